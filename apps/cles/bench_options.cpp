@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "bench_options.hpp"
+
+#include <unistd.h>
+
+namespace tool {
+
+const char* to_string(carrier c) {
+    switch (c) {
+    case carrier::tcp: return "tcp";
+    case carrier::unix_socket: return "unix";
+    case carrier::inproc: return "inproc";
+    }
+    return "";
+}
+
+const char* to_string(cles::perf::handler_style s) {
+    return s == cles::perf::handler_style::coroutine ? "coroutine" : "callback";
+}
+
+std::string bench_url(carrier c) {
+    switch (c) {
+    case carrier::tcp: return "tcp://127.0.0.1:0";
+    case carrier::unix_socket: return "unix://@cles-bench-" + std::to_string(::getpid());
+    case carrier::inproc: return "inproc://cles-bench";
+    }
+    return {};
+}
+
+} // namespace tool

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "perf/handler_style.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+namespace tool {
+
+enum class carrier : std::uint8_t { tcp, unix_socket, inproc };
+
+struct bench_options {
+    carrier transport = carrier::tcp;
+    cles::perf::handler_style style = cles::perf::handler_style::coroutine;
+    std::size_t rounds = 5;
+    std::uint64_t requests = 0;                          ///< in a pass; 0: what suits the measurement
+    std::optional<std::chrono::milliseconds> duration{}; ///< of a pass, instead
+    std::string against{};                               ///< a node that runs already
+
+    std::size_t in_flight = 1;
+
+    std::size_t binders = 1;
+    std::uint32_t keep = 0;
+};
+
+/// As in a URL.
+const char* to_string(carrier c);
+const char* to_string(cles::perf::handler_style s);
+
+/// Where the child is to listen.
+std::string bench_url(carrier c);
+
+} // namespace tool

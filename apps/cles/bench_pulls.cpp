@@ -1,0 +1,240 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/service.hpp>
+
+#include "bench_progress.hpp"
+#include "bench_run.hpp"
+#include "perf/byte_tap.hpp"
+#include "perf/child_process.hpp"
+#include "perf/cpu_clock.hpp"
+#include "perf/icd_exchange.hpp"
+#include "perf/icd_packet.hpp"
+#include "perf/latency_recorder.hpp"
+#include "perf/pinning.hpp"
+#include "perf/pull_exchange.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <algorithm>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include <unistd.h>
+
+namespace tool {
+
+namespace perf = cles::perf;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr std::uint64_t requests_alone = 50'000;
+constexpr std::uint64_t requests_in_flight = 1'000'000;
+// The room for a pass that is bounded by time: more than can come in a second, and no more than memory bears.
+constexpr std::uint64_t most_per_second_alone = 1'000'000;
+constexpr std::uint64_t most_per_second_in_flight = 4'000'000;
+constexpr std::uint64_t most_recorded = 20'000'000;
+constexpr std::uint64_t counted_bytes_of = 5'000;
+constexpr auto no_limit = std::chrono::nanoseconds::max();
+
+std::uint64_t requests_of(const bench_options& options) {
+    if (options.requests != 0) {
+        return options.requests;
+    }
+    const bool alone = options.in_flight == 1;
+    if (options.duration) {
+        const auto ms = static_cast<std::uint64_t>(options.duration->count());
+        return std::min(most_recorded, ms * (alone ? most_per_second_alone : most_per_second_in_flight) / 1000);
+    }
+    return alone ? requests_alone : requests_in_flight;
+}
+
+std::chrono::nanoseconds limit_of(const bench_options& options) {
+    return options.duration ? std::chrono::nanoseconds{*options.duration} : no_limit;
+}
+
+double microseconds(std::chrono::nanoseconds span) { return static_cast<double>(span.count()) / 1e3; }
+
+/// Measures one pass: what it took, on whose processor.
+class pass_meter {
+  public:
+    explicit pass_meter(std::optional<pid_t> server) : server_(server) {}
+
+    template <class Pass>
+    exchange_figures measure(perf::latency_recorder& record, Pass&& run) const {
+        const auto server_before = server_ ? perf::cpu_used(*server_) : 0ns;
+        const auto client_before = perf::cpu_used(::getpid());
+        const std::chrono::nanoseconds took = run();
+        const auto client = perf::cpu_used(::getpid()) - client_before;
+        const auto count = static_cast<double>(record.count());
+        exchange_figures figures;
+        if (server_) {
+            figures.cpu_server_us = microseconds(perf::cpu_used(*server_) - server_before) / count;
+        }
+        const auto quantiles = record.quantiles();
+        figures.p50_us = quantiles.p50;
+        figures.p99_us = quantiles.p99;
+        figures.p999_us = quantiles.p999;
+        figures.max_us = quantiles.max;
+        figures.requests_per_s = count / (microseconds(took) / 1e6);
+        figures.cpu_client_us = microseconds(client) / count;
+        return figures;
+    }
+
+  private:
+    std::optional<pid_t> server_;
+};
+
+std::chrono::nanoseconds pull_by_hand(perf::icd::client& client, std::chrono::nanoseconds at_most,
+                                      perf::latency_recorder& record) {
+    using clock = std::chrono::steady_clock;
+    record.clear();
+    const auto first = clock::now();
+    for (auto began = first;;) {
+        const auto value = client.pull();
+        const auto now = clock::now();
+        if (!perf::is_sample(value)) {
+            throw std::runtime_error("the hand-written exchange changed the values");
+        }
+        record.record(now - began);
+        if (record.full() || now - first >= at_most) {
+            return now - first;
+        }
+        began = now;
+    }
+}
+
+/// Sends some requests over a link that counts its bytes.
+void count_bytes(const std::string& url, const std::string& node, const std::string& noun, const bench_options& options,
+                 exchange_figures& figures) {
+    perf::byte_tap tap{cles::parse_url(url)};
+    boost::asio::io_context io{1};
+    cles::service client{io, {.name = "bench", .peers = {{node, tap.url()}}}};
+    perf::pull_load load{io, client, noun, options.style, false};
+    perf::latency_recorder record{counted_bytes_of};
+    load.run(1, no_limit, record);
+    figures.request_bytes = rounded(static_cast<double>(tap.to_server()) / static_cast<double>(counted_bytes_of));
+    figures.reply_bytes = rounded(static_cast<double>(tap.to_client()) / static_cast<double>(counted_bytes_of));
+}
+
+struct self_description {
+    std::string node;
+};
+BOOST_DESCRIBE_STRUCT(self_description, (), (node))
+
+std::string name_of_node_at(const std::string& url) {
+    boost::asio::io_context io{1};
+    cles::service client{io, {.name = "bench"}};
+    return cles::from_json<self_description>(client.request("PULL self:cles", cles::call_options{}.at(url))).node;
+}
+
+/// The hand-written exchange, both ends.
+class baseline {
+  public:
+    explicit baseline(int core)
+        : server_(core,
+                  [](const perf::child_process::announce& announce) {
+                      perf::icd::server server;
+                      announce(std::to_string(server.port()));
+                      server.run();
+                  }),
+          client_(static_cast<std::uint16_t>(std::stoul(server_.announced()))) {}
+
+    exchange_figures pass(std::chrono::nanoseconds at_most, perf::latency_recorder& record) {
+        auto figures = pass_meter{server_.id()}.measure(record, [&] { return pull_by_hand(client_, at_most, record); });
+        figures.cpu_us = figures.cpu_client_us + *figures.cpu_server_us;
+        figures.request_bytes = sizeof(perf::icd::request_packet);
+        figures.reply_bytes = sizeof(perf::icd::reply_packet);
+        return figures;
+    }
+
+  private:
+    perf::child_process server_;
+    perf::icd::client client_;
+};
+
+} // namespace
+
+pull_report bench_pulls(const bench_options& options) {
+    const bool remote = !options.against.empty();
+    const bool inproc = !remote && options.transport == carrier::inproc;
+    const auto cores = perf::place_ends();
+
+    // The children come first: before there is anything of ours that they would inherit.
+    std::unique_ptr<baseline> by_hand;
+    std::unique_ptr<perf::child_process> server;
+    std::string url = options.against;
+    if (!remote) {
+        by_hand = std::make_unique<baseline>(cores.server);
+        url = bench_url(options.transport);
+    }
+    if (!remote && !inproc) {
+        server =
+            std::make_unique<perf::child_process>(cores.server, [&](const perf::child_process::announce& announce) {
+                perf::serve_localization(url, announce);
+            });
+        url = server->announced();
+    }
+    perf::pin_to(cores.client);
+
+    boost::asio::io_context io{1};
+    std::unique_ptr<cles::service> neighbour;
+    if (inproc) {
+        neighbour = std::make_unique<cles::service>(io, cles::service_options{.name = "car1", .listen = {url}});
+        perf::register_localization(*neighbour);
+    }
+    const std::string node = remote ? name_of_node_at(url) : "car1";
+    const std::string noun = node + ":localization";
+    cles::service client{io, {.name = "bench", .peers = {{node, url}}}};
+    perf::pull_load load{io, client, noun, options.style, !remote};
+
+    const auto requests = requests_of(options);
+    perf::latency_recorder record{requests};
+    perf::latency_recorder warm_up{std::clamp<std::uint64_t>(requests / 10, 1, 20'000)};
+    // The baseline has one in flight and would take minutes for as many as a link full of them.
+    const auto by_hand_requests = options.in_flight == 1 ? requests : std::min(requests, requests_alone);
+    perf::latency_recorder by_hand_record{by_hand_requests};
+    perf::latency_recorder by_hand_warm_up{std::max<std::uint64_t>(1, by_hand_requests / 10)};
+    const auto limit = limit_of(options);
+    const pass_meter meter{server ? std::optional{server->id()} : std::nullopt};
+
+    std::vector<exchange_figures> hand_written;
+    std::vector<exchange_figures> ours;
+    pull_report report{.transport = remote ? cles::parse_url(url).scheme : to_string(options.transport),
+                       .style = to_string(options.style),
+                       .in_flight = options.in_flight,
+                       .rounds = options.rounds,
+                       .client_core = cores.client};
+    bench_progress progress{options.rounds * (by_hand ? 2 : 1)};
+    for (std::size_t round = 0; round < options.rounds; ++round) {
+        if (by_hand) {
+            progress.step("hand-written exchange");
+            by_hand->pass(limit, by_hand_warm_up);
+            hand_written.push_back(by_hand->pass(limit, by_hand_record));
+        }
+        progress.step("CLES");
+        load.run(options.in_flight, limit, warm_up);
+        ours.push_back(meter.measure(record, [&] { return load.run(options.in_flight, limit, record); }));
+        report.requests += record.count();
+    }
+
+    report.cles = median_of(ours);
+    if (inproc) {
+        report.cles.cpu_us = report.cles.cpu_client_us;
+    } else if (report.cles.cpu_server_us) {
+        report.cles.cpu_us = rounded(report.cles.cpu_client_us + *report.cles.cpu_server_us);
+    }
+    if (report.transport == "tcp" || report.transport == "unix") {
+        count_bytes(url, node, noun, options, report.cles);
+    }
+    if (remote) {
+        report.against = url;
+    } else {
+        report.server_core = inproc ? std::nullopt : std::optional{cores.server};
+        report.icd = median_of(hand_written);
+        report.ratio = ratio_of(report.cles, *report.icd);
+    }
+    return report;
+}
+
+} // namespace tool

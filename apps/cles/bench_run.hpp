@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "bench_options.hpp"
+#include "bench_report.hpp"
+
+namespace tool {
+
+/// PULL against the hand-written exchange, in turn, so that what disturbs the machine disturbs both.
+pull_report bench_pulls(const bench_options& options);
+
+/// UPDATE as fast as all binders take it, as text and as C++ values in turn.
+update_report bench_updates(const bench_options& options);
+
+} // namespace tool

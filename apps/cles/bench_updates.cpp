@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/service.hpp>
+
+#include "bench_progress.hpp"
+#include "bench_run.hpp"
+#include "perf/byte_tap.hpp"
+#include "perf/child_process.hpp"
+#include "perf/cpu_clock.hpp"
+#include "perf/pinning.hpp"
+#include "perf/update_exchange.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <algorithm>
+#include <string>
+
+#include <unistd.h>
+
+namespace tool {
+
+namespace perf = cles::perf;
+
+namespace {
+
+constexpr std::uint64_t deliveries_of_a_pass = 4'000'000;
+constexpr std::uint64_t most_updates = 1'000'000;
+constexpr std::uint64_t counted_bytes_of = 5'000;
+
+std::uint64_t updates_of(const bench_options& options) {
+    return options.requests != 0 ? options.requests
+                                 : std::clamp<std::uint64_t>(deliveries_of_a_pass / options.binders, 1, most_updates);
+}
+
+double microseconds(std::chrono::nanoseconds span) { return static_cast<double>(span.count()) / 1e3; }
+
+double count_bytes(const std::string& url) {
+    perf::byte_tap tap{cles::parse_url(url)};
+    boost::asio::io_context io{1};
+    cles::service client{io, {.name = "bench", .peers = {{"car1", tap.url()}}}};
+    perf::take_updates(io, client, {.binders = 1, .updates = counted_bytes_of});
+    return rounded(static_cast<double>(tap.to_client()) / static_cast<double>(counted_bytes_of));
+}
+
+update_figures take(boost::asio::io_context& io, cles::service& client, pid_t publisher,
+                    const perf::update_load& load) {
+    const auto publisher_before = perf::cpu_used(publisher);
+    const auto binder_before = perf::cpu_used(::getpid());
+    const auto tally = perf::take_updates(io, client, load);
+    const auto binder = perf::cpu_used(::getpid()) - binder_before;
+    const auto published = perf::cpu_used(publisher) - publisher_before;
+
+    const auto count = static_cast<double>(tally.delivered);
+    const double seconds = microseconds(tally.took) / 1e6;
+    update_figures figures;
+    figures.deliveries_per_s = count / seconds;
+    figures.updates_per_s = static_cast<double>(load.updates) / seconds;
+    figures.cpu_binder_us = microseconds(binder) / count;
+    figures.cpu_publisher_us = microseconds(published) / count;
+    figures.cpu_us = figures.cpu_binder_us + figures.cpu_publisher_us;
+    figures.missed = tally.missed;
+    return figures;
+}
+
+} // namespace
+
+update_report bench_updates(const bench_options& options) {
+    const auto cores = perf::place_ends();
+    perf::child_process publisher{cores.server, [&](const perf::child_process::announce& announce) {
+                                      perf::serve_updates(bench_url(options.transport), announce);
+                                  }};
+    const auto url = publisher.announced();
+    perf::pin_to(cores.client);
+
+    boost::asio::io_context io{1};
+    cles::service client{io, {.name = "bench", .peers = {{"car1", url}}}};
+
+    std::vector<update_figures> raw;
+    std::vector<update_figures> typed;
+    perf::update_load load{
+        .binders = options.binders, .updates = updates_of(options), .style = options.style, .keep = options.keep};
+    bench_progress progress{options.rounds * 2};
+    for (std::size_t round = 0; round < options.rounds; ++round) {
+        progress.step("updates as text");
+        load.form = perf::value_form::raw;
+        raw.push_back(take(io, client, publisher.id(), load));
+        progress.step("updates as C++ values");
+        load.form = perf::value_form::typed;
+        typed.push_back(take(io, client, publisher.id(), load));
+    }
+
+    update_report report{.transport = to_string(options.transport),
+                         .style = to_string(options.style),
+                         .binders = options.binders,
+                         .rounds = options.rounds,
+                         .updates = load.updates,
+                         .client_core = cores.client,
+                         .server_core = cores.server,
+                         .update_bytes = count_bytes(url),
+                         .raw = median_of(raw),
+                         .typed = median_of(typed)};
+    return report;
+}
+
+} // namespace tool

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "address.hpp"
+#include "client.hpp"
+#include "commands.hpp"
+#include "common_options.hpp"
+#include "context.hpp"
+#include "feed_command.hpp"
+#include "feed_events.hpp"
+#include "noun.hpp"
+#include "printer.hpp"
+
+#include <CLI/App.hpp>
+#include <CLI/Option.hpp>
+
+#include <cstdint>
+#include <memory>
+
+namespace tool {
+namespace {
+
+namespace asio = boost::asio;
+
+struct bind_command {
+    feed_command feed;
+    output_format format = output_format::automatic;
+};
+
+asio::awaitable<void> follow(client& asker, const bind_command& wanted) {
+    printer out{wanted.format, true};
+    const auto options = wanted.feed.options(asker);
+    auto feed = co_await asker.node().async_bind(wanted.feed.noun, options);
+    for (std::uint64_t shown = 0; wanted.feed.count == 0 || shown < wanted.feed.count;) {
+        const auto item = co_await feed.async_next();
+        if (item.has_value()) {
+            out.print(item.value.text, item.kind == cles::feed_event::update ? std::to_string(item.seq) : "-");
+            ++shown;
+        } else {
+            note_event(wanted.feed.noun, item);
+        }
+    }
+}
+
+} // namespace
+
+void add_bind(CLI::App& app, context& shared) {
+    auto wanted = std::make_shared<bind_command>();
+    auto* command = app.add_subcommand("bind", "Get updates as they are published");
+    wanted->feed.add_options(*command, "How many updates, the publisher's last value included; 0: until interrupted "
+                                       "(default 0)");
+    add_output_option(*command, wanted->format);
+    refuse_body(*command, "BIND");
+    command->footer("Updates that were missed, and a publisher lost and found again, are told on stderr.\n\n"
+                    "Examples:\n"
+                    "  cles bind car1:localization\n"
+                    "  cles bind car1:localization --every 1s -n 10\n"
+                    "  cles bind car1:localization -o json | jq -c '[.lat,.lon]'");
+    command->callback([wanted, &shared] {
+        check_noun(wanted->feed.noun);
+        client asker{wanted->feed.addresses, shared.verbosity};
+        wanted->feed.arm(asker);
+        shared.exit_code = asker.run(follow(asker, *wanted));
+    });
+}
+
+} // namespace tool

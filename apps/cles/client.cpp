@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "client.hpp"
+
+#include "exit_code.hpp"
+#include "failure.hpp"
+#include "logging.hpp"
+#include "output.hpp"
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include <csignal>
+#include <cstdlib>
+#include <exception>
+#include <utility>
+
+#include <unistd.h>
+
+namespace tool {
+
+using namespace std::chrono_literals;
+namespace asio = boost::asio;
+
+namespace {
+
+cles::service_options options_of(const address_book& addresses, int verbosity) {
+    addresses.check();
+    cles::service_options options;
+    options.name = "cles-" + std::to_string(::getpid());
+    options.peers = addresses.peers();
+    options.log = log_of_client(verbosity);
+    return options;
+}
+
+} // namespace
+
+client::client(const address_book& addresses, int verbosity)
+    : addresses_(addresses), signals_(io_, SIGINT, SIGTERM), end_timer_(io_), output_timer_(io_), sleep_timer_(io_),
+      node_(io_, options_of(addresses, verbosity)) {}
+
+cles::call_options client::options_for(std::string_view noun, std::optional<std::chrono::milliseconds> limit) const {
+    cles::call_options options;
+    const auto url = addresses_.url_for(noun.substr(0, noun.find(':')));
+    if (!url.empty()) {
+        options.at(url);
+    }
+    if (limit) {
+        options.deadline(*limit);
+    }
+    return options;
+}
+
+void client::end_after(std::chrono::milliseconds span) {
+    end_timer_.expires_after(span);
+    end_timer_.async_wait([this](boost::system::error_code code) {
+        if (!code && !finished_) {
+            end_early(exit_code::success);
+        }
+    });
+}
+
+asio::awaitable<void> client::sleep_until(std::chrono::steady_clock::time_point when) {
+    sleep_timer_.expires_at(when);
+    co_await sleep_timer_.async_wait(asio::use_awaitable);
+}
+
+int client::run(asio::awaitable<void> work) {
+    std::exception_ptr thrown;
+    wait_for_signal();
+    watch_output();
+    asio::co_spawn(io_, std::move(work),
+                   asio::bind_cancellation_slot(cancel_.slot(), [this, &thrown](std::exception_ptr failure) {
+                       finished_ = true;
+                       thrown = std::move(failure);
+                       // What was sent to withdraw a request still leaves; nothing else is waited for.
+                       node_.stop();
+                       signals_.cancel();
+                       end_timer_.cancel();
+                       output_timer_.cancel();
+                   }));
+    io_.run();
+    if (early_) {
+        return *early_;
+    }
+    return thrown ? report_failure(thrown) : exit_code::success;
+}
+
+void client::end_early(int code) {
+    if (!early_) {
+        early_ = code;
+        cancel_.emit(asio::cancellation_type::terminal);
+    }
+}
+
+void client::wait_for_signal() {
+    signals_.async_wait([this](boost::system::error_code code, int signal) {
+        if (code || finished_) {
+            return;
+        }
+        if (early_) { // asked again: there is no patience left
+            std::_Exit(exit_code::signalled + signal);
+        }
+        wait_for_signal();
+        end_early(exit_code::signalled + signal);
+    });
+}
+
+// Without this, `cles bind ... | head -1` would stay until the next update.
+void client::watch_output() {
+    output_timer_.expires_after(250ms);
+    output_timer_.async_wait([this](boost::system::error_code code) {
+        if (code || finished_) {
+            return;
+        }
+        if (is_output_closed()) {
+            end_early(exit_code::success);
+        } else {
+            watch_output();
+        }
+    });
+}
+
+} // namespace tool

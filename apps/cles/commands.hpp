@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+/// Each function adds one subcommand, which leaves its exit code in the context when it has run.
+namespace tool {
+
+struct context;
+
+void add_pull(CLI::App& app, context& shared);
+void add_push(CLI::App& app, context& shared);
+void add_delegate(CLI::App& app, context& shared);
+void add_bind(CLI::App& app, context& shared);
+void add_update(CLI::App& app, context& shared);
+void add_ping(CLI::App& app, context& shared);
+void add_hz(CLI::App& app, context& shared);
+void add_info(CLI::App& app, context& shared);
+void add_serve(CLI::App& app, context& shared);
+
+} // namespace tool

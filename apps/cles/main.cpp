@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/version.hpp>
+
+#include "bench.hpp"
+#include "commands.hpp"
+#include "context.hpp"
+#include "diagnostics.hpp"
+#include "exit_code.hpp"
+#include "failure.hpp"
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+#include <csignal>
+#include <exception>
+#include <string>
+#include <vector>
+
+namespace {
+
+constexpr auto about = "Talks to the nodes of a CLES network: five verbs, and what helps to look at them.";
+
+constexpr auto footer =
+    "Data goes to stdout, everything else to stderr. CLES_AT is the default of --at; NO_COLOR turns "
+    "colours off.\n\n"
+    "Exit codes: 0 ok, 1 local failure, 2 usage, 3 no such target or task, 4 deadline,\n"
+    "5 remote error, 6 busy, 130 interrupted.\n\n"
+    "Examples:\n"
+    "  cles serve                      # in one terminal\n"
+    "  cles info                       # in another\n"
+    "  cles pull car1:localization\n"
+    "  cles bind car1:localization\n"
+    "  cles delegate car1:sleep/3000";
+
+int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
+    try {
+        app.parse(argc, argv);
+        return shared.exit_code;
+    } catch (const CLI::Success& asked) { // --help, --version
+        return app.exit(asked);
+    } catch (const CLI::ParseError& wrong) {
+        const auto unknown = app.get_subcommands().empty() ? app.remaining() : std::vector<std::string>{};
+        tool::complain(unknown.empty() ? std::string{wrong.what()} : "there is no command '" + unknown.front() + "'");
+        tool::note("cles --help, or cles COMMAND --help, says what there is");
+        return tool::exit_code::usage;
+    }
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    // A reader that goes away shows as an error of the write, which ends the command without noise.
+    std::signal(SIGPIPE, SIG_IGN);
+    try {
+        tool::context shared;
+        CLI::App app{about, "cles"};
+        app.footer(footer);
+        app.fallthrough();
+        app.require_subcommand(1);
+        app.set_version_flag("--version", "cles " + std::string{cles::version});
+        app.add_flag("-v,--verbose", shared.verbosity, "Say more on stderr; twice: everything");
+        tool::add_pull(app, shared);
+        tool::add_push(app, shared);
+        tool::add_delegate(app, shared);
+        tool::add_bind(app, shared);
+        tool::add_update(app, shared);
+        tool::add_ping(app, shared);
+        tool::add_hz(app, shared);
+        tool::add_info(app, shared);
+        tool::add_serve(app, shared);
+#ifdef CLES_WITH_BENCH
+        tool::add_bench(app, shared.exit_code);
+#endif
+        return run(app, shared, argc, argv);
+    } catch (...) {
+        return tool::report_failure(std::current_exception());
+    }
+}

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "request_command.hpp"
+
+#include "body.hpp"
+#include "client.hpp"
+#include "common_options.hpp"
+#include "context.hpp"
+#include "noun.hpp"
+#include "progress_line.hpp"
+
+#include <CLI/App.hpp>
+#include <CLI/Option.hpp>
+
+#include <memory>
+
+namespace tool {
+
+namespace asio = boost::asio;
+
+struct request_loop {
+    static asio::awaitable<void> run(client& asker, const request_command& wanted, std::string command) {
+        printer out{wanted.format_, wanted.count_ != 1};
+        progress_line progress{wanted.progress_};
+        auto options = asker.options_for(wanted.noun_, wanted.timeout_);
+        if (wanted.verb_ == cles::verb::delegate && progress.is_wanted()) {
+            options.on_progress(
+                [&progress](double fraction, std::string_view details) { progress.show(fraction, details); });
+        }
+        auto next = std::chrono::steady_clock::now();
+        for (std::uint64_t i = 0; wanted.count_ == 0 || i < wanted.count_; ++i) {
+            if (i > 0 && wanted.interval_.count() > 0) {
+                next += wanted.interval_;
+                co_await asker.sleep_until(next);
+            }
+            const cles::json_text answer = co_await asker.node().async_request(command, options);
+            progress.clear();
+            out.print(answer.text);
+        }
+    }
+};
+
+void request_command::add_options(CLI::App& command) {
+    add_noun(command, noun_);
+    addresses_.add_options(command);
+    add_timeout(command, timeout_, verb_ == cles::verb::delegate ? "30s" : "5s");
+    add_count(command, count_, "How often; 0: until interrupted (default 1)");
+    add_duration(command, "-i,--interval", interval_, "From one request to the next; 0: no pause (default 1s)");
+    add_output_option(command, format_);
+}
+
+void request_command::add_body_option(CLI::App& command) {
+    command.add_option("-d,--data", body_, "The body: JSON, @FILE, or - for stdin")->type_name("JSON");
+}
+
+void request_command::add_progress_option(CLI::App& command) {
+    command.add_flag("--progress", progress_, "Show progress, a line per report, though stderr is no terminal");
+}
+
+int request_command::run() {
+    check_noun(noun_);
+    std::string command{to_string(verb_)};
+    command.append(" ").append(noun_);
+    if (body_) {
+        command.append(" ").append(read_body(*body_));
+    }
+    client asker{addresses_, shared_.verbosity};
+    return asker.run(request_loop::run(asker, *this, std::move(command)));
+}
+
+} // namespace tool

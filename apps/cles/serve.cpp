@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "address.hpp"
+#include "commands.hpp"
+#include "context.hpp"
+#include "exit_code.hpp"
+#include "failure.hpp"
+#include "logging.hpp"
+#include "output.hpp"
+#include "play_node.hpp"
+
+#include <boost/asio/signal_set.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Option.hpp>
+#include <CLI/Validators.hpp>
+
+#include <csignal>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace tool {
+
+namespace asio = boost::asio;
+
+namespace {
+
+struct serve_command {
+    std::string name = "car1";
+    std::vector<std::string> listen;
+    bool insecure = false;
+    double rate = 10;
+};
+
+cles::service_options options_of(const serve_command& wanted, const cles::log_sink& log) {
+    cles::service_options options;
+    options.name = wanted.name;
+    options.listen = wanted.listen;
+    if (options.listen.empty()) {
+        options.listen.emplace_back(default_url);
+    }
+    options.insecure = wanted.insecure;
+    options.log = log;
+    return options;
+}
+
+int serve(const serve_command& wanted, int verbosity) {
+    const auto log = log_of_server(verbosity);
+    asio::io_context io{1};
+    play_node node{io, options_of(wanted, log), wanted.rate};
+
+    asio::signal_set signals{io, SIGINT, SIGTERM};
+    signals.async_wait([&](boost::system::error_code code, int signal) {
+        if (!code) {
+            log(cles::log_level::info, signal == SIGINT ? "stopping on SIGINT" : "stopping on SIGTERM");
+            node.stop();
+        }
+    });
+    for (const auto& endpoint : node.service().endpoints()) {
+        write_output(wanted.name + " listening on " + endpoint + "\n");
+    }
+    io.run();
+    return exit_code::success;
+}
+
+} // namespace
+
+void add_serve(CLI::App& app, context& shared) {
+    auto wanted = std::make_shared<serve_command>();
+    auto* command = app.add_subcommand("serve", "Run a node to play with");
+    command->add_option("--name", wanted->name, "What the node is called (default car1)")->type_name("NAME");
+    command
+        ->add_option("-l,--listen", wanted->listen,
+                     "Where it listens, may be repeated; port 0: a free one (default " + std::string{default_url} + ")")
+        ->type_name("URL")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    command->add_option("--rate", wanted->rate, "Localizations published a second; 0: only on PULL (default 10)")
+        ->type_name("HZ")
+        ->check(CLI::Range(0.0, 1e6).description(""));
+    command->add_flag("--insecure", wanted->insecure,
+                      "Allow listening beyond this host, where anybody may ask for anything");
+    command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
+                    "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop it.\n\n"
+                    "Examples:\n"
+                    "  cles serve\n"
+                    "  cles serve --name car2 --listen tcp://127.0.0.1:0 --listen unix:///tmp/car2.sock --rate 50\n"
+                    "  cles serve --listen tcp://0.0.0.0 --insecure");
+    command->callback([wanted, &shared] { shared.exit_code = serve(*wanted, shared.verbosity); });
+}
+
+} // namespace tool

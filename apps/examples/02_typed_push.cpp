@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSL-1.0
+// Structs travel as JSON and arrive as structs. What does not fit is refused by naming the path to it.
+#include <cles/service.hpp>
+
+#include "rethrow.hpp"
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+
+#include <iostream>
+
+namespace asio = boost::asio;
+
+struct point {
+    double lat = 0, lon = 0;
+    std::optional<std::string> name{}; // may be absent
+};
+BOOST_DESCRIBE_STRUCT(point, (), (lat, lon, name))
+
+struct route {
+    std::vector<point> points{};
+};
+BOOST_DESCRIBE_STRUCT(route, (), (points))
+
+asio::awaitable<void> drive(cles::service& car, cles::service& planner) {
+    const route home{{{48.1, 11.5, "start"}, {48.2, 11.6}}};
+    const auto taken = co_await planner.async_push<int>("car:route", home);
+    std::cout << "the car took " << taken << " points\n";
+
+    try {
+        co_await planner.async_request(
+            R"(PUSH car:route {"points":[{"lat":48.1,"lon":11.5},{"lat":48.2,"lon":"east"}]})");
+    } catch (const cles::error& refused) {
+        std::cout << refused.what() << '\n';
+    }
+    car.stop();
+    planner.stop();
+}
+
+int main() {
+    asio::io_context io;
+    cles::service car{io, {.name = "car", .listen = {"tcp://127.0.0.1:0"}}};
+    car.on_push("route", [](const route& r) {
+        std::cout << "from " << r.points.front().name.value_or("somewhere") << " to " << r.points.back().lat << '\n';
+        return r.points.size();
+    });
+
+    cles::service planner{io, {.name = "planner", .peers = {{"car", car.endpoints().front()}}}};
+    asio::co_spawn(io, drive(car, planner), examples::rethrow);
+    io.run();
+}
+
+// Prints:
+// from start to 48.2
+// the car took 2 points
+// bad_request: car: the body does not fit: points[1].lon: expected a number, got a string (at byte ...)

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSL-1.0
+// A feed: it begins with the last value, tells of gaps, and survives its publisher.
+#include <cles/service.hpp>
+
+#include "rethrow.hpp"
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+
+#include <iostream>
+#include <memory>
+
+namespace asio = boost::asio;
+
+std::unique_ptr<cles::service> start_car(const asio::any_io_executor& executor) {
+    return std::make_unique<cles::service>(executor, cles::service_options{.name = "car", .listen = {"inproc://car"}});
+}
+
+void show(const cles::feed_item<double>& item) {
+    switch (item.kind) {
+    case cles::feed_event::current: std::cout << "as it stands: " << item.value << '\n'; break;
+    case cles::feed_event::update: std::cout << "update " << item.seq << ": " << item.value << '\n'; break;
+    case cles::feed_event::gap: std::cout << item.missed << " missed\n"; break;
+    case cles::feed_event::lost: std::cout << "the publisher is lost\n"; break;
+    case cles::feed_event::rebound: std::cout << "the publisher is back\n"; break;
+    }
+}
+
+asio::awaitable<void> follow(std::unique_ptr<cles::service> car, cles::service& me) {
+    car->update("speed", 10.5);
+    auto feed = co_await me.async_bind<double>("car:speed", cles::bind_options{}.keep(2));
+    show(co_await feed.async_next());
+    car->update("speed", 11.0);
+    show(co_await feed.async_next());
+    for (const double speed : {12.0, 13.0, 14.0, 15.0, 16.0}) {
+        car->update("speed", speed); // at once: more than the two that are kept for this binder
+    }
+    for (int i = 0; i < 3; ++i) {
+        show(co_await feed.async_next());
+    }
+
+    car.reset();
+    car = start_car(me.get_executor());
+    car->update("speed", 0.0);
+    for (int i = 0; i < 3; ++i) {
+        show(co_await feed.async_next());
+    }
+    car->stop();
+    me.stop();
+}
+
+int main() {
+    asio::io_context io;
+    cles::service me{io, {.name = "me", .peers = {{"car", "inproc://car"}}}};
+    asio::co_spawn(io, follow(start_car(me.get_executor()), me), examples::rethrow);
+    io.run();
+}
+
+// Prints:
+// as it stands: 10.5
+// update 2: 11
+// 3 missed
+// update 6: 15
+// update 7: 16
+// the publisher is lost
+// the publisher is back
+// as it stands: 0

@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: BSL-1.0
+
+# cles_target_sanitizers(target): instruments the target as CLES_SANITIZE says. Nothing recovers: the first finding ends
+# the program, so that no test passes over one.
+function(cles_target_sanitizers target)
+    if(NOT CLES_SANITIZE)
+        return()
+    endif()
+
+    string(REPLACE ";" "," kinds "${CLES_SANITIZE}")
+    set(flags -fsanitize=${kinds} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    set(quiet)
+
+    if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+        if("thread" IN_LIST CLES_SANITIZE)
+            # Asio's fences: g++ warns of each that it cannot instrument.
+            list(APPEND quiet -Wno-tsan)
+        endif()
+        if("address" IN_LIST CLES_SANITIZE)
+            # Instrumented Asio looks uninitialized to g++ 12. The builds without sanitizers keep this warning.
+            list(APPEND quiet -Wno-maybe-uninitialized)
+        endif()
+    elseif("undefined" IN_LIST CLES_SANITIZE)
+        # clang 14's check of function types breaks Asio's coroutines.
+        list(APPEND flags -fno-sanitize=function)
+    endif()
+
+    target_compile_options(${target} PRIVATE ${flags} ${quiet})
+    # A program that links an instrumented library needs the runtime, whoever wrote the program.
+    target_link_options(${target} PUBLIC ${flags})
+endfunction()
+
+# CLES_TEST_LAUNCHER: what has to stand before a test's command. g++ 12's thread sanitizer cannot start where the kernel
+# spreads addresses over more than 28 bits, so there the tests run with that turned off.
+set(CLES_TEST_LAUNCHER)
+if("thread" IN_LIST CLES_SANITIZE AND EXISTS /proc/sys/vm/mmap_rnd_bits)
+    file(READ /proc/sys/vm/mmap_rnd_bits cles_rnd_bits)
+    string(STRIP "${cles_rnd_bits}" cles_rnd_bits)
+    find_program(CLES_SETARCH setarch)
+    mark_as_advanced(CLES_SETARCH)
+    if(cles_rnd_bits GREATER 28 AND CLES_SETARCH)
+        execute_process(COMMAND ${CLES_SETARCH} -R true RESULT_VARIABLE cles_setarch_result OUTPUT_QUIET ERROR_QUIET)
+        if(cles_setarch_result EQUAL 0)
+            set(CLES_TEST_LAUNCHER ${CLES_SETARCH} -R)
+        endif()
+    endif()
+endif()

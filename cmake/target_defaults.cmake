@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: BSL-1.0
+
+# cles_target_defaults(target): every target of ours calls this once, after it is defined.
+function(cles_target_defaults target)
+    cles_target_warnings(${target})
+    cles_target_sanitizers(${target})
+
+    if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
+        # One section per function, so that a program carries only what it uses.
+        target_compile_options(${target} PRIVATE -ffunction-sections -fdata-sections)
+        # No path of the machine that compiled ends up in a program.
+        target_compile_options(${target} PRIVATE "-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=")
+
+        get_target_property(type ${target} TYPE)
+        if(type STREQUAL "EXECUTABLE" OR type STREQUAL "MODULE_LIBRARY" OR type STREQUAL "SHARED_LIBRARY")
+            target_link_options(${target} PRIVATE LINKER:--gc-sections)
+        endif()
+    endif()
+
+    # The standard library checks its own preconditions in every build that is not for release.
+    target_compile_definitions(${target} PRIVATE $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS>)
+endfunction()

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace cles {
+
+/// What a caller may say of one request. Set by chaining: `cles::call_options{}.deadline(200ms).at("tcp://10.0.0.2")`.
+class call_options {
+  public:
+    call_options() = default;
+
+    /// How long to wait for the answer; the peer is told. 0: the protocol's default (5 s, DELEGATE 30 s). At most a
+    /// day.
+    call_options& deadline(std::chrono::milliseconds limit) {
+        deadline_ = limit;
+        return *this;
+    }
+    /// Where to send it, instead of asking the directory for the target's name.
+    call_options& at(std::string_view url) {
+        at_ = url;
+        return *this;
+    }
+    /// Where the peer's own words go if the request fails; written before the request completes, which it must outlive.
+    call_options& diagnostics(std::string& text) {
+        diagnostics_ = &text;
+        return *this;
+    }
+    /// Called for each report of a DELEGATE's progress with a fraction from 0 to 1 and a JSON object. It runs in line,
+    /// on the service's executor; asks the peer for reports.
+    call_options& on_progress(std::function<void(double, std::string_view)> callback) {
+        on_progress_ = std::move(callback);
+        return *this;
+    }
+
+    std::chrono::milliseconds deadline_{0};
+    std::string at_{};
+    std::string* diagnostics_ = nullptr;
+    std::function<void(double, std::string_view)> on_progress_{};
+};
+
+/// What a binder may say of one binding.
+class bind_options : public call_options {
+  public:
+    bind_options() = default;
+
+    /// At most one update in so long, always the newest. 0: every one.
+    bind_options& every(std::chrono::milliseconds interval) {
+        every_ = interval;
+        return *this;
+    }
+    /// How many updates the publisher queues while this binder is slow (1 to 65536, 64 where nothing is said).
+    bind_options& keep(std::uint32_t updates) {
+        keep_ = updates;
+        return *this;
+    }
+    bind_options& deadline(std::chrono::milliseconds limit) {
+        call_options::deadline(limit);
+        return *this;
+    }
+    bind_options& at(std::string_view url) {
+        call_options::at(url);
+        return *this;
+    }
+    bind_options& diagnostics(std::string& text) {
+        call_options::diagnostics(text);
+        return *this;
+    }
+
+    std::chrono::milliseconds every_{0};
+    std::uint32_t keep_ = 0;
+};
+
+} // namespace cles

@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/append.hpp>
+#include <boost/asio/associated_allocator.hpp>
+#include <boost/asio/associated_executor.hpp>
+#include <boost/asio/dispatch.hpp>
+#include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include <exception>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+/// How an operation's handler is kept and called. Not for applications.
+
+namespace boost::asio {
+template <typename Allocator>
+class use_future_t;
+}
+
+namespace cles::detail {
+
+/// Tokens whose user is told of a failure by an exception, which then carries the peer's own words.
+template <class Token>
+inline constexpr bool throws = false;
+template <class E>
+inline constexpr bool throws<boost::asio::use_awaitable_t<E>> = true;
+template <class A>
+inline constexpr bool throws<boost::asio::use_future_t<A>> = true;
+
+template <bool Throws, class... T>
+struct signature {
+    using type = void(boost::system::error_code, T...);
+};
+template <class... T>
+struct signature<true, T...> {
+    using type = void(std::exception_ptr, T...);
+};
+template <class Token, class... T>
+using signature_for = typename signature<throws<std::remove_cvref_t<Token>>, T...>::type;
+
+/// Completes a handler on its executor: in line where that is the service's own, which completions run on already.
+template <bool Throws, class Handler>
+class completion {
+  public:
+    using allocator_type = boost::asio::associated_allocator_t<Handler>;
+
+    completion(Handler handler, const boost::asio::any_io_executor& service)
+        : handler_(std::move(handler)), service_(service) {
+        const auto executor = boost::asio::get_associated_executor(handler_, service_);
+        if (boost::asio::any_io_executor{executor} != service_) {
+            work_.emplace(executor); // the handler's own context must not run out of work meanwhile
+        }
+    }
+
+    [[nodiscard]] const Handler& handler() const noexcept { return handler_; }
+
+    template <class... T>
+    void operator()(boost::system::error_code code, std::string_view message, T&&... values) && {
+        if constexpr (Throws) {
+            auto thrown = code ? std::make_exception_ptr(error(code, std::string{message})) : std::exception_ptr{};
+            std::move(*this).run(std::move(thrown), std::forward<T>(values)...);
+        } else {
+            std::move(*this).run(code, std::forward<T>(values)...);
+        }
+    }
+
+  private:
+    template <class... A>
+    void run(A&&... arguments) && {
+        const auto executor = boost::asio::get_associated_executor(handler_, service_);
+        if (!work_) {
+            std::move(handler_)(std::forward<A>(arguments)...);
+        } else {
+            boost::asio::dispatch(executor, boost::asio::append(std::move(handler_), std::forward<A>(arguments)...));
+            work_.reset();
+        }
+    }
+
+    Handler handler_;
+    boost::asio::any_io_executor service_;
+    using executor_type = boost::asio::associated_executor_t<Handler, boost::asio::any_io_executor>;
+    std::optional<boost::asio::executor_work_guard<executor_type>> work_;
+};
+
+/// Makes an operation that lives in memory of its handler's allocator.
+template <class Operation, class Handler, class... A>
+Operation* make_operation(Handler handler, A&&... arguments) {
+    using allocator_type =
+        typename std::allocator_traits<boost::asio::associated_allocator_t<Handler>>::template rebind_alloc<Operation>;
+    allocator_type allocator{boost::asio::get_associated_allocator(handler)};
+    auto* memory = std::allocator_traits<allocator_type>::allocate(allocator, 1);
+    return ::new (static_cast<void*>(memory)) Operation(std::move(handler), std::forward<A>(arguments)...);
+}
+
+/// Ends an operation: its memory goes before its handler is called, so that the handler's next operation finds it free.
+template <class Operation, class Completion, class... A>
+void end_operation(Operation* self, Completion& kept, boost::system::error_code code, std::string_view message,
+                   A&&... values) {
+    auto complete = std::move(kept);
+    typename std::allocator_traits<typename Completion::allocator_type>::template rebind_alloc<Operation> allocator{
+        boost::asio::get_associated_allocator(complete.handler())};
+    std::destroy_at(self);
+    std::allocator_traits<decltype(allocator)>::deallocate(allocator, self, 1);
+    std::move(complete)(code, message, std::forward<A>(values)...);
+}
+
+/// Destroys an operation without calling its handler.
+template <class Operation, class Completion>
+void discard_operation(Operation* self, Completion& kept) noexcept {
+    const auto complete = std::move(kept);
+    typename std::allocator_traits<typename Completion::allocator_type>::template rebind_alloc<Operation> allocator{
+        boost::asio::get_associated_allocator(complete.handler())};
+    std::destroy_at(self);
+    std::allocator_traits<decltype(allocator)>::deallocate(allocator, self, 1);
+}
+
+} // namespace cles::detail

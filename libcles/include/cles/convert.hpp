@@ -1,0 +1,199 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+#include <cles/json_reader.hpp>
+#include <cles/json_writer.hpp>
+
+#include <boost/describe/enumerators.hpp>
+#include <boost/describe/members.hpp>
+
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+/// Conversion between C++ types and JSON text, without a document tree in between.
+///
+/// Understood are `bool`, integers, floating-point numbers, strings, `std::optional`, `std::vector`, `std::array`,
+/// `std::map<std::string, T>`, structs described with `BOOST_DESCRIBE_STRUCT` (their described bases too), described
+/// enums (by name), `json_text`, and `boost::json::value` with `<cles/json_value.hpp>`. A type of your own joins them
+/// by a specialisation of `cles::converter`.
+///
+/// Reading is tolerant where a newer writer may differ: unknown members are passed over, and a `std::optional` member
+/// may be absent or null. Any other member that is missing, or of another kind, is an error that names the path to it,
+/// as in "route[2].lat: expected a number, got a string".
+
+namespace cles {
+
+/// JSON text as a value of its own. Reading copies it; writing checks it and drops its white space.
+struct json_text {
+    json_text() = default;
+    json_text(std::string json) : text(std::move(json)) {} // NOLINT(google-explicit-constructor): text is what it is
+    json_text(const char* json) : text(json) {}            // NOLINT(google-explicit-constructor)
+
+    std::string text = "{}";
+};
+
+/// How T is written and read. Specialise with
+/// `static void write(json_writer&, const T&)` and `static bool read(json_reader&, T&)`.
+template <class T>
+struct converter;
+
+template <class T>
+void write_json(json_writer& w, const T& value) {
+    converter<T>::write(w, value);
+}
+
+/// False on failure; the reader then says what and where.
+template <class T>
+bool read_json(json_reader& r, T& value) {
+    return converter<T>::read(r, value);
+}
+
+template <class T>
+std::string to_json(const T& value) {
+    std::string out;
+    json_writer writer{out};
+    write_json(writer, value);
+    return out;
+}
+
+/// Reads all of `text` as a T. On failure `why` (if given) says what was expected, where.
+template <class T>
+bool from_json(std::string_view text, T& value, std::string* why = nullptr) {
+    json_reader reader{text};
+    if (read_json(reader, value) && reader.at_end()) {
+        return true;
+    }
+    if (why != nullptr) {
+        *why = reader.error();
+    }
+    return false;
+}
+
+/// \throws cles::error with `errc::conversion`
+template <class T>
+T from_json(std::string_view text) {
+    T value{};
+    std::string why;
+    if (!from_json(text, value, &why)) {
+        throw error(errc::conversion, why);
+    }
+    return value;
+}
+
+namespace detail {
+
+/// \throws cles::error with `failed` where the text is not JSON
+void write_text(json_writer& w, std::string_view json);
+
+template <class T>
+concept described_struct = std::is_class_v<T> && boost::describe::has_describe_members<T>::value;
+
+template <class T>
+concept described_enum = std::is_enum_v<T> && boost::describe::has_describe_enumerators<T>::value;
+
+} // namespace detail
+
+template <>
+struct converter<bool> {
+    static void write(json_writer& w, bool value) { w.value(value); }
+    static bool read(json_reader& r, bool& value) { return r.read(value); }
+};
+
+template <class T>
+    requires(std::integral<T> && !std::same_as<T, bool>)
+struct converter<T> {
+    using wide = std::conditional_t<std::is_signed_v<T>, std::int64_t, std::uint64_t>;
+    static void write(json_writer& w, T value) { w.value(static_cast<wide>(value)); }
+    static bool read(json_reader& r, T& value) {
+        wide number{};
+        if (!r.read(number)) {
+            return false;
+        }
+        if (!std::in_range<T>(number)) {
+            return r.fail("an integer out of range");
+        }
+        value = static_cast<T>(number);
+        return true;
+    }
+};
+
+template <std::floating_point T>
+struct converter<T> {
+    static void write(json_writer& w, T value) { w.value(static_cast<double>(value)); }
+    static bool read(json_reader& r, T& value) {
+        if (r.peek() == json_reader::kind::null) { // the written form of a number that is not finite
+            value = std::numeric_limits<T>::quiet_NaN();
+            return r.read_null();
+        }
+        double number = 0;
+        if (!r.read(number)) {
+            return false;
+        }
+        value = static_cast<T>(number);
+        return true;
+    }
+};
+
+template <>
+struct converter<std::string> {
+    static void write(json_writer& w, const std::string& value) { w.value(std::string_view{value}); }
+    static bool read(json_reader& r, std::string& value) { return r.read(value); }
+};
+
+template <>
+struct converter<std::string_view> {
+    static void write(json_writer& w, std::string_view value) { w.value(value); }
+};
+
+template <std::size_t N>
+struct converter<char[N]> {
+    static void write(json_writer& w, const char* value) { w.value(std::string_view{value}); }
+};
+
+template <>
+struct converter<const char*> {
+    static void write(json_writer& w, const char* value) { w.value(std::string_view{value}); }
+};
+
+template <>
+struct converter<json_text> {
+    static void write(json_writer& w, const json_text& value) { detail::write_text(w, value.text); }
+    static bool read(json_reader& r, json_text& value) {
+        std::string_view raw;
+        if (!r.read_raw(raw)) {
+            return false;
+        }
+        value.text = raw;
+        return true;
+    }
+};
+
+template <class T>
+struct converter<std::optional<T>> {
+    static void write(json_writer& w, const std::optional<T>& value) {
+        if (value) {
+            write_json(w, *value);
+        } else {
+            w.null();
+        }
+    }
+    static bool read(json_reader& r, std::optional<T>& value) {
+        if (r.peek() == json_reader::kind::null) {
+            value.reset();
+            return r.read_null();
+        }
+        return read_json(r, value.emplace());
+    }
+};
+
+} // namespace cles
+
+#include <cles/convert_containers.hpp>
+#include <cles/convert_described.hpp>

@@ -1,0 +1,203 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/completion.hpp>
+#include <cles/feed_event.hpp>
+#include <cles/pending.hpp>
+#include <cles/reply_operation.hpp>
+
+#include <boost/asio/associated_cancellation_slot.hpp>
+#include <boost/asio/async_result.hpp>
+#include <boost/asio/cancellation_type.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace cles {
+
+/// What a feed has to tell.
+template <class T>
+struct feed_item {
+    feed_event kind = feed_event::update;
+    T value{};               ///< of `current` and `update`
+    std::string publisher{}; ///< the node's name; empty where it is not known
+    std::uint64_t seq = 0;   ///< of an `update`: its number in the noun's publications
+    std::uint64_t missed = 0;
+    std::string text{};
+
+    /// True for the kinds that carry a value.
+    [[nodiscard]] bool has_value() const noexcept { return kind == feed_event::current || kind == feed_event::update; }
+};
+
+namespace detail {
+
+using event_ptr = std::unique_ptr<pending_event, discarding>;
+
+/// The part of a feed that does not depend on its type; implemented by the service.
+class feed_control {
+  public:
+    virtual ~feed_control() = default;
+    /// Binds. The operation completes when the publisher has answered; where it fails, the feed is closed.
+    virtual void start(pending_ptr bound) = 0;
+    /// Takes the event that waits, or keeps the operation until one comes. A second operation while one waits fails.
+    virtual void next(event_ptr operation) = 0;
+    /// Withdraws the operation that waits, if any.
+    virtual void cancel() = 0;
+    /// Unbinds.
+    virtual void close() = 0;
+    [[nodiscard]] virtual const boost::asio::any_io_executor& executor() const = 0;
+};
+
+template <class T>
+boost::system::error_code fill(const raw_event& event, feed_item<T>& item, std::string& why) {
+    item.kind = event.kind;
+    item.publisher = event.publisher;
+    item.seq = event.seq;
+    item.missed = event.missed;
+    item.text = event.text;
+    if (!item.has_value()) {
+        return {};
+    }
+    bool fits = false;
+    if constexpr (std::is_same_v<T, json_text>) { // checked when it came
+        item.value.text = event.body;
+        fits = true;
+    } else if constexpr (comes_wrapped<T>) {
+        wrapped<T> value{};
+        fits = from_json(event.body, value, &why);
+        item.value = std::move(value.value);
+    } else {
+        fits = from_json(event.body, item.value, &why);
+    }
+    if (fits) {
+        return {};
+    }
+    why.insert(0, "the update does not fit: ");
+    return errc::conversion;
+}
+
+template <class T, bool Throws, class Handler>
+class event_operation final : public pending_event {
+  public:
+    event_operation(Handler handler, const boost::asio::any_io_executor& service)
+        : complete_(std::move(handler), service) {}
+
+    void deliver(const raw_event& event) override {
+        feed_item<T> item;
+        std::string why;
+        const auto code = fill(event, item, why);
+        end_operation(this, complete_, code, why, std::move(item));
+    }
+
+    void fail(boost::system::error_code code, std::string_view message) override {
+        end_operation(this, complete_, code, std::string{message}, feed_item<T>{});
+    }
+
+    void discard() noexcept override { discard_operation(this, complete_); }
+
+  private:
+    completion<Throws, Handler> complete_;
+};
+
+} // namespace detail
+
+template <class T>
+class feed;
+
+namespace detail {
+
+/// Completes `async_bind` with the feed.
+template <class T, bool Throws, class Handler>
+class bind_operation final : public pending {
+  public:
+    bind_operation(Handler handler, const boost::asio::any_io_executor& service, std::shared_ptr<feed_control> control,
+                   std::string* diagnostics)
+        : complete_(std::move(handler), service), control_(std::move(control)), diagnostics_(diagnostics) {}
+
+    verdict offer(std::string_view) override {
+        feed<T> bound{std::move(control_)};
+        end_operation(this, complete_, {}, {}, std::move(bound));
+        return verdict::completed;
+    }
+
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::string text{message};
+        if (diagnostics_ != nullptr) {
+            *diagnostics_ = text;
+        }
+        end_operation(this, complete_, code, text, feed<T>{});
+    }
+
+    void discard() noexcept override { discard_operation(this, complete_); }
+
+  private:
+    completion<Throws, Handler> complete_;
+    std::shared_ptr<feed_control> control_;
+    std::string* diagnostics_;
+};
+
+} // namespace detail
+
+/// A binding from the binder's side: updates of one noun, and what happens to it.
+///
+/// Events come in order. While nobody fetches them, the newest are kept, up to `limits::feed`; what is dropped shows as
+/// a gap. When the publisher is lost the feed says so once and binds again by itself, backing off from 100 ms to 5 s.
+/// It ends with its last handle: destruction unbinds. Use it on the service's executor, with one `async_next` at a
+/// time; it may outlive the service, and then fails with `stopped`.
+template <class T>
+class feed {
+  public:
+    using value_type = T;
+
+    feed() = default;
+    explicit feed(std::shared_ptr<detail::feed_control> control) : control_(std::move(control)) {}
+    feed(feed&&) noexcept = default;
+    feed& operator=(feed&& other) noexcept {
+        close();
+        control_ = std::move(other.control_);
+        return *this;
+    }
+    feed(const feed&) = delete;
+    feed& operator=(const feed&) = delete;
+    ~feed() { close(); }
+
+    /// The next event. An update that is not a T fails with `conversion`, and the next call goes on behind it.
+    /// Cancellation (terminal, partial or total) leaves the feed as it was.
+    template <class Token = boost::asio::use_awaitable_t<>>
+    auto async_next(Token&& token = {}) {
+        constexpr bool with_exceptions = detail::throws<std::remove_cvref_t<Token>>;
+        return boost::asio::async_initiate<Token, detail::signature_for<Token, feed_item<T>>>(
+            [control = control_](auto handler) {
+                auto slot = boost::asio::get_associated_cancellation_slot(handler);
+                if (slot.is_connected()) {
+                    slot.assign([weak = std::weak_ptr{control}](boost::asio::cancellation_type type) {
+                        const auto alive = weak.lock();
+                        if (alive && type != boost::asio::cancellation_type::none) {
+                            alive->cancel();
+                        }
+                    });
+                }
+                using operation_type = detail::event_operation<T, with_exceptions, decltype(handler)>;
+                const auto executor = control->executor();
+                control->next(detail::event_ptr{detail::make_operation<operation_type>(std::move(handler), executor)});
+            },
+            token);
+    }
+
+    /// Unbinds. An `async_next` that waits fails with `cancelled`.
+    void close() {
+        if (auto control = std::exchange(control_, nullptr)) {
+            control->close();
+        }
+    }
+
+    [[nodiscard]] bool is_open() const noexcept { return control_ != nullptr; }
+
+  private:
+    std::shared_ptr<detail::feed_control> control_;
+};
+
+} // namespace cles

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <boost/system/error_code.hpp>
+
+#include <cstdint>
+#include <string_view>
+
+namespace cles {
+
+/// What happens to a binding, as its feed tells it.
+enum class feed_event : std::uint8_t {
+    current, ///< the publisher's last value, as it stood when the binding was made; it bears no `seq`
+    update,  ///< an update
+    gap,     ///< `missed` updates went by unseen
+    lost,    ///< the publisher was lost, for the reason in `text`; the feed binds again by itself
+    rebound, ///< the publisher is back
+};
+
+namespace detail {
+
+/// An event as it comes from the link; views are valid for the call.
+struct raw_event {
+    feed_event kind = feed_event::update;
+    std::string_view body = "{}";
+    std::string_view publisher{};
+    std::uint64_t seq = 0;
+    std::uint64_t missed = 0;
+    std::string_view text{};
+};
+
+/// One call of `async_next` that waits.
+class pending_event {
+  public:
+    pending_event() = default;
+    pending_event(const pending_event&) = delete;
+    pending_event& operator=(const pending_event&) = delete;
+    virtual void deliver(const raw_event& event) = 0;
+    virtual void fail(boost::system::error_code code, std::string_view message) = 0;
+    /// Destroys it without calling its handler.
+    virtual void discard() noexcept = 0;
+
+  protected:
+    ~pending_event() = default;
+};
+
+} // namespace detail
+
+} // namespace cles

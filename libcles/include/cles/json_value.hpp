@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/convert.hpp>
+
+#include <boost/json/value.hpp>
+
+namespace cles {
+
+/// `boost::json::value` as an argument or result of a handler, for those who want a tree. Doubles are read and written
+/// by the library's own reader and writer, so that they come back exactly.
+template <>
+struct converter<boost::json::value> {
+    static void write(json_writer& w, const boost::json::value& value);
+    static bool read(json_reader& r, boost::json::value& value);
+};
+
+template <>
+struct converter<boost::json::object> {
+    static void write(json_writer& w, const boost::json::object& value);
+    static bool read(json_reader& r, boost::json::object& value);
+};
+
+template <>
+struct converter<boost::json::array> {
+    static void write(json_writer& w, const boost::json::array& value);
+    static bool read(json_reader& r, boost::json::array& value);
+};
+
+} // namespace cles

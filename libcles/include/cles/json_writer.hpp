@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace cles {
+
+/// Appends JSON (RFC 8259) without white space to a string that it borrows.
+///
+/// Commas and colons come by themselves: call `key` before each member of an object, and one value after it. Doubles
+/// are written with the fewest digits that read back the same (`45.1`); a double that is not finite becomes `null`,
+/// since JSON has no name for it. Text that is not UTF-8 is written with U+FFFD where it is broken, so that what is
+/// written is always valid. Not thread-safe; the string must outlive the writer.
+class json_writer {
+  public:
+    explicit json_writer(std::string& out) noexcept : out_(out), start_(out.size()) {}
+
+    void begin_object() { open('{'); }
+    void end_object() { out_.push_back('}'); }
+    void begin_array() { open('['); }
+    void end_array() { out_.push_back(']'); }
+    void key(std::string_view name);
+    /// A name that needs no escapes, as that of a C++ member.
+    void plain_key(std::string_view name);
+
+    void null();
+    void value(bool b);
+    void value(double d);
+    void value(std::int64_t i);
+    void value(std::uint64_t u);
+    void value(std::string_view text);
+    /// JSON text that is known to be valid and free of white space.
+    void raw(std::string_view json);
+
+    /// What has been written by this writer.
+    [[nodiscard]] std::string_view written() const noexcept { return std::string_view{out_}.substr(start_); }
+
+  private:
+    void open(char bracket);
+    // Compact JSON tells by its last character whether a comma is due, so that no stack of open brackets is needed.
+    void separate() {
+        if (out_.size() > start_) {
+            const auto last = out_.back();
+            if (last != '{' && last != '[' && last != ':') {
+                out_.push_back(',');
+            }
+        }
+    }
+
+    std::string& out_;
+    std::size_t start_;
+};
+
+} // namespace cles

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <string_view>
+
+/// The seam between completion handlers of any type, which are templates, and the service, which is not. Not for
+/// applications.
+
+namespace cles::detail {
+
+/// One operation that waits for its result. Whoever holds it has it ended once, by `offer`, `fail` or `discard`, which
+/// consume it.
+class pending {
+  public:
+    pending() = default;
+    pending(const pending&) = delete;
+    pending& operator=(const pending&) = delete;
+
+    enum class verdict : std::uint8_t { completed, malformed };
+
+    /// Offers the result's text. `malformed`: it is no JSON, and the operation goes on waiting.
+    virtual verdict offer(std::string_view json) = 0;
+    virtual void fail(boost::system::error_code code, std::string_view message) = 0;
+    /// Destroys it without calling its handler, as Asio does when an execution context goes.
+    virtual void discard() noexcept = 0;
+
+  protected:
+    ~pending() = default;
+};
+
+struct discarding {
+    template <class Operation>
+    void operator()(Operation* operation) const noexcept {
+        operation->discard();
+    }
+};
+
+/// Owns an operation until it has been completed.
+using pending_ptr = std::unique_ptr<pending, discarding>;
+
+} // namespace cles::detail

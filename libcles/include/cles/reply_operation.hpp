@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/completion.hpp>
+#include <cles/convert.hpp>
+#include <cles/convert_wrapped.hpp>
+#include <cles/error.hpp>
+#include <cles/pending.hpp>
+
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+/// Requests that wait for their reply, and how the reply becomes a value. Not for applications.
+
+namespace cles::detail {
+
+/// A text result read as a T. `json_text` is handed over as it came.
+template <class T>
+pending::verdict read_result(std::string_view json, T& value, boost::system::error_code& code, std::string& why) {
+    json_reader reader{json};
+    if (read_json(reader, value) && reader.at_end()) {
+        return pending::verdict::completed;
+    }
+    if (!is_valid_json(json)) {
+        return pending::verdict::malformed;
+    }
+    code = errc::conversion;
+    why = "the answer does not fit: " + reader.error();
+    return pending::verdict::completed;
+}
+
+template <class T, bool Throws, class Handler>
+class reply_operation final : public pending {
+  public:
+    reply_operation(Handler handler, const boost::asio::any_io_executor& service, std::string* diagnostics)
+        : complete_(std::move(handler), service), diagnostics_(diagnostics) {}
+
+    verdict offer(std::string_view json) override {
+        boost::system::error_code code;
+        std::string why;
+        if constexpr (std::is_void_v<T>) {
+            if (!is_valid_json(json)) {
+                return verdict::malformed;
+            }
+            finish(code, why);
+        } else {
+            using carrier = std::conditional_t<comes_wrapped<T>, wrapped<T>, T>;
+            carrier value{};
+            if (read_result(json, value, code, why) == verdict::malformed) {
+                return verdict::malformed;
+            }
+            if constexpr (comes_wrapped<T>) {
+                finish(code, why, std::move(value.value));
+            } else {
+                finish(code, why, std::move(value));
+            }
+        }
+        return verdict::completed;
+    }
+
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::string text{message}; // the view may be of something that goes with the handler's memory
+        if constexpr (std::is_void_v<T>) {
+            finish(code, text);
+        } else {
+            finish(code, text, T{});
+        }
+    }
+
+    void discard() noexcept override { discard_operation(this, complete_); }
+
+  private:
+    template <class... V>
+    void finish(boost::system::error_code code, const std::string& message, V&&... value) {
+        if (code && diagnostics_ != nullptr) {
+            *diagnostics_ = message;
+        }
+        end_operation(this, complete_, code, message, std::forward<V>(value)...);
+    }
+
+    completion<Throws, Handler> complete_;
+    std::string* diagnostics_;
+};
+
+} // namespace cles::detail

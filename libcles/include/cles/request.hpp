@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/convert.hpp>
+#include <cles/convert_wrapped.hpp>
+#include <cles/error.hpp>
+#include <cles/identity.hpp>
+#include <cles/limits.hpp>
+#include <cles/verb.hpp>
+
+#include <charconv>
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+namespace cles {
+
+namespace detail {
+
+struct request_data {
+    cles::verb verb = verb::pull;
+    std::string_view node;
+    std::string_view task;
+    std::span<const std::string_view> parameters;
+    std::string_view body = "{}";
+    const identity* peer = nullptr;
+    time_point deadline{};
+};
+
+/// A copy that owns all it refers to.
+std::shared_ptr<const request_data> own(const request_data& data);
+
+} // namespace detail
+
+/// A request as its handler sees it: decoded, validated and addressed to this node.
+///
+/// A handler that is a plain function borrows it: it is valid until the function returns. A copy owns its text and may
+/// be kept for as long as you like; coroutines take their argument by value and thus own it. Not thread-safe while
+/// borrowed; copies may be read from any thread.
+class request {
+  public:
+    explicit request(const detail::request_data& borrowed) noexcept : data_(&borrowed) {}
+    request(const request& other)
+        : owned_(other.owned_ ? other.owned_ : detail::own(*other.data_)), data_(owned_.get()) {}
+    request& operator=(const request& other) {
+        if (this != &other) {
+            owned_ = other.owned_ ? other.owned_ : detail::own(*other.data_);
+            data_ = owned_.get();
+        }
+        return *this;
+    }
+    ~request() = default;
+
+    [[nodiscard]] cles::verb verb() const noexcept { return data_->verb; }
+    /// The node that serves it.
+    [[nodiscard]] std::string_view node() const noexcept { return data_->node; }
+    [[nodiscard]] std::string_view task() const noexcept { return data_->task; }
+    /// The parameters after the task, percent-decoded.
+    [[nodiscard]] std::span<const std::string_view> parameters() const noexcept { return data_->parameters; }
+    /// The JSON body; `{}` where none came.
+    [[nodiscard]] std::string_view body() const noexcept { return data_->body; }
+    /// Who asks. The reference is valid as long as this request.
+    [[nodiscard]] const identity& peer() const noexcept { return *data_->peer; }
+    /// When the requester stops waiting.
+    [[nodiscard]] time_point deadline() const noexcept { return data_->deadline; }
+
+    /// The parameter at `index` (from 0) as text or a number.
+    /// \throws cles::error with `bad_request` where it is missing or no such number
+    template <class T = std::string_view>
+    [[nodiscard]] T parameter(std::size_t index) const {
+        const auto text = parameter_text(index);
+        if constexpr (std::is_arithmetic_v<T>) {
+            T number{};
+            const auto end = text.data() + text.size();
+            const auto [ptr, code] = std::from_chars(text.data(), end, number);
+            if (code != std::errc{} || ptr != end) {
+                throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is no number that fits");
+            }
+            return number;
+        } else {
+            return T{text};
+        }
+    }
+
+    /// The body as a T; a scalar is taken out of {"value":x}.
+    /// \throws cles::error with `bad_request`, naming the path to what does not fit
+    template <class T>
+    [[nodiscard]] T as() const {
+        using carrier = std::conditional_t<detail::comes_wrapped<T>, detail::wrapped<T>, T>;
+        carrier value{};
+        std::string why;
+        if (!from_json(body(), value, &why)) {
+            throw error(errc::bad_request, "the body does not fit: " + why);
+        }
+        if constexpr (detail::comes_wrapped<T>) {
+            return std::move(value.value);
+        } else {
+            return value;
+        }
+    }
+
+  private:
+    [[nodiscard]] std::string_view parameter_text(std::size_t index) const;
+
+    std::shared_ptr<const detail::request_data> owned_;
+    const detail::request_data* data_;
+};
+
+} // namespace cles

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace cles {
+
+inline constexpr std::uint16_t default_port = 25370;
+
+/// Where a link leads, in parts.
+///
+/// ```
+/// url      = "tcp://" host [ ":" port ] / "unix://" path / "inproc://" name
+/// host     = IPv4 address / "[" IPv6 address [ "%25" zone ] "]" / host name
+/// path     = "/" ... (a socket file) / "@" ... (an abstract socket)
+/// ```
+///
+/// The port is 25370 where none is given; 0 asks the system for a free one when listening.
+struct url {
+    std::string scheme;
+    std::string host; ///< of `tcp`, without brackets; of `inproc`, the name
+    std::uint16_t port = 0;
+    std::string path; ///< of `unix`
+};
+
+/// \throws cles::error with `invalid_url`, saying what is wrong
+url parse_url(std::string_view text);
+
+std::string to_string(const url& u);
+
+} // namespace cles

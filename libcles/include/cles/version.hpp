@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <string_view>
+
+namespace cles {
+
+/// The library's version (semantic versioning); the protocol's own is 1.
+inline constexpr std::string_view version = "0.1.0";
+
+} // namespace cles

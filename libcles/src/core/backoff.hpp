@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+
+namespace cles::core {
+
+/// Pauses between tries: doubling from the first to the longest, each shortened by up to a quarter so that many who
+/// lost the same peer do not come back in step.
+class backoff {
+  public:
+    using milliseconds = std::chrono::milliseconds;
+
+    explicit backoff(std::uint32_t seed, milliseconds first = milliseconds{100},
+                     milliseconds longest = milliseconds{5000}) noexcept
+        : first_(first), longest_(longest), next_(first), random_(seed | 1U) {}
+
+    milliseconds next() noexcept {
+        random_ ^= random_ << 13U; // xorshift32 (Marsaglia 2003)
+        random_ ^= random_ >> 17U;
+        random_ ^= random_ << 5U;
+        const auto pause = next_ - milliseconds{random_ % static_cast<std::uint32_t>(next_.count() / 4 + 1)};
+        next_ = std::min(next_ * 2, longest_);
+        return pause;
+    }
+    void reset() noexcept { next_ = first_; }
+
+  private:
+    milliseconds first_;
+    milliseconds longest_;
+    milliseconds next_;
+    std::uint32_t random_;
+};
+
+} // namespace cles::core

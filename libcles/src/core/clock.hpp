@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+namespace cles::core {
+
+/// Where the time comes from when nobody passes it in, as when a handler answers. Tests set it.
+class clock {
+  public:
+    clock() = default;
+    clock(const clock&) = delete;
+    clock& operator=(const clock&) = delete;
+    virtual ~clock() = default;
+    [[nodiscard]] virtual time_point now() const = 0;
+};
+
+} // namespace cles::core

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/feed_machine.hpp"
+
+#include <utility>
+
+namespace cles::core {
+
+feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
+                           std::string path, bool thinned, std::uint32_t seed)
+    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines),
+      queue_(bounds.feed, bounds.binding_bytes), backoff_(seed) {}
+
+void feed_machine::start(detail::pending_ptr bound) {
+    first_ = std::move(bound);
+    state_ = state::binding;
+    host_.bind(*this);
+}
+
+void feed_machine::on_bound(std::string_view last) {
+    if (state_ != state::binding) {
+        return;
+    }
+    state_ = state::bound;
+    backoff_.reset();
+    // The events are queued before the caller hears that it is bound, so that it finds them in their order.
+    const std::string body{last};
+    if (was_bound_) {
+        on_event({.kind = feed_event::rebound});
+    }
+    was_bound_ = true;
+    if (body != "{}") {
+        on_event({.kind = feed_event::current, .body = body});
+    }
+    if (first_) {
+        first_.release()->offer(body);
+    }
+}
+
+void feed_machine::on_refused(boost::system::error_code why, std::string_view message, time_point now) {
+    if (state_ != state::binding) {
+        return;
+    }
+    if (first_) {
+        auto operation = std::move(first_);
+        const std::string text{message};
+        close(errc::cancelled);
+        operation.release()->fail(why, text);
+        return;
+    }
+    pause(now);
+}
+
+void feed_machine::on_lost(std::string_view why, time_point now) {
+    if (state_ != state::bound) {
+        return;
+    }
+    pause(now);
+    on_event({.kind = feed_event::lost, .text = why});
+}
+
+void feed_machine::pause(time_point now) {
+    state_ = state::pausing;
+    deadlines_.arm(*this, now + backoff_.next());
+}
+
+void feed_machine::on_deadline(time_point) {
+    if (state_ == state::pausing) {
+        state_ = state::binding;
+        host_.bind(*this);
+    }
+}
+
+bool feed_machine::next(event_ptr operation) {
+    waiter_ = std::move(operation);
+    return !queue_.empty();
+}
+
+void feed_machine::pump() {
+    if (waiter_ != nullptr && !queue_.empty()) {
+        auto* operation = waiter_.release();
+        queue_.pop([operation](const detail::raw_event& event) { operation->deliver(event); });
+    }
+}
+
+void feed_machine::on_event(const detail::raw_event& event) {
+    if (state_ == state::closed) {
+        return;
+    }
+    if (waiter_ != nullptr && queue_.empty()) {
+        waiter_.release()->deliver(event);
+    } else {
+        queue_.push(event);
+    }
+}
+
+void feed_machine::cancel() {
+    if (auto* operation = waiter_.release()) {
+        operation->fail(errc::cancelled, "the wait was cancelled");
+    }
+}
+
+void feed_machine::close(errc why) { abandon().fail(why); }
+
+feed_machine::waiting feed_machine::abandon() {
+    if (state_ != state::closed) {
+        state_ = state::closed;
+        deadlines_.disarm(*this);
+        host_.unbind(*this);
+    }
+    return {.first = std::move(first_), .next = std::move(waiter_)};
+}
+
+void feed_machine::waiting::fail(errc why) {
+    if (auto* operation = first.release()) {
+        operation->fail(why, "the feed was closed");
+    }
+    if (auto* operation = next.release()) {
+        operation->fail(why, "the feed was closed");
+    }
+}
+
+} // namespace cles::core

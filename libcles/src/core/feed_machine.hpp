@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+#include <cles/feed_event.hpp>
+#include <cles/limits.hpp>
+#include <cles/pending.hpp>
+
+#include "core/backoff.hpp"
+#include "core/deadlines.hpp"
+#include "core/feed_queue.hpp"
+#include "core/subscription.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+class feed_machine;
+
+/// What a feed asks of the service.
+class feed_host {
+  public:
+    feed_host() = default;
+    feed_host(const feed_host&) = delete;
+    feed_host& operator=(const feed_host&) = delete;
+    /// Sends a BIND; `on_bound` or `on_refused` follows, later `on_lost` when its link is lost.
+    virtual void bind(feed_machine& feed) = 0;
+    /// Takes it off its link and unbinds at the publisher.
+    virtual void unbind(feed_machine& feed) = 0;
+
+  protected:
+    ~feed_host() = default;
+};
+
+/// A feed's life: it binds, tells what comes, and when the publisher is lost binds again after a pause.
+class feed_machine final : public subscription, private deadline {
+  public:
+    using event_ptr = std::unique_ptr<detail::pending_event, detail::discarding>;
+
+    feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target, std::string path,
+                 bool thinned, std::uint32_t seed);
+    ~feed_machine() = default;
+
+    /// Binds for the first time. The operation ends with the answer; where it fails, the feed is closed.
+    void start(detail::pending_ptr bound);
+    void on_bound(std::string_view last);
+    void on_refused(boost::system::error_code why, std::string_view message, time_point now);
+    void on_lost(std::string_view why, time_point now);
+
+    /// Waits for an event; the feed is open, and nobody else waits. True where one is there: `pump` delivers it, which
+    /// is for the caller to do later, since an operation must not end while it begins.
+    bool next(event_ptr operation);
+    void pump();
+    void cancel();
+    void close(errc why);
+
+    /// Those who wait for a feed.
+    struct waiting {
+        detail::pending_ptr first;
+        event_ptr next;
+        void fail(errc why);
+    };
+    /// Closes it and leaves telling those who wait to the caller.
+    [[nodiscard]] waiting abandon();
+    [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
+    [[nodiscard]] bool has_waiter() const noexcept { return waiter_ != nullptr; }
+
+  private:
+    enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
+
+    void on_event(const detail::raw_event& event) override;
+    void on_deadline(time_point now) override;
+    void pause(time_point now);
+
+    feed_host& host_;
+    deadline_queue& deadlines_;
+    feed_queue queue_;
+    backoff backoff_;
+    state state_ = state::fresh;
+    bool was_bound_ = false;
+    detail::pending_ptr first_;
+    event_ptr waiter_;
+};
+
+} // namespace cles::core

@@ -1,0 +1,397 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/inbound.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "core/handler_failure.hpp"
+#include "core/request_checks.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <optional>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+constexpr unsigned sample_every = 16;
+
+protocol::failure busy(std::string message) { return {.code = errc::busy, .message = std::move(message)}; }
+
+// A failure once the handler has begun: whoever repeats what was too large has to know.
+protocol::failure after_run(protocol::failure why) {
+    why.ran = why.code == errc::too_large;
+    return why;
+}
+
+std::string failure_text(const protocol::failure& why) {
+    std::string text;
+    protocol::append_failure(text, why);
+    return text;
+}
+
+} // namespace
+
+inbound::inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
+    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out), bound_(node_->published, updates) {}
+
+inbound::~inbound() { lose(); }
+
+void inbound::on_request(std::string_view line, const protocol::request_line& r, time_point now) {
+    if (ending_) {
+        return;
+    }
+    ++node_->counts.requests[static_cast<std::size_t>(r.verb)];
+    if (r.id != 0 && calls_.contains(r.id)) {
+        replies_.fail(r, errc::bad_request, node_->name + ": the id " + std::to_string(r.id) + " is in flight already");
+        lose();
+        ending_ = closing_ = true;
+        finish_if_done();
+        return;
+    }
+    if (const auto id = r.verb == verb::push ? cancelled_id(r.noun) : std::nullopt) {
+        serve_cancel(r, *id, now);
+        return;
+    }
+    if (r.id == 0 && must_wait()) {
+        if (in_flight() < node_->bounds.in_flight) {
+            waiting_.push_line(line, now);
+            follow_waiting();
+        } else if (r.wants_reply) {
+            answer_in_turn(failure_text(busy(node_->name + ": too many requests wait on this link")), now);
+        } else {
+            ++node_->counts.errors_unsent;
+        }
+        return;
+    }
+    if (in_flight() >= node_->bounds.in_flight) {
+        replies_.fail(r, busy(node_->name + ": too many requests are in flight on this link"));
+        return;
+    }
+    serve(r, now, now);
+}
+
+void inbound::on_malformed(std::string_view, const protocol::malformed_request& what, time_point now) {
+    if (ending_) {
+        return;
+    }
+    const protocol::failure why{.code = errc::bad_request, .message = node_->name + ": " + what.why};
+    if (what.id != 0 && calls_.contains(what.id)) {
+        replies_.fail(what.id, what.wants_reply, why);
+        lose();
+        ending_ = closing_ = true;
+        finish_if_done();
+    } else if (what.id == 0 && what.wants_reply && must_wait()) {
+        answer_in_turn(failure_text(why), now);
+    } else {
+        replies_.fail(what.id, what.wants_reply, why);
+    }
+}
+
+void inbound::on_overlong(std::string_view head, time_point now) {
+    if (ending_) {
+        return;
+    }
+    const auto meant = protocol::salvage(head);
+    const protocol::failure why{.code = errc::too_large,
+                                .message = node_->name + ": a line has at most " + std::to_string(node_->bounds.line) +
+                                           " bytes"};
+    if (meant.id == 0 && meant.wants_reply && must_wait()) {
+        answer_in_turn(failure_text(why), now);
+    } else {
+        replies_.fail(meant.id, meant.wants_reply, why);
+    }
+    closing_ = true;
+    end(now);
+}
+
+void inbound::end(time_point) {
+    ending_ = true;
+    withdraw_all();
+    finish_if_done();
+}
+
+void inbound::withdraw_all() {
+    while (!calls_.empty()) {
+        withdraw(calls_.begin()->first);
+    }
+}
+
+void inbound::lose() {
+    auto calls = std::exchange(calls_, {});
+    auto anonymous = std::exchange(anonymous_, nullptr);
+    waiting_.clear();
+    bound_.clear();
+    const auto cut = [this](call& c) {
+        c.owner_ = nullptr;
+        node_->deadlines.disarm(c);
+    };
+    for (auto& [id, c] : calls) {
+        cut(*c);
+    }
+    if (anonymous) {
+        cut(*anonymous);
+        anonymous->stop();
+    }
+    for (auto& [id, c] : calls) {
+        c->stop();
+    }
+}
+
+void inbound::finish_if_done() {
+    if (ending_ && !finished_ && !must_wait() && (closing_ || bound_.empty())) {
+        finished_ = true;
+        out_.finish();
+    }
+}
+
+// -- requests without id wait for each other -----------------------------------------------------------------------
+
+void inbound::answer_in_turn(std::string answer, time_point now) {
+    waiting_.push_answer(std::move(answer), now);
+    follow_waiting();
+}
+
+// A link whose requests take up too much room is not read for a while.
+void inbound::follow_waiting() {
+    const auto most = node_->bounds.waiting;
+    const bool too_much = waiting_.bytes() > (paused_ ? most / 2 : most);
+    if (too_much != paused_) {
+        paused_ = too_much;
+        out_.pause(too_much);
+    }
+}
+
+void inbound::serve_waiting(time_point now) {
+    if (serving_waiting_) {
+        return;
+    }
+    serving_waiting_ = true;
+    while (anonymous_ == nullptr && !waiting_.empty()) {
+        const auto next = waiting_.pop();
+        if (!next.line.empty()) {
+            protocol::request_line r;
+            protocol::malformed_request ignored;
+            protocol::parse_request(next.line, r, ignored); // was read when it came
+            serve(r, next.arrived, now);
+        }
+        for (std::size_t i = 0; i < next.times && !next.answer.empty(); ++i) {
+            out_.output().append(next.answer).push_back('\n');
+            node_->counts.errors += protocol::is_failure(next.answer) ? 1 : 0;
+        }
+    }
+    serving_waiting_ = false;
+    follow_waiting();
+    finish_if_done();
+}
+
+// -- serving -------------------------------------------------------------------------------------------------------
+
+void inbound::serve(const protocol::request_line& r, time_point arrived, time_point now) {
+    if (now - arrived >= std::chrono::milliseconds{r.deadline_ms}) {
+        replies_.fail(r, errc::deadline, node_->name + ": its time ran out while it waited for its turn");
+        return;
+    }
+    if (const auto why = objection(*node_, peer_, r)) {
+        replies_.fail(r, *why);
+        return;
+    }
+    if (r.noun.task == "cles") {
+        serve_reserved(r);
+    } else if (r.verb == verb::bind) {
+        serve_bind(r);
+    } else {
+        serve_task(r, arrived, now);
+    }
+}
+
+// Acts when it is read, however much is in flight; without an id it is answered in its turn all the same.
+void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, time_point now) {
+    const auto why = objection(*node_, peer_, r);
+    if (!why) {
+        withdraw(id);
+    }
+    if (r.id == 0 && r.wants_reply && must_wait()) {
+        answer_in_turn(why ? failure_text(*why) : "{}", now);
+    } else if (why) {
+        replies_.fail(r, *why);
+    } else {
+        replies_.done(r.id, r.wants_reply, {});
+    }
+}
+
+void inbound::serve_reserved(const protocol::request_line& r) {
+    const auto& parameters = r.noun.parameters;
+    if (r.verb == verb::pull && parameters.empty()) {
+        replies_.write(r, [this](json_writer& w) { write_description(w, *node_); });
+    } else if (r.verb == verb::pull && parameters.size() == 1 && parameters[0] == "metrics") {
+        replies_.write(r, [this](json_writer& w) { write_metrics(w, *node_); });
+    } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
+        replies_.fail(r, errc::bad_request, node_->name + ": cancel needs an id from 1 to 2^63-1");
+    } else {
+        replies_.fail(r, errc::no_task,
+                      node_->name + " has no " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.path} +
+                          "'");
+    }
+}
+
+void inbound::serve_bind(const protocol::request_line& r) {
+    const std::string path{protocol::canonical_path(r.noun, path_)};
+    auto& published = node_->published;
+    if (r.unbinds()) {
+        bound_.unbind(path);
+        replies_.done(r.id, r.wants_reply, {});
+        finish_if_done();
+        return;
+    }
+    if (!node_->tasks.can_bind(r.noun.task) && !published.knows(r.noun.task)) {
+        replies_.fail(r, errc::no_task, node_->name + " has no BIND '" + std::string{r.noun.task} + "'");
+        return;
+    }
+    try {
+        if (const auto* h = node_->tasks.find(verb::bind, r.noun.task); h != nullptr && h->plain) {
+            auto storage = std::exchange(decoded_, {}); // the handler may have other requests served meanwhile
+            const auto parameters = decode(r.noun, storage);
+            const cles::detail::request_data data{.verb = r.verb,
+                                                  .node = node_->name,
+                                                  .task = r.noun.task,
+                                                  .parameters = {parameters.data(), parameters.size()},
+                                                  .peer = &peer_,
+                                                  .deadline = {}};
+            std::string unused;
+            json_writer w{unused};
+            h->plain(cles::request{data}, w);
+            decoded_ = std::move(storage);
+        }
+        if (!bound_.has(path) && bound_.size() >= node_->bounds.bindings) {
+            replies_.fail(r, busy(node_->name + ": too many bindings on this link"));
+            return;
+        }
+        auto& t = published.open(path);
+        replies_.done(r.id, r.wants_reply, t.last_body());
+        bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
+    } catch (...) {
+        replies_.fail(r, describe(std::current_exception()));
+    }
+}
+
+void inbound::serve_task(const protocol::request_line& r, time_point arrived, time_point now) {
+    const auto* h = node_->tasks.find(r.verb, r.noun.task);
+    if (h == nullptr) {
+        replies_.fail(r, errc::no_task,
+                      node_->name + " has no " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} +
+                          "'");
+        return;
+    }
+    if (r.verb == verb::update && !node_->published.can_open(protocol::canonical_path(r.noun, path_))) {
+        replies_.fail(r, busy(node_->name + ": '" + std::string{r.noun.task} + "' has as many nouns as it may"));
+        return;
+    }
+    auto storage = std::exchange(decoded_, {}); // the handler may have other requests served meanwhile
+    const auto parameters = decode(r.noun, storage);
+    const cles::detail::request_data data{.verb = r.verb,
+                                          .node = node_->name,
+                                          .task = r.noun.task,
+                                          .parameters = {parameters.data(), parameters.size()},
+                                          .body = r.body.empty() ? std::string_view{"{}"} : r.body,
+                                          .peer = &peer_,
+                                          .deadline = arrived + std::chrono::milliseconds{r.deadline_ms}};
+    if (h->plain) {
+        run_plain(r, *h, cles::request{data}, now);
+    } else {
+        run_later(r, *h, cles::request{data}, now);
+    }
+    decoded_ = std::move(storage);
+}
+
+void inbound::run_plain(const protocol::request_line& r, const handler& h, const cles::request& request, time_point) {
+    const bool timed = sample_++ % sample_every == 0;
+    const auto before = timed ? node_->time.now() : time_point{};
+    try {
+        replies_.write(r, [&](json_writer& w) {
+            h.plain(request, w);
+            if (r.verb == verb::update) {
+                std::string body;
+                append_compact_json(request.body(), body);
+                node_->published.publish_body(protocol::canonical_path(r.noun, path_), body);
+            }
+        });
+    } catch (...) {
+        replies_.fail(r, after_run(describe(std::current_exception())));
+    }
+    if (timed) {
+        node_->handler_time.record(node_->time.now() - before);
+    }
+}
+
+void inbound::run_later(const protocol::request_line& r, const handler& h, const cles::request& request,
+                        time_point now) {
+    if (node_->counts.handlers_running >= node_->bounds.running) {
+        replies_.fail(r, busy(node_->name + " runs as many handlers as it may"));
+        return;
+    }
+    call::terms wanted{.verb = r.verb, .id = r.id, .wants_reply = r.wants_reply, .wants_progress = r.wants_progress};
+    if (r.verb == verb::update) {
+        wanted.publish_path = protocol::canonical_path(r.noun, path_);
+        append_compact_json(request.body(), wanted.publish_body);
+    }
+    const auto c = std::make_shared<call>(node_, *this, std::move(wanted), now);
+    if (r.id != 0) {
+        calls_.emplace(r.id, c);
+    } else {
+        anonymous_ = c;
+    }
+    node_->deadlines.arm(*c, request.deadline());
+    try {
+        h.start(request, c);
+    } catch (...) {
+        c->fail(describe(std::current_exception()));
+    }
+}
+
+// -- calls ---------------------------------------------------------------------------------------------------------
+
+void inbound::withdraw(std::uint64_t id) {
+    const auto found = calls_.find(id);
+    if (found != calls_.end()) {
+        const auto c = found->second;
+        refuse(*c, {.code = errc::cancelled, .message = node_->name + ": the requester withdrew it"});
+        c->stop();
+    }
+}
+
+void inbound::answer(call& c, std::string_view json) {
+    const auto& wanted = c.wanted();
+    if (!wanted.publish_path.empty()) {
+        try {
+            node_->published.publish_body(wanted.publish_path, wanted.publish_body);
+        } catch (...) {
+            refuse(c, describe(std::current_exception()));
+            return;
+        }
+    }
+    replies_.done(wanted.id, wanted.wants_reply, json);
+    detach(c);
+}
+
+void inbound::refuse(call& c, const protocol::failure& why) {
+    replies_.fail(c.wanted().id, c.wanted().wants_reply, after_run(why));
+    detach(c);
+}
+
+void inbound::detach(call& c) {
+    const auto keep = c.shared_from_this();
+    const auto now = node_->time.now();
+    c.owner_ = nullptr;
+    node_->deadlines.disarm(c);
+    node_->handler_time.record(now - c.started());
+    out_.wake();
+    if (c.wanted().id != 0) {
+        calls_.erase(c.wanted().id);
+    } else {
+        anonymous_.reset();
+        serve_waiting(now);
+    }
+}
+
+} // namespace cles::core

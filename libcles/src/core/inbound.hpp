@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+
+#include "core/call.hpp"
+#include "core/link_bindings.hpp"
+#include "core/node.hpp"
+#include "core/outlet.hpp"
+#include "core/reply_writer.hpp"
+#include "core/waiting_requests.hpp"
+#include "protocol/message.hpp"
+
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+/// Serves the requests that one link brings (docs/protocol.md, "Order" and "Ends").
+///
+/// Requests with an id start at once. Those without wait for each other. Plain handlers are run in line and answered
+/// into the link's output; other handlers become calls.
+class inbound {
+  public:
+    inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer);
+    inbound(const inbound&) = delete;
+    inbound& operator=(const inbound&) = delete;
+    ~inbound();
+
+    /// A request's line with what was read from it.
+    void on_request(std::string_view line, const protocol::request_line& request, time_point now);
+    /// A line that is no request.
+    void on_malformed(std::string_view line, const protocol::malformed_request& what, time_point now);
+    /// A line over the limit: answered, then the link ends.
+    void on_overlong(std::string_view head, time_point now);
+    /// The peer sends no more: what has an id is withdrawn, the rest is still answered, then the link finishes.
+    void end(time_point now);
+    /// The link is gone.
+    void lose();
+
+    /// Puts updates that wait to the link, which has room again.
+    void drain(time_point now) { bound_.drain(now); }
+    [[nodiscard]] std::size_t in_flight() const noexcept {
+        return calls_.size() + waiting_.size() + (anonymous_ ? 1 : 0);
+    }
+    [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
+
+  private:
+    friend call;
+
+    void serve(const protocol::request_line& request, time_point arrived, time_point now);
+    void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
+    void serve_reserved(const protocol::request_line& request);
+    void serve_bind(const protocol::request_line& request);
+    void serve_task(const protocol::request_line& request, time_point arrived, time_point now);
+    void run_plain(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
+    void run_later(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
+
+    [[nodiscard]] bool must_wait() const noexcept { return anonymous_ != nullptr || !waiting_.empty(); }
+    void answer_in_turn(std::string answer, time_point now);
+    void follow_waiting();
+    void serve_waiting(time_point now);
+    void withdraw_all();
+    void finish_if_done();
+
+    void withdraw(std::uint64_t id);
+    void answer(call& c, std::string_view json);
+    void refuse(call& c, const protocol::failure& why);
+    void detach(call& c);
+
+    std::shared_ptr<node> node_;
+    outlet& out_;
+    const identity& peer_;
+    boost::unordered_flat_map<std::uint64_t, std::shared_ptr<call>> calls_;
+    std::shared_ptr<call> anonymous_;
+    waiting_requests waiting_;
+    reply_writer replies_;
+    link_bindings bound_;
+    std::string path_;    // of the noun being served, where it had to be rebuilt
+    std::string decoded_; // its parameters, where they held escapes
+    bool serving_waiting_ = false;
+    bool paused_ = false;
+    bool ending_ = false;  // the peer sends no more, or what it sends is no longer read
+    bool closing_ = false; // the link ends whatever is bound
+    bool finished_ = false;
+    unsigned sample_ = 0;
+};
+
+} // namespace cles::core

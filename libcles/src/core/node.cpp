@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/node.hpp"
+
+#include <cles/version.hpp>
+
+#include "protocol/message.hpp"
+
+#include <chrono>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+void write_task(json_writer& w, std::string_view verb, std::string_view task, const task_info& info) {
+    w.begin_object();
+    w.key("verb");
+    w.value(verb);
+    w.key("task");
+    w.value(task);
+    if (!info.description.empty()) {
+        w.key("description");
+        w.value(std::string_view{info.description});
+    }
+    if (!info.parameters.empty()) {
+        w.key("parameters");
+        w.begin_array();
+        for (const auto& p : info.parameters) {
+            w.value(std::string_view{p});
+        }
+        w.end_array();
+    }
+    w.end_object();
+}
+
+void write_tasks(json_writer& w, const node& n) {
+    w.begin_array();
+    for (const auto& [task, handlers] : n.tasks.tasks()) {
+        for (std::size_t i = 0; i < verb_count; ++i) {
+            const bool opened = static_cast<verb>(i) == verb::bind && !handlers[i].present &&
+                                (n.tasks.can_bind(task) || n.published.knows(task));
+            if (handlers[i].present || opened) {
+                write_task(w, verb_names[i], task, handlers[i].info);
+            }
+        }
+    }
+    for (const auto& task : n.published.tasks()) {
+        if (!n.tasks.tasks().contains(task)) {
+            write_task(w, to_string(verb::bind), task, {});
+        }
+    }
+    w.end_array();
+}
+
+std::int64_t milliseconds_since(time_point then, time_point now) {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(now - then).count();
+}
+
+} // namespace
+
+node::node(node_setup setup, const core::clock& source, std::function<void()> wake)
+    : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), bounds(setup.bounds),
+      authorise(std::move(setup.authorise)), log(std::move(setup.log)), time(source), started(source.now()),
+      published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)) {}
+
+void write_description(json_writer& w, const node& n) {
+    w.begin_object();
+    w.key("node");
+    w.value(std::string_view{n.name});
+    w.key("version");
+    w.value(std::string_view{version});
+    w.key("protocol");
+    w.value(std::int64_t{1});
+    w.key("epoch");
+    w.value(std::string_view{n.epoch});
+    w.key("uptime_ms");
+    w.value(milliseconds_since(n.started, n.time.now()));
+    w.key("endpoints");
+    w.begin_array();
+    for (const auto& endpoint : n.endpoints) {
+        w.value(std::string_view{endpoint});
+    }
+    w.end_array();
+    w.key("tasks");
+    write_tasks(w, n);
+    w.end_object();
+}
+
+void write_metrics(json_writer& w, const node& n) {
+    const auto number = [&](std::string_view name, std::uint64_t value) {
+        w.key(name);
+        w.value(value);
+    };
+    const auto& c = n.counts;
+    w.begin_object();
+    w.key("uptime_ms");
+    w.value(milliseconds_since(n.started, n.time.now()));
+    w.key("requests");
+    w.begin_object();
+    for (std::size_t i = 0; i < verb_count; ++i) {
+        number(verb_names[i], c.requests[i]);
+    }
+    w.end_object();
+    number("errors", c.errors);
+    number("errors_unsent", c.errors_unsent);
+    number("handlers_running", c.handlers_running);
+    number("requests_sent", c.requests_sent);
+    number("replies_dropped", c.replies_dropped);
+    number("updates_published", c.updates_published);
+    number("updates_delivered", c.updates_delivered);
+    number("updates_shed", c.updates_shed);
+    number("updates_received", c.updates_received);
+    number("updates_dropped", c.updates_dropped);
+    number("links_open", c.links_open);
+    number("links_accepted", c.links_accepted);
+    number("links_refused", c.links_refused);
+    number("links_lost", c.links_lost);
+    number("bytes_received", c.bytes_received);
+    number("bytes_sent", c.bytes_sent);
+    w.key("handler_us");
+    w.begin_object();
+    number("samples", n.handler_time.count());
+    const auto quantile = [&](std::string_view name, double q) {
+        w.key(name);
+        w.value(static_cast<double>(n.handler_time.quantile(q).count()) / 1000.0);
+    };
+    quantile("p50", 0.5);
+    quantile("p99", 0.99);
+    quantile("p999", 0.999);
+    w.end_object();
+    w.end_object();
+}
+
+} // namespace cles::core

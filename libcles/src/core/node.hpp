@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+#include <cles/json_writer.hpp>
+#include <cles/limits.hpp>
+#include <cles/log.hpp>
+
+#include "core/clock.hpp"
+#include "core/counters.hpp"
+#include "core/deadlines.hpp"
+#include "core/latency_histogram.hpp"
+#include "core/publications.hpp"
+#include "core/registry.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// How a node begins.
+struct node_setup {
+    std::string name;
+    std::uint32_t epoch = 0; ///< drawn at random for each run
+    cles::limits bounds{};
+    authoriser authorise{};
+    log_sink log{};
+};
+
+/// What all sessions of a node share.
+struct node {
+    /// `wake` asks for `publications::drain` soon.
+    node(node_setup setup, const core::clock& source, std::function<void()> wake);
+
+    const std::string name;
+    const std::string epoch;
+    const cles::limits bounds;
+    const authoriser authorise;
+    const log_sink log;
+    const core::clock& time;
+    const time_point started;
+
+    std::vector<std::string> endpoints;
+    registry tasks;
+    deadline_queue deadlines;
+    counters counts;
+    latency_histogram handler_time; ///< of all handlers that answer later, and of a sample of the others
+    publications published;
+
+    void say(log_level level, std::string_view text) const {
+        if (log) {
+            log(level, text);
+        }
+    }
+};
+
+/// Writes the reply to `PULL self:cles`.
+void write_description(json_writer& w, const node& n);
+/// Writes the reply to `PULL self:cles/metrics`.
+void write_metrics(json_writer& w, const node& n);
+
+} // namespace cles::core

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/outbound.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+namespace cles::core {
+
+void outbound::send(protocol::request_text request, time_point deadline, time_point now, detail::pending_ptr operation,
+                    progress_function progress) {
+    std::unique_ptr<entry> e;
+    if (spare_.empty()) {
+        e = std::make_unique<entry>(*this);
+    } else {
+        e = std::move(spare_.back());
+        spare_.pop_back();
+    }
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - now).count();
+    const auto told = static_cast<std::uint32_t>(
+        std::clamp<std::int64_t>(left, 1, static_cast<std::int64_t>(protocol::max_deadline_ms)));
+    request.deadline_ms = told == protocol::default_deadline(request.verb) ? 0 : told;
+    request.wants_progress = static_cast<bool>(progress);
+    protocol::append_request(out_.output(), request);
+    e->id = request.id;
+    e->operation = std::move(operation);
+    e->progress = std::move(progress);
+    node_.deadlines.arm(*e, deadline);
+    waiting_.emplace(request.id, std::move(e));
+    ++node_.counts.requests_sent;
+    out_.wake();
+}
+
+std::unique_ptr<outbound::entry> outbound::take(std::uint64_t id) {
+    const auto found = waiting_.find(id);
+    if (found == waiting_.end()) {
+        return nullptr;
+    }
+    auto e = std::move(found->second);
+    waiting_.erase(found);
+    node_.deadlines.disarm(*e);
+    return e;
+}
+
+void outbound::recycle(std::unique_ptr<entry> e) {
+    constexpr std::size_t enough = 256;
+    if (spare_.size() < enough) {
+        e->progress = nullptr;
+        spare_.push_back(std::move(e));
+    }
+}
+
+void outbound::fail(std::uint64_t id, errc why, std::string_view message) {
+    if (auto e = take(id)) {
+        auto operation = std::move(e->operation);
+        recycle(std::move(e));
+        operation.release()->fail(why, message);
+    }
+}
+
+bool outbound::cancel(std::uint64_t id) {
+    if (!waiting_.contains(id)) {
+        return false;
+    }
+    const auto noun = "self:cles/cancel/" + std::to_string(id);
+    protocol::append_request(out_.output(), {.verb = verb::push, .noun = noun, .wants_reply = false});
+    out_.wake();
+    fail(id, errc::cancelled, "the request was withdrawn");
+    return true;
+}
+
+void outbound::on_reply(const protocol::reply_line& reply) {
+    auto e = take(reply.id);
+    if (!e) {
+        ++node_.counts.replies_dropped;
+        return;
+    }
+    const auto due = e->due();
+    bool ended = false;
+    if (reply.progress) {
+        if (e->progress && is_valid_json(reply.body)) {
+            // Called from a copy: it may withdraw its own request.
+            const auto report = e->progress;
+            const auto id = e->id;
+            node_.deadlines.arm(*e, due);
+            waiting_.emplace(id, std::move(e));
+            report(*reply.progress, reply.body);
+            return;
+        }
+    } else if (protocol::is_failure(reply.body)) {
+        protocol::failure why;
+        if (protocol::parse_failure(reply.body, why)) {
+            auto operation = std::move(e->operation);
+            recycle(std::move(e));
+            operation.release()->fail(why.code, why.message);
+            return;
+        }
+    } else {
+        auto* operation = e->operation.release();
+        ended = operation->offer(reply.body) == detail::pending::verdict::completed;
+        if (!ended) {
+            e->operation.reset(operation);
+        }
+    }
+    if (ended) {
+        recycle(std::move(e));
+    } else {
+        ++node_.counts.replies_dropped;
+        const auto id = e->id;
+        node_.deadlines.arm(*e, due);
+        waiting_.emplace(id, std::move(e));
+    }
+}
+
+void outbound::on_overlong(const protocol::reply_line& reply) {
+    fail(reply.id, errc::too_large, "the answer is longer than " + std::to_string(node_.bounds.line) + " bytes");
+}
+
+void outbound::lose(errc why, std::string_view message) {
+    const auto lost = std::exchange(waiting_, {});
+    const std::string text{message};
+    for (const auto& [id, e] : lost) {
+        node_.deadlines.disarm(*e);
+        e->operation.release()->fail(why, text);
+    }
+}
+
+std::vector<detail::pending_ptr> outbound::take_all() {
+    std::vector<detail::pending_ptr> taken;
+    for (auto& [id, e] : std::exchange(waiting_, {})) {
+        node_.deadlines.disarm(*e);
+        taken.push_back(std::move(e->operation));
+    }
+    return taken;
+}
+
+void outbound::entry::on_deadline(time_point) { owner.fail(id, errc::deadline, "no answer came in time"); }
+
+} // namespace cles::core

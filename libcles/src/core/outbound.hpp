@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/pending.hpp>
+
+#include "core/deadlines.hpp"
+#include "core/node.hpp"
+#include "core/outlet.hpp"
+#include "protocol/message.hpp"
+
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// The requests that a node has sent on one link and that wait for their replies.
+class outbound {
+  public:
+    using progress_function = std::function<void(double, std::string_view)>;
+
+    outbound(node& host, outlet& out) noexcept : node_(host), out_(out) {}
+    outbound(const outbound&) = delete;
+    outbound& operator=(const outbound&) = delete;
+
+    /// Sends a request and keeps the operation until its reply, its deadline or the loss of the link. The request bears
+    /// an id that is not in flight; how long is left is filled in here.
+    void send(protocol::request_text request, time_point deadline, time_point now, detail::pending_ptr operation,
+              progress_function progress = {});
+    /// Withdraws a request at the peer; its operation fails with `cancelled` at once. False where it has ended.
+    bool cancel(std::uint64_t id);
+    void on_reply(const protocol::reply_line& reply);
+    /// A reply that is longer than a line may be.
+    void on_overlong(const protocol::reply_line& reply);
+    /// Fails all that wait.
+    void lose(errc why, std::string_view message);
+    /// Takes out all that wait, without a word.
+    [[nodiscard]] std::vector<detail::pending_ptr> take_all();
+    [[nodiscard]] std::size_t in_flight() const noexcept { return waiting_.size(); }
+
+  private:
+    struct entry final : deadline {
+        explicit entry(outbound& o) : owner(o) {}
+        void on_deadline(time_point now) override;
+
+        outbound& owner;
+        std::uint64_t id = 0;
+        detail::pending_ptr operation;
+        progress_function progress;
+    };
+
+    std::unique_ptr<entry> take(std::uint64_t id);
+    void recycle(std::unique_ptr<entry> e);
+    void fail(std::uint64_t id, errc why, std::string_view message);
+
+    node& node_;
+    outlet& out_;
+    boost::unordered_flat_map<std::uint64_t, std::unique_ptr<entry>> waiting_;
+    std::vector<std::unique_ptr<entry>> spare_;
+};
+
+} // namespace cles::core

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+
+namespace cles::core {
+
+/// What a session asks of the link that it lives on.
+class outlet {
+  public:
+    outlet() = default;
+    outlet(const outlet&) = delete;
+    outlet& operator=(const outlet&) = delete;
+
+    /// Lines to send are appended here, LF included.
+    virtual std::string& output() = 0;
+    /// Something was appended outside of a call that the link made: it is to be sent soon.
+    virtual void wake() = 0;
+    /// Stops handing over lines, or goes on.
+    virtual void pause(bool stop) = 0;
+    /// Sends what is there, then says goodbye and closes.
+    virtual void finish() = 0;
+    virtual void close() = 0;
+
+  protected:
+    ~outlet() = default;
+};
+
+} // namespace cles::core

@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/publications.hpp"
+
+#include <cles/error.hpp>
+
+#include "core/result_text.hpp"
+#include "protocol/message.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+std::string_view task_of(std::string_view path) { return path.substr(0, path.find('/')); }
+
+} // namespace
+
+publications::publications(topic_context shared, const cles::limits& bounds, std::string publisher, std::string epoch,
+                           std::function<void()> wake)
+    : shared_(shared), bounds_(bounds), publisher_(std::move(publisher)), epoch_(std::move(epoch)),
+      wake_(std::move(wake)) {}
+
+topic* publications::find(std::string_view path) noexcept {
+    if (recent_ != nullptr && recent_->path() == path) {
+        return recent_;
+    }
+    const auto found = topics_.find(path);
+    return found == topics_.end() ? nullptr : found->second.get();
+}
+
+bool publications::knows(std::string_view task) const noexcept { return nouns_.contains(task); }
+
+bool publications::can_open(std::string_view path) noexcept {
+    const auto count = nouns_.find(task_of(path));
+    return count == nouns_.end() || count->second < bounds_.nouns || find(path) != nullptr;
+}
+
+topic& publications::open(std::string_view path) {
+    if (auto* existing = find(path)) {
+        return *existing;
+    }
+    const auto task = task_of(path);
+    auto& count = nouns_[std::string{task}];
+    if (count >= bounds_.nouns) {
+        throw error(errc::busy, "'" + std::string{task} + "' has " + std::to_string(count) + " nouns already");
+    }
+    ++count;
+    auto made = std::make_unique<topic>(shared_, std::string{path});
+    auto& result = *made;
+    topics_.emplace(std::string{path}, std::move(made));
+    return result;
+}
+
+void publications::tidy(topic& t) {
+    if (t.is_bound() || t.seq() != 0 || !t.waiters().empty()) {
+        return;
+    }
+    const std::string path = t.path();
+    const auto count = nouns_.find(task_of(path));
+    if (count != nouns_.end() && --count->second == 0) {
+        nouns_.erase(count);
+    }
+    std::erase(dirty_, &t);
+    if (recent_ == &t) {
+        recent_ = nullptr;
+    }
+    topics_.erase(path);
+}
+
+void publications::publish(std::string_view path, const std::function<void(json_writer&)>& write) {
+    auto& t = open(path);
+    auto& line = t.begin();
+    const auto start = line.size();
+    protocol::append_update_head(line, publisher_, t.path(), t.seq() + 1, epoch_);
+    const auto body = line.size();
+    try {
+        json_writer writer{line};
+        write(writer);
+        close_result(line, body);
+        end(t, body - start);
+    } catch (...) {
+        t.roll_back();
+        tidy(t);
+        throw;
+    }
+}
+
+void publications::publish_body(std::string_view path, std::string_view body) {
+    publish(path, [body](json_writer& w) { w.raw(body); });
+}
+
+void publications::end(topic& t, std::size_t body_at) {
+    const auto line = t.pending();
+    if (line.size() > bounds_.line) {
+        throw error(errc::too_large, "an update of '" + t.path() + "' has " + std::to_string(line.size()) +
+                                         " bytes, the limit is " + std::to_string(bounds_.line));
+    }
+    if (protocol::looks_like_failure(line.substr(body_at))) {
+        throw error(errc::failed, "an update whose first key is 'error' would be taken for a failure");
+    }
+    t.commit(body_at);
+    recent_ = &t;
+    mark(t);
+}
+
+void publications::mark(topic& t) {
+    if (t.is_bound() && std::find(dirty_.begin(), dirty_.end(), &t) == dirty_.end()) {
+        dirty_.push_back(&t);
+        if (dirty_.size() == 1) {
+            wake_();
+        }
+    }
+}
+
+bool publications::publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation) {
+    auto& t = open(path);
+    if (!t.waiters().empty() || !t.has_room()) {
+        t.waiters().push_back({std::string{body}, std::move(operation)});
+        return false;
+    }
+    publish_body(path, body);
+    return true;
+}
+
+void publications::admit(topic& t) {
+    while (!t.waiters().empty() && t.has_room()) {
+        auto next = std::move(t.waiters().front());
+        t.waiters().pop_front();
+        try {
+            publish_body(t.path(), next.body);
+            next.operation.release()->offer("{}");
+        } catch (const error& e) {
+            next.operation.release()->fail(e.code(), e.message());
+        }
+    }
+}
+
+void publications::drain(time_point now) {
+    auto batch = std::exchange(dirty_, {});
+    for (auto* t : batch) {
+        t->drain(now);
+    }
+    for (auto* t : batch) {
+        admit(*t);
+    }
+}
+
+std::vector<detail::pending_ptr> publications::take_waiters() {
+    std::vector<detail::pending_ptr> taken;
+    for (auto& [path, t] : topics_) {
+        for (auto& w : std::exchange(t->waiters(), {})) {
+            taken.push_back(std::move(w.operation));
+        }
+    }
+    return taken;
+}
+
+std::vector<std::string> publications::tasks() const {
+    std::vector<std::string> names;
+    for (const auto& [path, t] : topics_) {
+        if (t->seq() != 0) {
+            names.emplace_back(task_of(path));
+        }
+    }
+    std::sort(names.begin(), names.end());
+    names.erase(std::unique(names.begin(), names.end()), names.end());
+    return names;
+}
+
+} // namespace cles::core

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/json_writer.hpp>
+#include <cles/limits.hpp>
+
+#include "core/topic.hpp"
+
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// All that a node publishes.
+class publications {
+  public:
+    /// `wake` is called when there is something to drain, once until `drain`.
+    publications(topic_context shared, const cles::limits& bounds, std::string publisher, std::string epoch,
+                 std::function<void()> wake);
+
+    /// Publishes what `write` writes (a body, or a scalar that is wrapped). The path is canonical.
+    /// \throws cles::error: `too_large`, `busy`, `failed`; what `write` throws. Nothing is published then.
+    void publish(std::string_view path, const std::function<void(json_writer&)>& write);
+    /// Publishes JSON that is known to be valid and without white space.
+    void publish_body(std::string_view path, std::string_view body);
+    /// Publishes a body of any kind now, or once every binder has room. True: now, and completing the operation is left
+    /// to the caller; otherwise it is taken and completed later.
+    bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation);
+
+    /// The topic, or null.
+    [[nodiscard]] topic* find(std::string_view path) noexcept;
+    /// Whether anything of the task has been published or bound.
+    [[nodiscard]] bool knows(std::string_view task) const noexcept;
+    /// The topic, made if need be.
+    /// \throws cles::error with `busy` where the task has too many nouns
+    topic& open(std::string_view path);
+    /// Whether `open` finds or makes it.
+    [[nodiscard]] bool can_open(std::string_view path) noexcept;
+    /// Forgets a topic that nobody is bound to and that was never published.
+    void tidy(topic& t);
+
+    /// Puts to binders what has been published since the last time.
+    void drain(time_point now);
+    [[nodiscard]] bool dirty() const noexcept { return !dirty_.empty(); }
+    /// Publishes what waits for room in this topic, as far as there is some.
+    void admit(topic& t);
+
+    [[nodiscard]] std::uint64_t published() const noexcept { return shared_.counts.updates_published; }
+    /// Takes out all that wait for room.
+    [[nodiscard]] std::vector<detail::pending_ptr> take_waiters();
+
+    /// The names of the tasks that have been published.
+    [[nodiscard]] std::vector<std::string> tasks() const;
+
+  private:
+    struct text_hash : boost::hash<std::string_view> {
+        using is_transparent = void;
+    };
+    template <class V>
+    using map = boost::unordered_flat_map<std::string, V, text_hash, std::equal_to<>>;
+
+    void end(topic& t, std::size_t body_at);
+    void mark(topic& t);
+
+    topic_context shared_;
+    const cles::limits& bounds_;
+    std::string publisher_;
+    std::string epoch_;
+    std::function<void()> wake_;
+    map<std::unique_ptr<topic>> topics_;
+    map<std::size_t> nouns_; // per task
+    std::vector<topic*> dirty_;
+    topic* recent_ = nullptr; // most publish the same noun again
+};
+
+} // namespace cles::core

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/request_checks.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "protocol/parts.hpp"
+
+#include <utility>
+
+namespace cles::core {
+
+decoded_parameters decode(const protocol::noun_view& noun, std::string& storage) {
+    decoded_parameters result;
+    storage.clear();
+    storage.reserve(noun.path.size());
+    for (const auto raw : noun.parameters) {
+        if (raw.find('%') == std::string_view::npos) {
+            result.push_back(raw);
+            continue;
+        }
+        const auto start = storage.size();
+        protocol::decode_parameter(raw, storage);
+        result.push_back(std::string_view{storage}.substr(start));
+    }
+    return result;
+}
+
+bool begins_with_error(std::string_view body) {
+    json_reader reader{body};
+    std::string_view key;
+    return reader.peek() == json_reader::kind::object && reader.begin_object() && reader.next_key(key) &&
+           key == "error";
+}
+
+bool passes(std::string_view via, std::string_view name) {
+    while (!via.empty()) {
+        const auto comma = via.find(',');
+        if (via.substr(0, comma) == name) {
+            return true;
+        }
+        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
+    }
+    return false;
+}
+
+std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& r) {
+    const auto object = [](errc code, std::string message) {
+        return protocol::failure{.code = code, .message = std::move(message)};
+    };
+    if (n.authorise) {
+        std::string scratch;
+        const auto path = protocol::canonical_path(r.noun, scratch);
+        if (!n.authorise({peer, r.verb, r.noun.task, path})) {
+            return object(errc::denied, n.name + " does not allow " + std::string{to_string(r.verb)} + " '" +
+                                            std::string{r.noun.task} + "'");
+        }
+    }
+    if ((r.noun.target != "self" && r.noun.target != n.name) || passes(r.via, n.name)) {
+        return object(errc::no_target, n.name + " knows no way to '" + std::string{r.noun.target} + "'");
+    }
+    std::string why;
+    if (!r.body.empty() && !is_valid_json(r.body, n.bounds.depth, &why)) {
+        return object(errc::bad_request, n.name + ": the body is not valid JSON: " + why);
+    }
+    if (r.verb == verb::update && begins_with_error(r.body)) {
+        return object(errc::bad_request, n.name + ": an update's first key cannot be 'error'");
+    }
+    return std::nullopt;
+}
+
+std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun) {
+    if (noun.task != "cles" || noun.parameters.size() != 2 || noun.parameters[0] != "cancel") {
+        return std::nullopt;
+    }
+    return protocol::number_between(noun.parameters[1], 1, protocol::max_id);
+}
+
+} // namespace cles::core

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+
+#include "core/node.hpp"
+#include "protocol/message.hpp"
+
+#include <boost/container/static_vector.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+/// What has to be known of a request before it is served.
+
+namespace cles::core {
+
+using decoded_parameters = boost::container::static_vector<std::string_view, protocol::max_parameters>;
+
+/// The parameters decoded: what holds escapes into `storage`, the others as views of the line.
+decoded_parameters decode(const protocol::noun_view& noun, std::string& storage);
+
+/// Whether a valid body is an object whose first key is "error".
+bool begins_with_error(std::string_view body);
+
+/// Whether `name` is in a comma-separated list.
+bool passes(std::string_view via, std::string_view name);
+
+/// What keeps a node from serving a request, whatever it asks for: access, target, body.
+std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& request);
+
+/// The id in "cles/cancel/<id>"; nothing for other nouns and for what is no id.
+std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun);
+
+} // namespace cles::core

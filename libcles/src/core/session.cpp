@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/session.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "protocol/line.hpp"
+
+#include <string>
+#include <utility>
+
+namespace cles::core {
+
+session::session(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
+    : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {}
+
+void session::on_line(std::string_view line, time_point now) {
+    line = protocol::trim(line);
+    if (line.empty() || closed_) {
+        return;
+    }
+    if (protocol::is_reply(line)) {
+        on_reply(line);
+        return;
+    }
+    if (protocol::is_http(line)) {
+        node_->say(log_level::warning, "a web client was turned away: " + peer_.address);
+        on_lost("the peer speaks HTTP");
+        out_.close();
+        return;
+    }
+    protocol::request_line request;
+    protocol::malformed_request malformed;
+    if (!protocol::parse_request(line, request, malformed)) {
+        inbound_.on_malformed(line, malformed, now);
+    } else if (request.is_update()) {
+        on_update(request);
+    } else {
+        inbound_.on_request(line, request, now);
+    }
+}
+
+void session::on_reply(std::string_view line) {
+    protocol::reply_line reply;
+    if (protocol::parse_reply(line, reply) && reply.id != 0) {
+        outbound_.on_reply(reply);
+    } else {
+        ++node_->counts.replies_dropped;
+    }
+}
+
+void session::on_update(const protocol::request_line& update) {
+    std::string scratch;
+    auto* s = subscriptions_.find(update.noun.target, protocol::canonical_path(update.noun, scratch));
+    const bool valid = s != nullptr && (update.body.empty() || is_valid_json(update.body, node_->bounds.depth)) &&
+                       !protocol::looks_like_failure(update.body);
+    if (!valid || !s->take(update)) {
+        ++node_->counts.updates_dropped;
+    } else {
+        ++node_->counts.updates_received;
+    }
+}
+
+void session::on_overlong(std::string_view head, time_point now) {
+    head = protocol::trim(head);
+    if (!protocol::is_reply(head)) {
+        inbound_.on_overlong(head, now);
+        return;
+    }
+    protocol::reply_line reply;
+    protocol::parse_reply(head, reply);
+    if (reply.id != 0) {
+        outbound_.on_overlong(reply);
+    }
+    ++node_->counts.replies_dropped;
+    closed_ = true;
+    out_.finish();
+}
+
+void session::on_end(time_point now) {
+    inbound_.end(now);
+    outbound_.lose(errc::unavailable, "the peer ended the link before it answered");
+}
+
+void session::on_lost(std::string_view why) {
+    closed_ = true;
+    inbound_.lose();
+    outbound_.lose(errc::unavailable, why);
+}
+
+} // namespace cles::core

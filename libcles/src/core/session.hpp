@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+
+#include "core/inbound.hpp"
+#include "core/node.hpp"
+#include "core/outbound.hpp"
+#include "core/outlet.hpp"
+#include "core/subscription.hpp"
+
+#include <memory>
+#include <string_view>
+
+namespace cles::core {
+
+/// What happens on one link, whatever it runs over: requests and replies cross it in both directions. Lines and time go
+/// in; what is to be sent comes out through the outlet.
+class session {
+  public:
+    session(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer);
+
+    void on_line(std::string_view line, time_point now);
+    void on_overlong(std::string_view head, time_point now);
+    /// The peer sends no more.
+    void on_end(time_point now);
+    /// The link is gone, for this reason.
+    void on_lost(std::string_view why);
+
+    [[nodiscard]] inbound& serving() noexcept { return inbound_; }
+    [[nodiscard]] outbound& asking() noexcept { return outbound_; }
+    [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }
+
+  private:
+    void on_reply(std::string_view line);
+    void on_update(const protocol::request_line& update);
+
+    std::shared_ptr<node> node_;
+    outlet& out_;
+    const identity& peer_;
+    inbound inbound_;
+    outbound outbound_;
+    subscriptions subscriptions_;
+    bool closed_ = false;
+};
+
+} // namespace cles::core

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/feed_event.hpp>
+
+#include "core/update_order.hpp"
+#include "protocol/message.hpp"
+
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace cles::core {
+
+/// What a node is bound to on one link, from the binder's side. Takes updates in, drops what is not wanted or not new.
+class subscription {
+  public:
+    /// `thinned`: with `every`, so that what is missing is no gap.
+    subscription(std::string target, std::string path, bool thinned)
+        : target_(std::move(target)), path_(std::move(path)), thinned_(thinned) {}
+    subscription(const subscription&) = delete;
+    subscription& operator=(const subscription&) = delete;
+
+    [[nodiscard]] const std::string& path() const noexcept { return path_; }
+    [[nodiscard]] const std::string& target() const noexcept { return target_; }
+
+    /// Hands an update on: first a gap that it shows, then itself. False where it is old or repeated, or from a node
+    /// that is not bound to.
+    bool take(const protocol::request_line& update);
+
+  protected:
+    ~subscription() = default;
+
+  private:
+    virtual void on_event(const detail::raw_event& event) = 0;
+
+    std::string target_;
+    std::string path_;
+    bool thinned_;
+    update_order order_;
+};
+
+/// The subscriptions on one link, by what they are bound to: one for each publisher and noun.
+class subscriptions {
+  public:
+    /// False where the noun is bound on this link already.
+    bool add(subscription& s);
+    void remove(const subscription& s);
+    [[nodiscard]] bool has(std::string_view target, std::string_view path) const;
+    /// The subscription that an update is for, or null.
+    [[nodiscard]] subscription* find(std::string_view publisher, std::string_view path) const;
+    [[nodiscard]] bool empty() const noexcept { return by_path_.empty(); }
+
+  private:
+    struct text_hash : boost::hash<std::string_view> {
+        using is_transparent = void;
+    };
+    // Mostly one node publishes a path on a link, so that a short list is quicker than a second key.
+    boost::unordered_flat_map<std::string, std::vector<subscription*>, text_hash, std::equal_to<>> by_path_;
+    mutable subscription* recent_ = nullptr; // most updates are of the noun of the one before
+};
+
+} // namespace cles::core

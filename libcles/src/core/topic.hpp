@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/pending.hpp>
+
+#include "core/counters.hpp"
+#include "core/deadlines.hpp"
+#include "core/update_log.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// The end of a link that updates are put to.
+class binder {
+  public:
+    binder() = default;
+    binder(const binder&) = delete;
+    binder& operator=(const binder&) = delete;
+    /// Whether it takes more just now; if not, it asks for the rest when it does.
+    [[nodiscard]] virtual bool takes_updates() const = 0;
+    virtual void put_updates(std::string_view lines) = 0;
+
+  protected:
+    ~binder() = default;
+};
+
+class topic;
+
+/// One binder's place in a topic.
+class binding final : public deadline {
+  public:
+    struct terms {
+        std::chrono::milliseconds every{0};
+        std::uint32_t keep = 64;
+    };
+
+    binding(topic& source, binder& target, terms wanted) : source_(source), target_(target), terms_(wanted) {}
+
+    /// Puts what waits to the binder, as far as it takes it.
+    void drain(time_point now);
+    void set_terms(terms wanted) noexcept { terms_ = wanted; }
+    [[nodiscard]] binder& target() const noexcept { return target_; }
+
+  private:
+    friend topic;
+    void on_deadline(time_point now) override;
+    void drain_newest(time_point now);
+    void drain_all();
+
+    topic& source_;
+    binder& target_;
+    terms terms_;
+    std::uint64_t seen_ = 0; // the last update that it was given, or that was dropped for it
+    time_point next_due_{};  // with `every`: not before
+};
+
+/// What a topic shares with the others of its node.
+struct topic_context {
+    deadline_queue& deadlines;
+    counters& counts;
+    std::size_t binding_bytes;
+};
+
+/// A noun that is published: its last updates, who is bound to it and how far each has got.
+class topic {
+  public:
+    topic(topic_context shared, std::string path) : shared_(shared), path_(std::move(path)) {}
+
+    [[nodiscard]] const std::string& path() const noexcept { return path_; }
+    [[nodiscard]] std::uint64_t seq() const noexcept { return log_.last(); }
+    /// The body of the last update; empty before the first.
+    [[nodiscard]] std::string_view last_body() const noexcept;
+
+    /// Begins the next update: append the line to what is returned, then `commit` (saying where in the line the body
+    /// begins) or `roll_back`.
+    std::string& begin() { return log_.begin(); }
+    [[nodiscard]] std::string_view pending() const noexcept { return log_.pending(); }
+    /// Ends the line and makes it the last update.
+    void commit(std::size_t body_at);
+    void roll_back() { log_.roll_back(); }
+
+    binding& bind(binder& target, binding::terms wanted);
+    /// False where it was not bound.
+    bool unbind(binder& target);
+    [[nodiscard]] binding* find(const binder& target) noexcept;
+    [[nodiscard]] bool is_bound() const noexcept { return !bindings_.empty(); }
+
+    /// Puts what waits to all binders that take it, and lets those publish that waited for room.
+    void drain(time_point now);
+    /// Takes note of how far the bindings have got, after one was drained by itself.
+    void refresh() noexcept;
+    /// Whether one more update fits the queue of every binder.
+    [[nodiscard]] bool has_room() const noexcept;
+
+    struct waiter {
+        std::string body;
+        detail::pending_ptr operation;
+    };
+    /// Updates that are to be published when there is room, oldest first.
+    std::deque<waiter>& waiters() noexcept { return waiters_; }
+
+  private:
+    friend binding;
+
+    topic_context shared_;
+    std::string path_;
+    update_log log_;
+    std::size_t last_body_at_ = 0;
+    std::vector<std::unique_ptr<binding>> bindings_;
+    std::deque<waiter> waiters_;
+    std::uint64_t slowest_ = 0;    // the least `seen_` of all bindings that take every update
+    std::uint64_t room_until_ = 0; // the last number that fits every such binding's `keep`
+    std::uint32_t longest_keep_ = 0;
+    bool unthinned_ = false; // there are such bindings
+};
+
+} // namespace cles::core

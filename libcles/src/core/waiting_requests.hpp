@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include <cstddef>
+#include <deque>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace cles::core {
+
+/// Requests without id that came while another was being served, in their order.
+class waiting_requests {
+  public:
+    /// Either a line that is still to be served, or an answer that is known already and stands as many times in a row.
+    struct entry {
+        std::string line;
+        std::string answer;
+        time_point arrived;
+        std::size_t times = 1;
+    };
+
+    void push_line(std::string_view line, time_point arrived) {
+        bytes_ += line.size();
+        entries_.push_back({.line = std::string{line}, .answer = {}, .arrived = arrived});
+    }
+    /// Equal answers in a row take no more memory than one, so that a flood of refusals is bounded.
+    void push_answer(std::string answer, time_point arrived) {
+        if (!entries_.empty() && entries_.back().line.empty() && entries_.back().answer == answer) {
+            ++entries_.back().times;
+            return;
+        }
+        bytes_ += answer.size();
+        entries_.push_back({.line = {}, .answer = std::move(answer), .arrived = arrived});
+    }
+    entry pop() {
+        auto first = std::move(entries_.front());
+        entries_.pop_front();
+        bytes_ -= first.line.size() + first.answer.size();
+        return first;
+    }
+    void clear() noexcept {
+        entries_.clear();
+        bytes_ = 0;
+    }
+
+    [[nodiscard]] bool empty() const noexcept { return entries_.empty(); }
+    [[nodiscard]] std::size_t size() const noexcept { return entries_.size(); }
+    [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
+
+  private:
+    std::deque<entry> entries_;
+    std::size_t bytes_ = 0;
+};
+
+} // namespace cles::core

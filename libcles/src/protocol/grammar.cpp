@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "protocol/grammar.hpp"
+
+#include "protocol/utf8.hpp"
+
+#include <array>
+#include <charconv>
+
+namespace cles::protocol {
+namespace {
+
+enum : std::uint8_t { name_char = 1, parameter_char = 2 };
+
+constexpr auto classes = [] {
+    std::array<std::uint8_t, 256> table{};
+    for (const auto c : std::string_view{"abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-."}) {
+        table[static_cast<unsigned char>(c)] = name_char | parameter_char;
+    }
+    table['~'] = table['+'] = parameter_char;
+    return table;
+}();
+
+constexpr bool in_class(char c, std::uint8_t wanted) noexcept {
+    return (classes[static_cast<unsigned char>(c)] & wanted) != 0;
+}
+
+constexpr int hex_value(char c) noexcept {
+    if (c >= '0' && c <= '9') {
+        return c - '0';
+    }
+    if (c >= 'A' && c <= 'F') {
+        return c - 'A' + 10;
+    }
+    if (c >= 'a' && c <= 'f') {
+        return c - 'a' + 10;
+    }
+    return -1;
+}
+
+bool has_control(std::string_view text) noexcept {
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        const auto b = static_cast<unsigned char>(text[i]);
+        const bool c1 = b == 0xC2 && i + 1 < text.size() && static_cast<unsigned char>(text[i + 1]) < 0xA0;
+        if (b < 0x20 || b == 0x7F || c1) {
+            return true;
+        }
+    }
+    return false;
+}
+
+} // namespace
+
+bool is_name(std::string_view text) noexcept {
+    if (text.empty() || text.size() > max_name) {
+        return false;
+    }
+    for (const auto c : text) {
+        if (!in_class(c, name_char)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+bool is_reserved_target(std::string_view name) noexcept { return name == "self" || name == "any" || name == "all"; }
+
+std::optional<std::uint64_t> parse_number(std::string_view text) noexcept {
+    std::uint64_t value = 0;
+    const auto end = text.data() + text.size();
+    const auto [ptr, code] = std::from_chars(text.data(), end, value);
+    if (text.empty() || code != std::errc{} || ptr != end || (text.size() > 1 && text.front() == '0')) {
+        return std::nullopt;
+    }
+    return value;
+}
+
+bool is_parameter(std::string_view text) noexcept {
+    bool escapes = false;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        if (text[i] == '%') {
+            if (i + 2 >= text.size() || hex_value(text[i + 1]) < 0 || hex_value(text[i + 2]) < 0) {
+                return false;
+            }
+            escapes = true;
+            i += 2;
+        } else if (!in_class(text[i], parameter_char)) {
+            return false;
+        }
+    }
+    if (escapes) {
+        std::string decoded;
+        decode_parameter(text, decoded);
+        return is_utf8(decoded) && !has_control(decoded);
+    }
+    return !text.empty();
+}
+
+void decode_parameter(std::string_view text, std::string& out) {
+    for (std::size_t i = 0; i < text.size(); ++i) {
+        if (text[i] == '%' && i + 2 < text.size()) {
+            out.push_back(static_cast<char>(hex_value(text[i + 1]) * 16 + hex_value(text[i + 2])));
+            i += 2;
+        } else {
+            out.push_back(text[i]);
+        }
+    }
+}
+
+void encode_parameter(std::string_view decoded, std::string& out) {
+    constexpr std::string_view digits = "0123456789ABCDEF";
+    for (const auto c : decoded) {
+        if (in_class(c, parameter_char)) {
+            out.push_back(c);
+        } else {
+            const auto b = static_cast<unsigned char>(c);
+            out.push_back('%');
+            out.push_back(digits[b >> 4U]);
+            out.push_back(digits[b & 0xFU]);
+        }
+    }
+}
+
+bool parse_noun(std::string_view text, noun_view& out, std::string& why) {
+    const auto colon = text.find(':');
+    if (colon == std::string_view::npos) {
+        why = "the noun " + quoted(text) + " has no ':' between target and task";
+        return false;
+    }
+    out.target = text.substr(0, colon);
+    out.path = text.substr(colon + 1);
+    if (!is_name(out.target)) {
+        why = "the target " + quoted(out.target) + " is not a name (1 to 64 letters, digits, '_', '-', '.')";
+        return false;
+    }
+    auto slash = out.path.find('/');
+    out.task = out.path.substr(0, slash);
+    if (!is_name(out.task)) {
+        why = "the task " + quoted(out.task) + " is not a name (1 to 64 letters, digits, '_', '-', '.')";
+        return false;
+    }
+    out.parameters.clear();
+    while (slash != std::string_view::npos) {
+        const auto from = slash + 1;
+        slash = out.path.find('/', from);
+        const auto parameter =
+            out.path.substr(from, slash == std::string_view::npos ? std::string_view::npos : slash - from);
+        if (out.parameters.size() == max_parameters) {
+            why = "more than 32 parameters";
+            return false;
+        }
+        if (!is_parameter(parameter)) {
+            const auto which = "parameter " + std::to_string(out.parameters.size() + 1);
+            why = parameter.empty()
+                      ? which + " is empty"
+                      : which + " " + quoted(parameter) + " holds a character or an escape that is not allowed";
+            return false;
+        }
+        out.parameters.push_back(parameter);
+    }
+    return true;
+}
+
+std::string_view canonical_path(const noun_view& noun, std::string& scratch) {
+    if (noun.path.find('%') == std::string_view::npos) {
+        return noun.path;
+    }
+    scratch.assign(noun.task);
+    std::string decoded;
+    for (const auto parameter : noun.parameters) {
+        decoded.clear();
+        decode_parameter(parameter, decoded);
+        scratch.push_back('/');
+        encode_parameter(decoded, scratch);
+    }
+    return scratch;
+}
+
+std::string quoted(std::string_view text) {
+    constexpr std::size_t longest = 48;
+    std::string out{"'"};
+    out.append(text.substr(0, longest));
+    out.append(text.size() > longest ? "...'" : "'");
+    return out;
+}
+
+} // namespace cles::protocol

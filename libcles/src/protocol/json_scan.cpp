@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "protocol/json_scan.hpp"
+
+#include "protocol/utf8.hpp"
+
+#include <array>
+#include <charconv>
+#include <cstdint>
+
+namespace cles::protocol {
+namespace {
+
+constexpr bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
+
+// Characters that stand for themselves in a string and need no further look.
+constexpr auto plain = [] {
+    std::array<bool, 256> table{};
+    for (std::size_t c = 0x20; c < 0x80; ++c) {
+        table[c] = c != '"' && c != '\\';
+    }
+    return table;
+}();
+
+void append_utf8(std::string& out, std::uint32_t c) {
+    const auto put = [&](std::uint32_t byte) { out.push_back(static_cast<char>(byte)); };
+    if (c < 0x80) {
+        put(c);
+    } else if (c < 0x800) {
+        put(0xC0U | (c >> 6U));
+        put(0x80U | (c & 0x3FU));
+    } else if (c < 0x10000) {
+        put(0xE0U | (c >> 12U));
+        put(0x80U | ((c >> 6U) & 0x3FU));
+        put(0x80U | (c & 0x3FU));
+    } else {
+        put(0xF0U | (c >> 18U));
+        put(0x80U | ((c >> 12U) & 0x3FU));
+        put(0x80U | ((c >> 6U) & 0x3FU));
+        put(0x80U | (c & 0x3FU));
+    }
+}
+
+bool hex4(std::string_view text, std::uint32_t& out) noexcept {
+    if (text.size() < 4) {
+        return false;
+    }
+    const auto* end = text.data() + 4;
+    return std::from_chars(text.data(), end, out, 16).ptr == end;
+}
+
+std::string_view scan_escape(std::string_view text, std::size_t& at) noexcept {
+    ++at;
+    if (at >= text.size()) {
+        return "a string without an end";
+    }
+    if (text[at] == 'u') {
+        std::uint32_t unit = 0;
+        if (!hex4(text.substr(at + 1), unit)) {
+            return "\\u needs four hex digits";
+        }
+        at += 5;
+        return {};
+    }
+    if (std::string_view{"\"\\/bfnrt"}.find(text[at]) == std::string_view::npos) {
+        return "an unknown escape";
+    }
+    ++at;
+    return {};
+}
+
+bool unescape_unit(std::string_view raw, std::size_t& at, std::string& out) {
+    std::uint32_t unit = 0;
+    hex4(raw.substr(at), unit);
+    at += 4;
+    if (unit >= 0xD800 && unit < 0xDC00) {
+        std::uint32_t low = 0;
+        if (raw.substr(at, 2) != "\\u" || !hex4(raw.substr(at + 2), low) || low < 0xDC00 || low > 0xDFFF) {
+            return false;
+        }
+        at += 6;
+        unit = 0x10000 + ((unit - 0xD800) << 10U) + (low - 0xDC00);
+    } else if (unit >= 0xDC00 && unit < 0xE000) {
+        return false;
+    }
+    append_utf8(out, unit);
+    return true;
+}
+
+} // namespace
+
+std::string_view scan_number(std::string_view text, std::size_t& at, bool& integral) noexcept {
+    const auto here = [&](char c) { return at < text.size() && text[at] == c; };
+    const auto digits = [&] {
+        const auto from = at;
+        while (at < text.size() && is_digit(text[at])) {
+            ++at;
+        }
+        return at != from;
+    };
+    integral = true;
+    if (here('-')) {
+        ++at;
+    }
+    if (here('0')) {
+        ++at;
+        if (at < text.size() && is_digit(text[at])) {
+            return "a number has no leading zeros";
+        }
+    } else if (!digits()) {
+        return "'-' without a digit";
+    }
+    if (here('.')) {
+        integral = false;
+        ++at;
+        if (!digits()) {
+            return "'.' without a digit";
+        }
+    }
+    if (here('e') || here('E')) {
+        integral = false;
+        ++at;
+        if (here('+') || here('-')) {
+            ++at;
+        }
+        if (!digits()) {
+            return "an exponent without a digit";
+        }
+    }
+    return {};
+}
+
+bool read_short_decimal(std::string_view text, std::size_t& at, double& out) noexcept {
+    constexpr std::size_t most_digits = 15;
+    constexpr std::array<double, most_digits + 1> powers{1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                         1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+    const auto* const begin = text.data() + at;
+    const auto* const end = text.data() + text.size();
+    const auto* p = begin;
+    const bool negative = p != end && *p == '-';
+    p += negative ? 1 : 0;
+    std::uint64_t digits = 0;
+    const auto* const whole = p;
+    const auto take_digits = [&] {
+        while (p != end && is_digit(*p)) {
+            digits = digits * 10 + static_cast<std::uint64_t>(*p - '0');
+            ++p;
+        }
+    };
+    take_digits();
+    auto count = static_cast<std::size_t>(p - whole);
+    if (count == 0 || count > most_digits || (count > 1 && *whole == '0')) {
+        return false;
+    }
+    std::size_t decimals = 0;
+    if (p != end && *p == '.') {
+        const auto* const fraction = ++p;
+        take_digits();
+        decimals = static_cast<std::size_t>(p - fraction);
+        count += decimals;
+        if (decimals == 0 || count > most_digits) {
+            return false;
+        }
+    }
+    if (p != end && (*p == 'e' || *p == 'E')) {
+        return false;
+    }
+    const auto value = static_cast<double>(digits) / powers[decimals];
+    out = negative ? -value : value;
+    at += static_cast<std::size_t>(p - begin);
+    return true;
+}
+
+std::string_view scan_string(std::string_view text, std::size_t& at, std::string_view& raw, bool& escaped) noexcept {
+    const auto start = ++at;
+    escaped = false;
+    for (;;) {
+        while (at < text.size() && plain[static_cast<unsigned char>(text[at])]) {
+            ++at;
+        }
+        if (at >= text.size()) {
+            return "a string without an end";
+        }
+        if (text[at] == '"') {
+            raw = text.substr(start, at - start);
+            ++at;
+            return {};
+        }
+        if (text[at] == '\\') {
+            escaped = true;
+            if (const auto wrong = scan_escape(text, at); !wrong.empty()) {
+                return wrong;
+            }
+        } else if (static_cast<unsigned char>(text[at]) < 0x20) {
+            return "a control character in a string";
+        } else if (const auto length = utf8_sequence(text, at); length != 0) {
+            at += length;
+        } else {
+            return "invalid UTF-8 in a string";
+        }
+    }
+}
+
+bool unescape(std::string_view raw, std::string& out) {
+    out.clear();
+    for (std::size_t i = 0; i < raw.size();) {
+        if (raw[i] != '\\') {
+            out.push_back(raw[i++]);
+            continue;
+        }
+        const auto c = raw[i + 1];
+        i += 2;
+        switch (c) {
+        case 'b': out.push_back('\b'); break;
+        case 'f': out.push_back('\f'); break;
+        case 'n': out.push_back('\n'); break;
+        case 'r': out.push_back('\r'); break;
+        case 't': out.push_back('\t'); break;
+        case 'u':
+            if (!unescape_unit(raw, i, out)) {
+                return false;
+            }
+            break;
+        default: out.push_back(c);
+        }
+    }
+    return true;
+}
+
+} // namespace cles::protocol

@@ -1,0 +1,6 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+/// All that crosses a link.
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "protocol/reply_line.hpp"
+
+#include <cles/json_reader.hpp>
+#include <cles/json_writer.hpp>
+
+#include "protocol/grammar.hpp"
+#include "protocol/parts.hpp"
+
+#include <array>
+#include <charconv>
+
+namespace cles::protocol {
+
+bool parse_reply(std::string_view line, reply_line& out) noexcept {
+    if (!line.starts_with("id=")) {
+        out.body = line;
+        return true;
+    }
+    part_reader parts{line};
+    const auto id = number_between(parts.next().substr(3), 1, max_id);
+    if (!id) {
+        return false;
+    }
+    out.id = *id;
+    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
+        adverb a;
+        if (!split_adverb(part, a)) {
+            return false;
+        }
+        if (a.key == "progress") {
+            double fraction = -1;
+            const auto end = a.value.data() + a.value.size();
+            const auto [ptr, code] = std::from_chars(a.value.data(), end, fraction);
+            if (out.progress || code != std::errc{} || ptr != end || !(fraction >= 0 && fraction <= 1)) {
+                return false;
+            }
+            out.progress = fraction;
+        } else if (a.key == "id") {
+            return false;
+        }
+    }
+    out.body = parts.rest();
+    return !out.body.empty();
+}
+
+bool parse_failure(std::string_view body, failure& out) {
+    json_reader reader{body};
+    std::string_view key;
+    reader.begin_object();
+    while (reader.next_key(key)) {
+        if (key == "error" && reader.peek() == json_reader::kind::string) {
+            std::string_view name;
+            if (reader.read(name)) {
+                out.code = errc_from_wire(name);
+            }
+        } else if (key == "message" && reader.peek() == json_reader::kind::string) {
+            reader.read(out.message);
+        } else if (key == "retry_ms" && reader.peek() == json_reader::kind::number) {
+            std::string_view raw;
+            if (reader.read_raw(raw)) {
+                out.retry_ms = parse_number(raw);
+            }
+        } else if (key == "ran" && reader.peek() == json_reader::kind::boolean) {
+            reader.read(out.ran);
+        } else {
+            reader.skip();
+        }
+    }
+    return reader.at_end();
+}
+
+void append_failure(std::string& out, const failure& f) {
+    json_writer writer{out};
+    writer.begin_object();
+    writer.key("error");
+    writer.value(wire_name(f.code));
+    writer.key("message");
+    writer.value(std::string_view{f.message});
+    if (f.ran) {
+        writer.key("ran");
+        writer.value(true);
+    }
+    if (f.retry_ms || f.code == errc::busy) {
+        writer.key("retry_ms");
+        writer.value(f.retry_ms.value_or(default_retry_ms));
+    }
+    writer.end_object();
+}
+
+void append_reply_head(std::string& out, std::uint64_t id) {
+    if (id != 0) {
+        out.append("id=");
+        append_number(out, id);
+        out.push_back(' ');
+    }
+}
+
+void append_progress_head(std::string& out, std::uint64_t id, double fraction) {
+    std::array<char, 32> digits;
+    out.append("id=");
+    append_number(out, id);
+    out.append(" progress=");
+    const auto* const end = std::to_chars(digits.data(), digits.data() + digits.size(), fraction).ptr;
+    out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
+    out.push_back(' ');
+}
+
+} // namespace cles::protocol

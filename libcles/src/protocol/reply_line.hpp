@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+/// Replies, both directions: how one is read from a line and how it is written (docs/protocol.md).
+
+namespace cles::protocol {
+
+/// Whether a line is a reply (anything else is a request).
+constexpr bool is_reply(std::string_view line) noexcept {
+    return line.starts_with('{') || line.starts_with('[') || line.starts_with("id=");
+}
+
+struct reply_line {
+    std::uint64_t id = 0; ///< 0: none
+    std::optional<double> progress;
+    std::string_view body;
+};
+
+/// Reads the parts of a reply; the body is found but not validated.
+bool parse_reply(std::string_view line, reply_line& out) noexcept;
+
+/// Whether a body is a failure.
+constexpr bool is_failure(std::string_view body) noexcept { return body.starts_with(R"({"error":")"); }
+
+/// Whether a handler's result would be taken for a failure, or for one by a reader that is less exact.
+constexpr bool looks_like_failure(std::string_view body) noexcept { return body.starts_with(R"({"error":)"); }
+
+/// When to come again, in a `busy` whose writer has nothing better to say.
+inline constexpr std::uint64_t default_retry_ms = 100;
+
+struct failure {
+    errc code = errc::failed;
+    std::string message;
+    std::optional<std::uint64_t> retry_ms{};
+    bool ran = false;
+};
+
+/// Reads a failure's members; a code from a newer node counts as `failed`. False: it is not valid JSON.
+bool parse_failure(std::string_view body, failure& out);
+
+/// Appends a failure's body. `ran` is written where it says something, `retry_ms` there and with `busy` always.
+void append_failure(std::string& out, const failure& f);
+
+/// Appends "id=7 ", or nothing for 0.
+void append_reply_head(std::string& out, std::uint64_t id);
+
+/// Appends "id=7 progress=0.4 ".
+void append_progress_head(std::string& out, std::uint64_t id, double fraction);
+
+} // namespace cles::protocol

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/connection.hpp"
+
+#include "core/feed_machine.hpp"
+#include "shell/engine.hpp"
+
+#include <utility>
+
+namespace cles::shell {
+namespace {
+
+constexpr unsigned lines_per_write = 32;
+constexpr std::size_t updates_wait_past = 65536; // unsent bytes past which updates stay in their topics
+
+} // namespace
+
+connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from)
+    : engine_(std::move(host)), link_(std::move(carrier)), from_(from),
+      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this) {}
+
+connection::~connection() = default;
+
+void connection::start() { link_->start(shared_from_this()); }
+
+time_point connection::now() { return now_ ? *now_ : *(now_ = engine_->now()); }
+
+// -- from the link -------------------------------------------------------------------------------------------------
+
+void connection::on_line(std::string_view line) {
+    session_.on_line(line, now());
+    // In a long batch the peer gets to work on the first replies while the rest is still being answered: with many
+    // requests in flight, neither end then waits for the other.
+    if (++lines_ % lines_per_write == 0 || link_->output().size() > engine_->bounds().unread) {
+        flush();
+    }
+}
+
+void connection::on_overlong(std::string_view head) { session_.on_overlong(head, now()); }
+
+void connection::on_batch() {
+    const auto keep = shared_from_this();
+    flush();
+    lines_ = 0;
+    now_.reset();
+    engine_->settle();
+}
+
+void connection::on_end() {
+    usable_ = false;
+    lose_feeds("the publisher ended the link");
+    session_.on_end(now());
+}
+
+void connection::on_lost(boost::system::error_code why) { end("the link was lost: " + why.message()); }
+
+void connection::on_room() {
+    const auto keep = shared_from_this();
+    session_.serving().drain(engine_->now());
+    flush();
+    engine_->settle();
+}
+
+// -- from the session ----------------------------------------------------------------------------------------------
+
+void connection::wake() {
+    if (!now_) { // else the batch ends with a flush
+        engine_->flush_soon(*this);
+    }
+}
+
+void connection::pause(bool stop) {
+    pause_for_queue_ = stop;
+    link_->pause(pause_for_queue_ || pause_for_backlog_);
+}
+
+void connection::finish() {
+    usable_ = false;
+    link_->finish();
+}
+
+void connection::close() { abandon("the link was closed"); }
+
+bool connection::takes_updates() const {
+    const bool takes = link_->unsent() < updates_wait_past;
+    updates_wait_ = updates_wait_ || !takes;
+    return takes;
+}
+
+void connection::put_updates(std::string_view lines) {
+    link_->output().append(lines);
+    engine_->flush_soon(*this);
+}
+
+// -- output --------------------------------------------------------------------------------------------------------
+
+void connection::flush() {
+    if (gone_) {
+        return;
+    }
+    link_->flush();
+    follow_backlog();
+    if (updates_wait_ && !engine_->stopped() && link_->unsent() < updates_wait_past) {
+        // The link took all at once, and so will not say that it has room.
+        updates_wait_ = false;
+        session_.serving().drain(engine_->now());
+    }
+}
+
+// A peer that does not read its replies is not read from either; one that takes nothing for long is left.
+void connection::follow_backlog() {
+    const auto unsent = link_->unsent();
+    const auto& bounds = engine_->bounds();
+    const bool too_much = unsent > (pause_for_backlog_ ? bounds.unread / 2 : bounds.unread);
+    if (too_much != pause_for_backlog_) {
+        pause_for_backlog_ = too_much;
+        link_->pause(pause_for_queue_ || pause_for_backlog_);
+    }
+    if (unsent != 0 && !stall_.armed()) {
+        stall_.sent = link_->sent();
+        engine_->deadlines().arm(stall_, engine_->now() + bounds.stall);
+    }
+}
+
+void connection::on_stall(time_point now) {
+    if (gone_ || link_->unsent() == 0) {
+        return;
+    }
+    if (link_->sent() != stall_.sent) {
+        stall_.sent = link_->sent();
+        engine_->deadlines().arm(stall_, now + engine_->bounds().stall);
+        return;
+    }
+    engine_->say(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address);
+    abandon("the peer took nothing for too long");
+}
+
+// -- feeds ---------------------------------------------------------------------------------------------------------
+
+void connection::bind(core::feed_machine& feed, protocol::request_text request, time_point deadline,
+                      detail::pending_ptr operation) {
+    session_.bound().add(feed);
+    feeds_.push_back(&feed);
+    session_.asking().send(request, deadline, engine_->now(), std::move(operation));
+}
+
+void connection::unbind(core::feed_machine& feed) {
+    session_.bound().remove(feed);
+    std::erase(feeds_, &feed);
+}
+
+void connection::lose_feeds(std::string_view why) {
+    const std::string reason{why};
+    const auto at = engine_->now();
+    while (!feeds_.empty()) {
+        auto* feed = feeds_.back();
+        unbind(*feed);
+        feed->on_lost(reason, at);
+    }
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void connection::abandon(std::string_view why) {
+    if (!gone_) {
+        const auto keep = shared_from_this();
+        link_->close();
+        end(why);
+    }
+}
+
+void connection::end(std::string_view why) {
+    if (gone_) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    gone_ = true;
+    usable_ = false;
+    engine_->deadlines().disarm(stall_);
+    engine_->forget(*this, link_->received(), link_->sent());
+    lose_feeds(why);
+    session_.on_lost(why);
+    now_.reset();
+    engine_->settle();
+}
+
+} // namespace cles::shell

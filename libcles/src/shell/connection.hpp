@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "core/outlet.hpp"
+#include "core/session.hpp"
+#include "core/topic.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace cles::core {
+class feed_machine;
+} // namespace cles::core
+
+namespace cles::detail {
+class engine;
+} // namespace cles::detail
+
+namespace cles::shell {
+
+/// A link with the session that lives on it.
+class connection final : public link_events,
+                         public core::outlet,
+                         public core::binder,
+                         public std::enable_shared_from_this<connection> {
+  public:
+    enum class origin : std::uint8_t { accepted, local, dialled };
+
+    connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from);
+    ~connection() override;
+
+    void start();
+    [[nodiscard]] core::session& session() noexcept { return session_; }
+    [[nodiscard]] origin from() const noexcept { return from_; }
+    /// Whether requests can still be sent.
+    [[nodiscard]] bool usable() const noexcept { return usable_; }
+    /// Writes what is there.
+    void flush();
+    /// Ends it at once, without a word to its owner.
+    void abandon(std::string_view why);
+    /// Sends a BIND for a feed and follows it from then on.
+    void bind(core::feed_machine& feed, protocol::request_text request, time_point deadline,
+              detail::pending_ptr operation);
+    void unbind(core::feed_machine& feed);
+
+    // link_events
+    void on_line(std::string_view line) override;
+    void on_overlong(std::string_view head) override;
+    void on_batch() override;
+    void on_end() override;
+    void on_lost(boost::system::error_code why) override;
+    void on_room() override;
+
+    // outlet
+    std::string& output() override { return link_->output(); }
+    void wake() override;
+    void pause(bool stop) override;
+    void finish() override;
+    void close() override;
+
+    // binder
+    [[nodiscard]] bool takes_updates() const override;
+    void put_updates(std::string_view lines) override;
+
+  private:
+    friend detail::engine;
+
+    struct stall_watch final : core::deadline {
+        explicit stall_watch(connection& c) : owner(c) {}
+        void on_deadline(time_point now) override { owner.on_stall(now); }
+        connection& owner;
+        std::uint64_t sent = 0;
+    };
+
+    time_point now();
+    void on_stall(time_point now);
+    void follow_backlog();
+    void end(std::string_view why);
+    void lose_feeds(std::string_view why);
+
+    std::shared_ptr<detail::engine> engine_;
+    link_ptr link_;
+    origin from_;
+    core::session session_;
+    stall_watch stall_;
+    std::vector<core::feed_machine*> feeds_;
+    std::optional<time_point> now_; // while a batch is handed over
+    unsigned lines_ = 0;            // of this batch
+    bool usable_ = true;
+    bool gone_ = false;
+    bool flush_asked_ = false;          // the engine will flush it
+    mutable bool updates_wait_ = false; // some were not taken
+    bool pause_for_queue_ = false;
+    bool pause_for_backlog_ = false;
+};
+
+} // namespace cles::shell

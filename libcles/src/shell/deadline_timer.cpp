@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/deadline_timer.hpp"
+
+#include <utility>
+
+namespace cles::shell {
+
+deadline_timer::deadline_timer(const boost::asio::any_io_executor& executor, std::function<void()> due)
+    : timer_(executor), due_(std::move(due)) {}
+
+void deadline_timer::follow(const core::deadline_queue& deadlines) {
+    const auto next = deadlines.next();
+    if (!due_ || !next || (set_for_ && *set_for_ <= *next)) {
+        return;
+    }
+    set_for_ = next;
+    timer_.expires_at(*next);
+    timer_.async_wait([self = shared_from_this()](boost::system::error_code code) {
+        if (!code && self->due_) {
+            self->set_for_.reset();
+            self->due_();
+        }
+    });
+}
+
+void deadline_timer::stop() {
+    due_ = nullptr;
+    timer_.cancel();
+}
+
+} // namespace cles::shell

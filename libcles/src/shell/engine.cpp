@@ -1,0 +1,391 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/engine.hpp"
+
+#include "core/call.hpp"
+#include "protocol/message.hpp"
+#include "shell/service_call.hpp"
+#include "transport/inproc.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <random>
+#include <utility>
+
+namespace cles::detail {
+namespace asio = boost::asio;
+
+namespace {
+
+// How many turns of the executor updates may wait for more to come, so that one write carries them all.
+constexpr int most_turns_put_off = 64;
+
+core::node_setup setup_of(service_options& options) {
+    std::random_device source;
+    return {.name = std::move(options.name),
+            .epoch = source(),
+            .bounds = options.limits,
+            .authorise = std::move(options.authorise),
+            .log = std::move(options.log)};
+}
+
+void check_node_name(const std::string& name) {
+    if (!protocol::is_name(name)) {
+        throw error(errc::invalid_name,
+                    protocol::quoted(name) + " is not a node's name (1 to 64 letters, digits, '_', '-', '.')");
+    }
+    if (protocol::is_reserved_target(name)) {
+        throw error(errc::invalid_name, "no node may be called '" + name + "'");
+    }
+}
+
+} // namespace
+
+engine::engine(asio::any_io_executor executor, service_options options)
+    : executor_(std::move(executor)), insecure_(options.insecure) {
+    check_node_name(options.name);
+    for (const auto& [name, where] : options.peers) {
+        set_peer(name, where);
+    }
+    node_ = std::make_shared<core::node>(setup_of(options), clock_, [this] { ask_for_turn(); });
+}
+
+engine::~engine() = default;
+
+void engine::start(const std::vector<std::string>& listen_at) {
+    timer_ = std::make_shared<shell::deadline_timer>(executor_, [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) {
+            self->node_->deadlines.expire(self->now());
+            self->settle();
+        }
+    });
+    for (const auto& where : listen_at) {
+        listen(where);
+    }
+    listeners_.open_local_doors();
+}
+
+// -- links ---------------------------------------------------------------------------------------------------------
+
+std::string engine::listen(std::string_view where) {
+    auto local = listeners_.listen(where, insecure_);
+    node_->endpoints.push_back(local);
+    say(log_level::debug, node_->name + " listens on " + local);
+    return local;
+}
+
+void engine::on_accepted(link_ptr arrived, bool counted) {
+    if (stopped_) {
+        arrived->close();
+        return;
+    }
+    if (counted && accepted_ >= bounds().links) {
+        ++node_->counts.links_refused;
+        protocol::append_failure(
+            arrived->output(),
+            {.code = errc::busy, .message = node_->name + " has as many links as it may", .retry_ms = 1000});
+        arrived->output().push_back('\n');
+        arrived->flush();
+        arrived->close();
+        return;
+    }
+    if (counted) {
+        ++node_->counts.links_accepted;
+    }
+    adopt(std::move(arrived), counted ? shell::connection::origin::accepted : shell::connection::origin::local);
+}
+
+std::shared_ptr<shell::connection> engine::adopt(link_ptr made, shell::connection::origin from) {
+    auto c = std::make_shared<shell::connection>(shared_from_this(), std::move(made), from);
+    connections_.emplace(c.get(), c);
+    if (from == shell::connection::origin::accepted) {
+        ++accepted_;
+    }
+    ++node_->counts.links_open;
+    c->start();
+    return c;
+}
+
+void engine::forget(shell::connection& c, std::uint64_t received, std::uint64_t sent) {
+    if (connections_.erase(&c) == 0) {
+        return;
+    }
+    if (c.from() == shell::connection::origin::accepted) {
+        --accepted_;
+    }
+    auto& counts = node_->counts;
+    --counts.links_open;
+    ++counts.links_lost;
+    counts.bytes_received += received;
+    counts.bytes_sent += sent;
+    for (auto& [where, r] : routes_) {
+        r->drop(c);
+    }
+}
+
+// -- turns ---------------------------------------------------------------------------------------------------------
+
+void engine::flush_soon(shell::connection& c) {
+    if (!c.flush_asked_) {
+        c.flush_asked_ = true;
+        to_flush_.push_back(c.shared_from_this());
+        ask_for_turn();
+    }
+}
+
+void engine::ask_for_turn() {
+    if (!turn_asked_ && !stopped_) {
+        turn_asked_ = true;
+        asio::post(executor_, [self = shared_from_this()] {
+            self->turn_asked_ = false;
+            self->turn();
+        });
+    }
+}
+
+void engine::turn() {
+    if (stopped_) {
+        return;
+    }
+    auto& published = node_->published;
+    if (published.dirty()) {
+        // While each turn brings more updates, they are let gather: one write for many.
+        const auto so_far = published.published();
+        if (so_far != published_at_last_turn_ && turns_put_off_ < most_turns_put_off) {
+            published_at_last_turn_ = so_far;
+            ++turns_put_off_;
+            ask_for_turn();
+        } else {
+            turns_put_off_ = 0;
+            published.drain(now());
+            published_at_last_turn_ = published.published();
+        }
+    }
+    flushing_.swap(to_flush_);
+    for (const auto& c : flushing_) {
+        c->flush_asked_ = false;
+        c->flush();
+    }
+    flushing_.clear();
+    settle();
+}
+
+// -- asking --------------------------------------------------------------------------------------------------------
+
+void engine::set_peer(std::string_view name, std::string_view where) {
+    if (!protocol::is_name(name) || protocol::is_reserved_target(name)) {
+        throw error(errc::invalid_name, protocol::quoted(name) + " is not a node's name");
+    }
+    if (!where.empty()) {
+        const auto address = parse_url(where);
+        if (find_transport(address.scheme) == nullptr) {
+            throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
+        }
+    }
+    directory_.set(name, where);
+    recent_route_ = nullptr;
+}
+
+shell::route* engine::route_to(std::string_view target, std::string_view at, boost::system::error_code& code,
+                               std::string& why) {
+    if (!at.empty()) {
+        return find_route(target, at, code, why);
+    }
+    if (recent_route_ == nullptr || recent_target_ != target) {
+        recent_route_ = find_route(target, at, code, why);
+        recent_target_ = target;
+    }
+    return recent_route_;
+}
+
+shell::route* engine::find_route(std::string_view target, std::string_view at, boost::system::error_code& code,
+                                 std::string& why) {
+    std::string address{at};
+    if (address.empty() && (target == "self" || target == node_->name)) {
+        address = "inproc://" + listeners_.self_door();
+    } else if (address.empty()) {
+        address = directory_.find(target);
+    }
+    if (address.empty() && transport::is_open(listeners_.shared_door(target))) {
+        address = "inproc://" + listeners_.shared_door(target);
+    }
+    if (const auto found = routes_.find(address); found != routes_.end()) {
+        return found->second.get();
+    }
+    try {
+        if (address.empty()) {
+            throw error(errc::no_target,
+                        protocol::is_reserved_target(target)
+                            ? "'" + std::string{target} + "' needs a node that routes"
+                            : node_->name + " knows no way to '" + std::string{target} + "': give its URL");
+        }
+        const auto where = parse_url(address);
+        if (find_transport(where.scheme) == nullptr) {
+            throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + address + "'");
+        }
+        auto made = std::make_shared<shell::route>(shared_from_this(), where);
+        return routes_.emplace(address, std::move(made)).first->second.get();
+    } catch (const error& e) {
+        code = e.code();
+        why = e.message();
+        return nullptr;
+    }
+}
+
+void engine::forget_waiting(const core::feed_machine& feed) {
+    for (const auto& [where, r] : routes_) {
+        r->forget(feed);
+    }
+}
+
+void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message) {
+    asio::post(executor_, [operation = std::move(operation), code, message = std::move(message)]() mutable {
+        operation.release()->fail(code, message);
+    });
+}
+
+std::uint64_t engine::send(const outgoing& request, const call_options& options, pending_ptr operation) {
+    if (stopped_) {
+        fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+        return 0;
+    }
+    protocol::noun_view noun;
+    std::string why;
+    boost::system::error_code code = errc::bad_request;
+    if (!protocol::parse_noun(request.noun, noun, why)) {
+        fail_later(std::move(operation), code, std::move(why));
+        return 0;
+    }
+    auto* r = route_to(noun.target, options.at_, code, why);
+    if (r == nullptr) {
+        fail_later(std::move(operation), code, std::move(why));
+        return 0;
+    }
+    auto limit = options.deadline_;
+    if (limit.count() <= 0) {
+        limit = std::chrono::milliseconds{protocol::default_deadline(request.verb)};
+    }
+    limit = std::min(limit, std::chrono::milliseconds{protocol::max_deadline_ms});
+    const auto id = draw_id();
+    const auto begun = now();
+    r->send({.verb = request.verb,
+             .noun = request.noun,
+             .body = request.body,
+             .id = id,
+             .begun = begun,
+             .deadline = begun + limit},
+            std::move(operation), options.on_progress_);
+    settle();
+    return id;
+}
+
+void engine::cancel(std::uint64_t ticket) {
+    const auto keep = shared_from_this();
+    for (const auto& [where, r] : routes_) {
+        if (r->cancel(ticket)) {
+            return;
+        }
+    }
+    for (const auto& [key, c] : connections_) {
+        const auto held = c;
+        if (held->session().asking().cancel(ticket)) {
+            return;
+        }
+    }
+}
+
+// -- serving and publishing ----------------------------------------------------------------------------------------
+
+void engine::add(registration task) {
+    core::handler entry{.info = std::move(task.info), .plain = std::move(task.plain)};
+    if (task.async) {
+        entry.start = [handler = std::move(task.async), executor = executor_](const request& r,
+                                                                              const std::shared_ptr<core::call>& call) {
+            // Held here too, so that what a handler throws is the answer, and not that its responder went without one.
+            const auto control = std::make_shared<shell::service_call>(call, executor);
+            try {
+                handler(r, responder{control});
+            } catch (...) {
+                fail_with(*control, std::current_exception());
+            }
+        };
+    }
+    node_->tasks.add(task.verb, task.task, std::move(entry));
+}
+
+void engine::check_path(std::string_view noun) const {
+    protocol::noun_view parts;
+    std::string why;
+    const auto whole = "self:" + std::string{noun};
+    std::string scratch;
+    if (!protocol::parse_noun(whole, parts, why)) {
+        throw error(errc::invalid_name, why);
+    }
+    if (parts.task == "cles") {
+        throw error(errc::invalid_name, "the task 'cles' is reserved");
+    }
+    if (protocol::canonical_path(parts, scratch) != noun) {
+        throw error(errc::invalid_name, "write '" + scratch + "' instead of '" + std::string{noun} + "'");
+    }
+}
+
+void engine::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
+    if (stopped_) {
+        return;
+    }
+    if (node_->published.find(noun) == nullptr) {
+        check_path(noun);
+    }
+    node_->published.publish(noun, write);
+}
+
+void engine::publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation) {
+    if (stopped_) {
+        fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+        return;
+    }
+    try {
+        if (node_->published.find(noun) == nullptr) {
+            check_path(noun);
+        }
+        if (node_->published.publish_when_room(noun, json, operation)) {
+            asio::post(executor_, [operation = std::move(operation)]() mutable { operation.release()->offer("{}"); });
+        }
+    } catch (const error& e) {
+        fail_later(std::move(operation), e.code(), e.message());
+    }
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void engine::stop() {
+    if (stopped_) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    stopped_ = true;
+    listeners_.close();
+    timer_->stop();
+    for (const auto& c : std::exchange(to_flush_, {})) {
+        c->flush();
+    }
+    // Whoever waits hears of it on the executor, never from inside this call.
+    const auto tell = [this](std::vector<pending_ptr> waiting) {
+        for (auto& operation : waiting) {
+            fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+        }
+    };
+    feeds_.stop();
+    tell(node_->published.take_waiters());
+    recent_route_ = nullptr;
+    for (auto routes = std::exchange(routes_, {}); const auto& [where, r] : routes) {
+        tell(r->stop());
+    }
+    for (auto connections = connections_; const auto& [key, c] : connections) {
+        tell(c->session().asking().take_all());
+        c->flush();
+        c->abandon("the service has been stopped");
+    }
+}
+
+} // namespace cles::detail

@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/call_options.hpp>
+#include <cles/link.hpp>
+#include <cles/service.hpp>
+
+#include "core/directory.hpp"
+#include "core/feed_machine.hpp"
+#include "core/node.hpp"
+#include "protocol/grammar.hpp"
+#include "shell/connection.hpp"
+#include "shell/deadline_timer.hpp"
+#include "shell/feed_links.hpp"
+#include "shell/listeners.hpp"
+#include "shell/route.hpp"
+#include "shell/steady_clock.hpp"
+
+#include <boost/asio/any_io_executor.hpp>
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::detail {
+
+/// The inside of a service: the node, its links and routes, and what drives them.
+class engine final : public std::enable_shared_from_this<engine> {
+  public:
+    engine(boost::asio::any_io_executor executor, service_options options);
+    ~engine();
+
+    /// Begins; to be called once, when the engine is owned.
+    void start(const std::vector<std::string>& listen_at);
+    std::string listen(std::string_view where);
+    void set_peer(std::string_view name, std::string_view where);
+    void stop();
+    [[nodiscard]] bool stopped() const noexcept { return stopped_; }
+
+    // For the rooms beneath.
+    [[nodiscard]] core::node& node() noexcept { return *node_; }
+    [[nodiscard]] const std::shared_ptr<core::node>& shared_node() const noexcept { return node_; }
+    [[nodiscard]] const limits& bounds() const noexcept { return node_->bounds; }
+    [[nodiscard]] core::deadline_queue& deadlines() noexcept { return node_->deadlines; }
+    [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
+    [[nodiscard]] time_point now() const { return clock_.now(); }
+    void say(log_level level, std::string_view text) const { node_->say(level, text); }
+    std::shared_ptr<shell::connection> adopt(link_ptr made, shell::connection::origin from);
+    /// A link that came in; those from other processes are counted against the limit.
+    void on_accepted(link_ptr arrived, bool counted);
+    void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
+    /// Has its output written when what runs now has ended.
+    void flush_soon(shell::connection& c);
+    /// To be called when something has happened: sets the timer.
+    void settle() { timer_->follow(node_->deadlines); }
+
+    // For the façade.
+    void add(registration task);
+    void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
+    void publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation);
+    std::uint64_t send(const outgoing& request, const call_options& options, pending_ptr operation);
+    void cancel(std::uint64_t ticket);
+    /// Completes an operation that failed while it began; not from inside the call.
+    void fail_later(pending_ptr operation, boost::system::error_code code, std::string message);
+
+    // For the feeds.
+    [[nodiscard]] shell::feed_links& feeds() noexcept { return feeds_; }
+    /// The route for a target, or null with the reason in `code` and `why`.
+    shell::route* route_to(std::string_view target, std::string_view at, boost::system::error_code& code,
+                           std::string& why);
+    [[nodiscard]] std::uint64_t draw_id() noexcept { return next_id_++; }
+    /// A feed no longer waits for a link.
+    void forget_waiting(const core::feed_machine& feed);
+
+  private:
+    void ask_for_turn();
+    void turn();
+    shell::route* find_route(std::string_view target, std::string_view at, boost::system::error_code& code,
+                             std::string& why);
+    void check_path(std::string_view noun) const;
+
+    boost::asio::any_io_executor executor_;
+    shell::steady_clock clock_;
+    std::shared_ptr<core::node> node_;
+    std::shared_ptr<shell::deadline_timer> timer_;
+    bool insecure_;
+    core::directory directory_;
+    shell::listeners listeners_{*this};
+    std::map<shell::connection*, std::shared_ptr<shell::connection>> connections_;
+    std::size_t accepted_ = 0;
+    std::map<std::string, std::shared_ptr<shell::route>, std::less<>> routes_;
+    std::string recent_target_; // most requests go where the one before went
+    shell::route* recent_route_ = nullptr;
+    shell::feed_links feeds_{*this};
+    std::vector<std::shared_ptr<shell::connection>> to_flush_;
+    std::vector<std::shared_ptr<shell::connection>> flushing_;
+    std::uint64_t next_id_ = 1;
+    std::uint64_t published_at_last_turn_ = 0;
+    int turns_put_off_ = 0;
+    bool turn_asked_ = false;
+    bool stopped_ = false;
+};
+
+} // namespace cles::detail

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/feed_links.hpp"
+
+#include "protocol/message.hpp"
+#include "shell/engine.hpp"
+#include "shell/route.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <utility>
+
+namespace cles::shell {
+namespace {
+
+/// The answer to a feed's BIND. The feed lives as long as its handle.
+class bind_reply final : public detail::pending {
+  public:
+    bind_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle, core::feed_machine& feed)
+        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed) {}
+
+    verdict offer(std::string_view json) override {
+        if (!is_valid_json(json)) {
+            return verdict::malformed;
+        }
+        const std::unique_ptr<bind_reply> self{this};
+        if (const auto alive = handle_.lock()) {
+            feed_.on_bound(json);
+        }
+        return verdict::completed;
+    }
+
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::unique_ptr<bind_reply> self{this};
+        const auto host = host_.lock();
+        const auto alive = handle_.lock();
+        if (host && alive && !feed_.closed()) {
+            const std::string text{message};
+            if (code == errc::deadline) { // the publisher may still answer, and would send updates for ever
+                host->feeds().unbind(feed_);
+            } else {
+                host->feeds().detach(feed_);
+            }
+            feed_.on_refused(code, text, host->now());
+        }
+    }
+    void discard() noexcept override { delete this; }
+
+  private:
+    std::weak_ptr<detail::engine> host_;
+    std::weak_ptr<detail::feed_control> handle_;
+    core::feed_machine& feed_;
+};
+
+/// The answer to an unbind, which nobody waits for.
+class ignored_reply final : public detail::pending {
+  public:
+    verdict offer(std::string_view) override {
+        delete this;
+        return verdict::completed;
+    }
+    void fail(boost::system::error_code, std::string_view) override { delete this; }
+    void discard() noexcept override { delete this; }
+};
+
+} // namespace
+
+void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
+    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}});
+}
+
+void feed_links::leave(core::feed_machine& feed) { feeds_.erase(&feed); }
+
+void feed_links::refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why) {
+    boost::asio::post(engine_.executor(),
+                      [host = engine_.shared_from_this(), handle = feeds_.at(&feed).handle.lock(), &feed, code, why] {
+                          feed.on_refused(code, why, host->now());
+                          host->settle();
+                      });
+}
+
+void feed_links::bind(core::feed_machine& feed) {
+    const auto found = feeds_.find(&feed);
+    if (found == feeds_.end()) {
+        return;
+    }
+    if (engine_.stopped()) {
+        refuse_later(feed, errc::stopped, "the service has been stopped");
+        return;
+    }
+    boost::system::error_code code;
+    std::string why;
+    auto* r = engine_.route_to(feed.target(), found->second.terms.at, code, why);
+    if (r == nullptr) {
+        refuse_later(feed, code, why);
+        return;
+    }
+    r->connect(feed, [host = engine_.shared_from_this(), handle = found->second.handle.lock(), &feed,
+                      address = r->address()](const std::shared_ptr<connection>& c, boost::system::error_code failed) {
+        if (feed.closed()) {
+            return;
+        }
+        if (c) {
+            host->feeds().send_bind(feed, c);
+        } else {
+            feed.on_refused(failed, "cannot connect to " + address + ": " + failed.message(), host->now());
+        }
+    });
+    engine_.settle();
+}
+
+void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
+    auto& e = feeds_.at(&feed);
+    e.on = c;
+    auto limit = e.terms.deadline;
+    if (limit.count() <= 0) {
+        limit = std::chrono::milliseconds{protocol::default_deadline_ms};
+    }
+    c->bind(feed,
+            {.verb = verb::bind,
+             .noun = e.terms.noun,
+             .id = engine_.draw_id(),
+             .every_ms = e.terms.every_ms,
+             .keep = e.terms.keep},
+            engine_.now() + limit, detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed)});
+}
+
+void feed_links::detach(core::feed_machine& feed) {
+    const auto found = feeds_.find(&feed);
+    if (found != feeds_.end()) {
+        if (const auto c = found->second.on.lock()) {
+            c->unbind(feed);
+        }
+        found->second.on.reset();
+    }
+}
+
+void feed_links::unbind(core::feed_machine& feed) {
+    const auto found = feeds_.find(&feed);
+    if (found == feeds_.end()) {
+        return;
+    }
+    engine_.forget_waiting(feed);
+    const auto c = found->second.on.lock();
+    const auto now = engine_.now();
+    detach(feed);
+    if (c && c->usable() && !engine_.stopped()) {
+        c->session().asking().send(
+            {.verb = verb::bind, .noun = found->second.terms.noun, .id = engine_.draw_id(), .lease_ms = 0},
+            now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
+            detail::pending_ptr{new ignored_reply});
+    }
+}
+
+void feed_links::stop() {
+    const auto feeds = feeds_;
+    for (const auto& [feed, e] : feeds) {
+        if (const auto handle = e.handle.lock()) {
+            // Taken out of the feed, which they may own: else neither would go if the context goes without running.
+            boost::asio::post(engine_.executor(),
+                              [waiting = feed->abandon()]() mutable { waiting.fail(errc::stopped); });
+        }
+    }
+}
+
+} // namespace cles::shell

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/feed.hpp>
+
+#include "core/feed_machine.hpp"
+#include "shell/connection.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+
+namespace cles::detail {
+class engine;
+} // namespace cles::detail
+
+namespace cles::shell {
+
+/// What a feed is bound to.
+struct feed_terms {
+    std::string noun;
+    std::string at;
+    std::chrono::milliseconds deadline{};
+    std::uint32_t every_ms = 0;
+    std::uint32_t keep = 0;
+};
+
+/// The feeds of a service and the links that they are on: finds each a link, sends its BIND, and unbinds it.
+class feed_links final : public core::feed_host {
+  public:
+    explicit feed_links(detail::engine& host) noexcept : engine_(host) {}
+
+    void enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms);
+    void leave(core::feed_machine& feed);
+    void bind(core::feed_machine& feed) override;
+    void unbind(core::feed_machine& feed) override;
+    /// Takes a feed off its link without telling the publisher.
+    void detach(core::feed_machine& feed);
+    /// Closes all.
+    void stop();
+
+  private:
+    struct entry {
+        std::weak_ptr<detail::feed_control> handle;
+        feed_terms terms;
+        std::weak_ptr<connection> on;
+    };
+
+    void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
+    void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
+
+    detail::engine& engine_;
+    std::map<core::feed_machine*, entry> feeds_;
+};
+
+} // namespace cles::shell

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/listeners.hpp"
+
+#include "shell/engine.hpp"
+
+#include <cstdint>
+#include <utility>
+
+namespace cles::shell {
+
+void listeners::start(acceptor& made, bool counted) {
+    made.start([weak = engine_.weak_from_this(), counted](link_ptr arrived) {
+        if (const auto host = weak.lock()) {
+            host->on_accepted(std::move(arrived), counted);
+        } else {
+            arrived->close();
+        }
+    });
+}
+
+std::string listeners::listen(std::string_view where, bool insecure) {
+    const auto address = parse_url(where);
+    auto* carrier = find_transport(address.scheme);
+    if (carrier == nullptr) {
+        throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
+    }
+    if (!insecure && carrier->is_exposed(address)) {
+        throw error(errc::insecure_listen, "'" + std::string{where} +
+                                               "' can be reached from other hosts, and nobody proves who they are; "
+                                               "set 'insecure' if that is meant");
+    }
+    std::unique_ptr<acceptor> made;
+    try {
+        made = carrier->listen(engine_.executor(), address, engine_.bounds());
+    } catch (const boost::system::system_error& e) {
+        throw error(e.code(), "cannot listen on '" + std::string{where} + "': " + e.code().message());
+    }
+    start(*made, true);
+    auto local = to_string(made->local());
+    open_.push_back(std::move(made));
+    return local;
+}
+
+std::string listeners::self_door() const {
+    return "self/" + std::to_string(reinterpret_cast<std::uintptr_t>(&engine_));
+}
+
+std::string listeners::shared_door(std::string_view name) const {
+    const auto& context = boost::asio::query(engine_.executor(), boost::asio::execution::context);
+    return "context/" + std::to_string(reinterpret_cast<std::uintptr_t>(&context)) + "/" + std::string{name};
+}
+
+void listeners::open_local_doors() {
+    auto* carrier = find_transport("inproc");
+    for (const auto& door : {self_door(), shared_door(engine_.node().name)}) {
+        try {
+            auto made = carrier->listen(engine_.executor(), {.scheme = "inproc", .host = door, .port = 0, .path = {}},
+                                        engine_.bounds());
+            start(*made, false);
+            open_.push_back(std::move(made));
+        } catch (const boost::system::system_error&) {
+            engine_.say(log_level::warning,
+                        "another '" + engine_.node().name + "' in this process is the one that others find here");
+        }
+    }
+}
+
+void listeners::close() { open_.clear(); }
+
+} // namespace cles::shell

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::detail {
+class engine;
+} // namespace cles::detail
+
+namespace cles::shell {
+
+/// Where a service's links come in.
+class listeners {
+  public:
+    explicit listeners(detail::engine& host) noexcept : engine_(host) {}
+
+    /// Listens at a URL and returns it as it turned out. \throws cles::error
+    std::string listen(std::string_view where, bool insecure);
+    /// Opens the ways by which services of the same process and context reach this one without a socket, itself among
+    /// them.
+    void open_local_doors();
+    void close();
+
+    /// The door that leads to this service alone.
+    [[nodiscard]] std::string self_door() const;
+    /// The door behind which services of this context look for a node of that name.
+    [[nodiscard]] std::string shared_door(std::string_view name) const;
+
+  private:
+    void start(acceptor& made, bool counted);
+
+    detail::engine& engine_;
+    std::vector<std::unique_ptr<acceptor>> open_;
+};
+
+} // namespace cles::shell

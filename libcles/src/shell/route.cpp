@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/route.hpp"
+
+#include "core/feed_machine.hpp"
+#include "shell/engine.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::shell {
+
+route::route(std::shared_ptr<detail::engine> host, url where)
+    : engine_(std::move(host)), where_(std::move(where)), address_(to_string(where_)) {}
+
+std::shared_ptr<connection> route::usable() const {
+    for (const auto& c : links_) {
+        if (c->usable()) {
+            return c;
+        }
+    }
+    return nullptr;
+}
+
+std::shared_ptr<connection> route::free_for(const core::feed_machine& feed) const {
+    for (const auto& c : links_) {
+        if (c->usable() && !c->session().bound().has(feed.target(), feed.path())) {
+            return c;
+        }
+    }
+    return nullptr;
+}
+
+void route::send(const request& r, detail::pending_ptr operation, core::outbound::progress_function progress) {
+    if (const auto c = usable()) {
+        c->session().asking().send({.verb = r.verb, .noun = r.noun, .id = r.id, .body = r.body}, r.deadline, r.begun,
+                                   std::move(operation), std::move(progress));
+        return;
+    }
+    auto w = std::make_unique<waiting>(*this);
+    w->verb = r.verb;
+    w->noun = r.noun;
+    w->body = r.body;
+    w->id = r.id;
+    w->deadline = r.deadline;
+    w->operation = std::move(operation);
+    w->progress = std::move(progress);
+    engine_->deadlines().arm(*w, r.deadline);
+    requests_.push_back(std::move(w));
+    dial();
+}
+
+bool route::cancel(std::uint64_t id) {
+    const auto found = std::find_if(requests_.begin(), requests_.end(), [id](const auto& w) { return w->id == id; });
+    if (found == requests_.end()) {
+        return false;
+    }
+    auto operation = std::move((*found)->operation);
+    requests_.erase(found);
+    operation.release()->fail(errc::cancelled, "the request was withdrawn");
+    return true;
+}
+
+void route::waiting::on_deadline(time_point) {
+    const auto& list = owner.requests_;
+    const auto found = std::find_if(list.begin(), list.end(), [this](const auto& w) { return w.get() == this; });
+    auto held = std::move(operation);
+    const auto message = "no link to " + owner.address_ + " came about in time";
+    owner.requests_.erase(found); // ends this
+    held.release()->fail(errc::deadline, message);
+}
+
+void route::connect(core::feed_machine& feed,
+                    std::function<void(const std::shared_ptr<connection>&, boost::system::error_code)> ready) {
+    if (const auto c = free_for(feed)) {
+        ready(c, {});
+        return;
+    }
+    binders_.push_back({&feed, std::move(ready)});
+    dial();
+}
+
+void route::forget(const core::feed_machine& feed) {
+    binders_.remove_if([&](const binder& b) { return b.feed == &feed; });
+}
+
+void route::drop(const connection& c) {
+    std::erase_if(links_, [&](const auto& held) { return held.get() == &c; });
+}
+
+void route::dial() {
+    if (give_up_) {
+        return;
+    }
+    auto* carrier = find_transport(where_.scheme);
+    give_up_ = carrier->dial(engine_->executor(), where_, engine_->bounds(),
+                             [weak = weak_from_this()](boost::system::error_code code, link_ptr made) {
+                                 if (const auto self = weak.lock()) {
+                                     self->on_dialled(code, std::move(made));
+                                 } else if (made) {
+                                     made->close();
+                                 }
+                             });
+}
+
+void route::on_dialled(boost::system::error_code code, link_ptr made) {
+    const auto keep = shared_from_this();
+    give_up_ = nullptr;
+    if (code) {
+        fail_waiting(code);
+    } else {
+        const auto c = engine_->adopt(std::move(made), connection::origin::dialled);
+        links_.push_back(c);
+        serve_waiting(c);
+    }
+    engine_->settle();
+}
+
+void route::serve_waiting(const std::shared_ptr<connection>& c) {
+    const auto now = engine_->now();
+    for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
+        auto& w = *requests.front();
+        engine_->deadlines().disarm(w);
+        c->session().asking().send({.verb = w.verb, .noun = w.noun, .id = w.id, .body = w.body}, w.deadline, now,
+                                   std::move(w.operation), std::move(w.progress));
+    }
+    for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {
+        auto& next = binders.front();
+        if (const auto free = free_for(*next.feed)) {
+            next.ready(free, {});
+        } else {
+            binders_.push_back(std::move(next));
+        }
+    }
+    if (!binders_.empty()) {
+        dial();
+    }
+}
+
+void route::fail_waiting(boost::system::error_code code) {
+    const auto message = "cannot connect to " + address_ + ": " + code.message();
+    auto requests = std::exchange(requests_, {});
+    auto binders = std::exchange(binders_, {});
+    for (const auto& w : requests) {
+        engine_->deadlines().disarm(*w);
+    }
+    for (const auto& w : requests) {
+        w->operation.release()->fail(code, message);
+    }
+    for (const auto& b : binders) {
+        b.ready(nullptr, code);
+    }
+}
+
+std::vector<detail::pending_ptr> route::stop() {
+    if (const auto give_up = std::exchange(give_up_, nullptr)) {
+        give_up();
+    }
+    binders_.clear();
+    links_.clear();
+    std::vector<detail::pending_ptr> taken;
+    for (auto& w : std::exchange(requests_, {})) {
+        taken.push_back(std::move(w->operation));
+    }
+    return taken;
+}
+
+} // namespace cles::shell

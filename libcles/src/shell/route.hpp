@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+#include <cles/pending.hpp>
+
+#include "core/deadlines.hpp"
+#include "core/outbound.hpp"
+#include "shell/connection.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <list>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace cles::core {
+class feed_machine;
+} // namespace cles::core
+
+namespace cles::shell {
+
+/// The way to one URL: the links that lead there, made when they are needed, and what waits for one.
+class route : public std::enable_shared_from_this<route> {
+  public:
+    route(std::shared_ptr<detail::engine> host, url where);
+
+    struct request {
+        cles::verb verb = verb::pull;
+        std::string_view noun;
+        std::string_view body;
+        std::uint64_t id = 0;
+        time_point begun{};
+        time_point deadline{};
+    };
+    /// Sends a request on a link that is there, or as soon as one has been made.
+    void send(const request& r, detail::pending_ptr operation, core::outbound::progress_function progress);
+    /// Withdraws a request that waits here for its link. False where there is none of that id.
+    bool cancel(std::uint64_t id);
+    /// Finds the feed a link on which its noun is not bound yet; `ready` is called with it, or with null and why there
+    /// is none. Not called any more after `forget`.
+    void connect(core::feed_machine& feed,
+                 std::function<void(const std::shared_ptr<connection>&, boost::system::error_code)> ready);
+    void forget(const core::feed_machine& feed);
+    /// A link has been lost or can no longer be used.
+    void drop(const connection& c);
+    /// Gives up, and takes out the requests that wait.
+    [[nodiscard]] std::vector<detail::pending_ptr> stop();
+
+    [[nodiscard]] const std::string& address() const noexcept { return address_; }
+
+  private:
+    struct waiting final : core::deadline {
+        explicit waiting(route& r) : owner(r) {}
+        void on_deadline(time_point now) override;
+
+        route& owner;
+        cles::verb verb = verb::pull;
+        std::string noun;
+        std::string body;
+        std::uint64_t id = 0;
+        time_point deadline{};
+        detail::pending_ptr operation;
+        core::outbound::progress_function progress;
+    };
+    struct binder {
+        core::feed_machine* feed;
+        std::function<void(const std::shared_ptr<connection>&, boost::system::error_code)> ready;
+    };
+
+    [[nodiscard]] std::shared_ptr<connection> usable() const;
+    [[nodiscard]] std::shared_ptr<connection> free_for(const core::feed_machine& feed) const;
+    void dial();
+    void on_dialled(boost::system::error_code code, link_ptr made);
+    void serve_waiting(const std::shared_ptr<connection>& c);
+    void fail_waiting(boost::system::error_code code);
+
+    std::shared_ptr<detail::engine> engine_;
+    url where_;
+    std::string address_;
+    std::vector<std::shared_ptr<connection>> links_;
+    std::list<std::unique_ptr<waiting>> requests_;
+    std::list<binder> binders_;
+    std::function<void()> give_up_; // set while a link is being made
+};
+
+} // namespace cles::shell

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "transport/stream_link.hpp"
+
+#include <boost/asio/basic_socket_acceptor.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include <functional>
+#include <memory>
+
+namespace cles::transport {
+
+/// Accepts connections of one protocol and makes links of them.
+///
+/// Where the process has run out of descriptors it waits a little and goes on, so that a burst does not end it.
+template <class Protocol>
+class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Protocol>> {
+  public:
+    using acceptor_type = typename Protocol::acceptor;
+    using socket_type = typename Protocol::socket;
+    using identify_function = std::function<identity(socket_type&)>;
+
+    stream_acceptor(acceptor_type acceptor, const limits& bounds, identify_function identify)
+        : acceptor_(std::move(acceptor)), pause_(acceptor_.get_executor()), bounds_(bounds),
+          identify_(std::move(identify)) {}
+
+    void start(std::function<void(link_ptr)> on_link) {
+        on_link_ = std::move(on_link);
+        accept();
+    }
+
+    void close() {
+        boost::system::error_code ignored;
+        acceptor_.close(ignored);
+        pause_.cancel();
+        on_link_ = nullptr;
+    }
+
+    [[nodiscard]] const acceptor_type& socket() const noexcept { return acceptor_; }
+
+  private:
+    void accept() {
+        acceptor_.async_accept([self = this->shared_from_this()](boost::system::error_code code, socket_type socket) {
+            if (!self->acceptor_.is_open() || !self->on_link_) {
+                return;
+            }
+            if (!code) {
+                auto peer = self->identify_(socket);
+                self->on_link_(std::make_shared<stream_link>(std::move(socket), std::move(peer), self->bounds_));
+                if (self->on_link_) {
+                    self->accept();
+                }
+            } else if (code == boost::asio::error::no_descriptors || code == boost::asio::error::no_memory ||
+                       code == boost::asio::error::no_buffer_space) {
+                self->accept_later();
+            } else {
+                self->accept(); // the peer was gone before it was accepted
+            }
+        });
+    }
+
+    void accept_later() {
+        pause_.expires_after(std::chrono::milliseconds{100});
+        pause_.async_wait([self = this->shared_from_this()](boost::system::error_code code) {
+            if (!code && self->acceptor_.is_open()) {
+                self->accept();
+            }
+        });
+    }
+
+    acceptor_type acceptor_;
+    boost::asio::steady_timer pause_;
+    limits bounds_;
+    identify_function identify_;
+    std::function<void(link_ptr)> on_link_;
+};
+
+} // namespace cles::transport

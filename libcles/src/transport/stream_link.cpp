@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "transport/stream_link.hpp"
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/asio/post.hpp>
+
+#include <utility>
+
+namespace cles::transport {
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+namespace {
+
+constexpr int lines_per_turn = 1024;
+constexpr std::size_t roomy = 262144; // buffers that grew past this are given back
+
+} // namespace
+
+stream_link::stream_link(socket_type socket, identity peer, const limits& bounds)
+    : socket_(std::move(socket)), peer_(std::move(peer)), bounds_(bounds), input_(bounds.line),
+      patience_(socket_.get_executor()) {
+    error_code ignored;
+    socket_.non_blocking(true, ignored);
+}
+
+void stream_link::start(std::shared_ptr<link_events> owner) {
+    owner_ = std::move(owner);
+    read();
+}
+
+// -- reading -------------------------------------------------------------------------------------------------------
+
+void stream_link::read() {
+    if (reading_ || ended_ || overlong_ || state_ == state::closed) {
+        return;
+    }
+    reading_ = true;
+    const auto space = input_.prepare();
+    socket_.async_receive(
+        asio::buffer(space.data(), space.size()),
+        [self = shared_from_this()](error_code code, std::size_t count) { self->on_read(code, count); });
+}
+
+void stream_link::on_read(error_code code, std::size_t count) {
+    reading_ = false;
+    if (state_ == state::closed) {
+        return;
+    }
+    received_ += count;
+    if (state_ == state::discarding || state_ == state::finishing) {
+        if (code) {
+            ended_ = true;
+            if (state_ == state::discarding) {
+                lose(code);
+            }
+        } else {
+            discard();
+        }
+        return;
+    }
+    if (code == asio::error::eof) {
+        ended_ = true;
+    } else if (code) {
+        lose(code);
+        return;
+    }
+    input_.commit(count);
+    hand_over();
+}
+
+void stream_link::hand_over() {
+    if (handing_ || overlong_ || state_ != state::open) {
+        return;
+    }
+    const auto self = shared_from_this();
+    handing_ = true;
+    bool more = true;
+    try {
+        more = hand_over_batch();
+    } catch (...) { // a handler's, for whoever runs the context; the other lines are none of its business
+        handing_ = false;
+        continue_later();
+        throw;
+    }
+    handing_ = false;
+    if (state_ == state::finishing || state_ == state::discarding) {
+        discard();
+    } else if (state_ == state::open && !paused_) {
+        if (more) {
+            continue_later();
+        } else {
+            read();
+        }
+    }
+}
+
+// True where lines may be left.
+bool stream_link::hand_over_batch() {
+    const auto owner = owner_;
+    int turn = lines_per_turn;
+    bool more = true;
+    while (more && turn-- > 0 && !paused_ && state_ == state::open) {
+        std::string_view line;
+        switch (input_.next(line)) {
+        case protocol::line_buffer::status::line: owner->on_line(line); break;
+        case protocol::line_buffer::status::overlong:
+            overlong_ = true;
+            more = false;
+            owner->on_overlong(line);
+            break;
+        case protocol::line_buffer::status::need_more: more = false; break;
+        }
+    }
+    if (state_ == state::open && !more && ended_ && !told_end_ && !overlong_) {
+        told_end_ = true;
+        owner->on_end();
+    }
+    if (state_ != state::closed) {
+        owner->on_batch();
+    }
+    return more;
+}
+
+// Lines are left, but other links have their turn first.
+void stream_link::continue_later() {
+    if (!posted_) {
+        posted_ = true;
+        asio::post(socket_.get_executor(), [self = shared_from_this()] {
+            self->posted_ = false;
+            if (self->state_ == state::open) {
+                self->hand_over();
+            } else {
+                self->discard();
+            }
+        });
+    }
+}
+
+void stream_link::pause(bool stop) {
+    if (paused_ != stop) {
+        paused_ = stop;
+        if (!stop && !handing_ && state_ == state::open && !reading_) {
+            continue_later();
+        }
+    }
+}
+
+// -- writing -------------------------------------------------------------------------------------------------------
+
+void stream_link::flush() {
+    if (state_ == state::closed || state_ == state::discarding || output_.empty() || !sending_.empty()) {
+        return;
+    }
+    error_code code;
+    const auto count = socket_.send(asio::buffer(output_), 0, code);
+    if (code && code != asio::error::would_block) {
+        // Told later: the owner may be in the middle of something, and may have read what explains it by then.
+        asio::post(socket_.get_executor(), [self = shared_from_this(), code] { self->lose(code); });
+        output_.clear();
+        return;
+    }
+    sent_ += count;
+    if (count == output_.size()) {
+        if (output_.capacity() > roomy) {
+            output_ = {};
+        }
+        output_.clear();
+        return;
+    }
+    sending_.swap(output_);
+    sending_at_ = count;
+    write_rest();
+}
+
+void stream_link::write_rest() {
+    socket_.async_send(
+        asio::buffer(sending_.data() + sending_at_, sending_.size() - sending_at_),
+        [self = shared_from_this()](error_code code, std::size_t count) { self->on_written(code, count); });
+}
+
+void stream_link::on_written(error_code code, std::size_t count) {
+    if (state_ == state::closed) {
+        return;
+    }
+    if (code) {
+        lose(code);
+        return;
+    }
+    sent_ += count;
+    sending_at_ += count;
+    if (sending_at_ < sending_.size()) {
+        write_rest();
+        return;
+    }
+    if (sending_.capacity() > roomy) {
+        sending_ = {};
+    }
+    sending_.clear();
+    sending_at_ = 0;
+    flush();
+    if (!sending_.empty()) {
+        return;
+    }
+    if (state_ == state::finishing) {
+        say_goodbye();
+    } else if (const auto owner = owner_) {
+        owner->on_room();
+    }
+}
+
+// -- ending --------------------------------------------------------------------------------------------------------
+
+void stream_link::finish() {
+    if (state_ != state::open) {
+        return;
+    }
+    flush();
+    state_ = state::finishing;
+    if (sending_.empty()) {
+        say_goodbye();
+    } else if (!handing_) {
+        discard();
+    }
+}
+
+void stream_link::say_goodbye() {
+    state_ = state::discarding;
+    error_code ignored;
+    socket_.shutdown(asio::socket_base::shutdown_send, ignored);
+    patience_.expires_after(bounds_.discard);
+    patience_.async_wait([self = shared_from_this()](error_code code) {
+        if (!code) {
+            self->lose(asio::error::eof);
+        }
+    });
+    if (ended_) {
+        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->lose(asio::error::eof); });
+    } else if (!handing_) {
+        discard();
+    }
+}
+
+// Reads and forgets, so that closing does not reset a connection whose last replies are still on their way.
+void stream_link::discard() {
+    if (reading_ || ended_ || state_ == state::closed) {
+        return;
+    }
+    reading_ = true;
+    nowhere_.resize(4096);
+    socket_.async_receive(asio::buffer(nowhere_), [self = shared_from_this()](error_code code, std::size_t count) {
+        self->on_read(code, count);
+    });
+}
+
+void stream_link::lose(error_code why) {
+    if (state_ == state::closed) {
+        return;
+    }
+    const auto owner = owner_;
+    close();
+    if (owner) {
+        owner->on_lost(why);
+    }
+}
+
+void stream_link::close() {
+    if (state_ == state::closed) {
+        return;
+    }
+    state_ = state::closed;
+    error_code ignored;
+    patience_.cancel();
+    socket_.close(ignored);
+    owner_.reset();
+}
+
+} // namespace cles::transport

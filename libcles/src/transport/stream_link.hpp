@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "protocol/line.hpp"
+
+#include <boost/asio/generic/stream_protocol.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+namespace cles::transport {
+
+/// A link over a stream socket, of whatever family.
+///
+/// One read hands over many lines and one write carries many replies. Output is written at once, without waiting for
+/// the reactor; only what the socket does not take waits for it. After a bounded number of lines it lets other links
+/// have their turn. In steady state neither allocates.
+class stream_link final : public link, public std::enable_shared_from_this<stream_link> {
+  public:
+    using socket_type = boost::asio::generic::stream_protocol::socket;
+
+    stream_link(socket_type socket, identity peer, const limits& bounds);
+
+    void start(std::shared_ptr<link_events> owner) override;
+    std::string& output() override { return output_; }
+    void flush() override;
+    [[nodiscard]] std::size_t unsent() const noexcept override {
+        return output_.size() + sending_.size() - sending_at_;
+    }
+    [[nodiscard]] std::uint64_t sent() const noexcept override { return sent_; }
+    [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
+    void pause(bool stop) override;
+    void finish() override;
+    void close() override;
+    [[nodiscard]] const identity& peer() const noexcept override { return peer_; }
+
+  private:
+    enum class state : std::uint8_t { open, finishing, discarding, closed };
+
+    void read();
+    void on_read(boost::system::error_code code, std::size_t count);
+    void hand_over();
+    bool hand_over_batch();
+    void continue_later();
+    void write_rest();
+    void on_written(boost::system::error_code code, std::size_t count);
+    void say_goodbye();
+    void discard();
+    void lose(boost::system::error_code why);
+
+    socket_type socket_;
+    identity peer_;
+    limits bounds_;
+    std::shared_ptr<link_events> owner_;
+    protocol::line_buffer input_;
+    std::string output_;
+    std::string sending_; // what the socket did not take at once
+    std::string nowhere_; // where input goes that is discarded
+    std::size_t sending_at_ = 0;
+    boost::asio::steady_timer patience_;
+    std::uint64_t sent_ = 0;
+    std::uint64_t received_ = 0;
+    state state_ = state::open;
+    bool reading_ = false; // a read is under way
+    bool handing_ = false; // lines are being handed over, further up the stack
+    bool posted_ = false;  // `hand_over` is to go on
+    bool paused_ = false;
+    bool ended_ = false; // the peer sends no more
+    bool told_end_ = false;
+    bool overlong_ = false;
+};
+
+} // namespace cles::transport

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "transport/unix.hpp"
+
+#include <cles/error.hpp>
+
+#include "transport/stream_acceptor.hpp"
+#include "transport/stream_dialler.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/local/stream_protocol.hpp>
+
+#include <string>
+#include <utility>
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+namespace cles::transport {
+namespace asio = boost::asio;
+using local_protocol = asio::local::stream_protocol;
+using boost::system::error_code;
+
+namespace {
+
+local_protocol::endpoint endpoint_of(const url& where) {
+    auto path = where.path;
+    if (path.starts_with('@')) {
+        path.front() = '\0';
+    }
+    return local_protocol::endpoint{path};
+}
+
+identity identify(local_protocol::socket& socket, const std::string& address) {
+    identity who{.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
+    ucred credentials{};
+    socklen_t size = sizeof credentials;
+    if (::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
+        who.uid = credentials.uid;
+    }
+    return who;
+}
+
+// Whether it is a socket file that a process which died has left behind. Connecting alone does not tell: what is no
+// socket refuses too, and is somebody's file.
+bool is_stale(const std::string& path, const local_protocol::endpoint& endpoint) {
+    struct stat what {};
+    if (::lstat(path.c_str(), &what) != 0 || !S_ISSOCK(what.st_mode)) {
+        return false;
+    }
+    asio::io_context unused;
+    local_protocol::socket probe{unused};
+    error_code code;
+    probe.connect(endpoint, code);
+    return code == asio::error::connection_refused;
+}
+
+class unix_acceptor final : public acceptor {
+  public:
+    unix_acceptor(local_protocol::acceptor socket, url where, const limits& bounds)
+        : where_(std::move(where)),
+          inside_(std::make_shared<stream_acceptor<local_protocol>>(
+              std::move(socket), bounds,
+              [address = to_string(where_)](local_protocol::socket& s) { return identify(s, address); })) {
+        struct stat made {};
+        if (!is_abstract() && ::stat(where_.path.c_str(), &made) == 0) {
+            device_ = made.st_dev;
+            inode_ = made.st_ino;
+        }
+    }
+    ~unix_acceptor() override { close(); }
+
+    [[nodiscard]] url local() const override { return where_; }
+    void start(std::function<void(link_ptr)> on_link) override { inside_->start(std::move(on_link)); }
+
+    void close() override {
+        inside_->close();
+        struct stat now {};
+        // Another process may have put its own socket there meanwhile.
+        if (inode_ != 0 && ::stat(where_.path.c_str(), &now) == 0 && now.st_dev == device_ && now.st_ino == inode_) {
+            ::unlink(where_.path.c_str());
+        }
+        inode_ = 0;
+    }
+
+  private:
+    [[nodiscard]] bool is_abstract() const noexcept { return where_.path.starts_with('@'); }
+
+    url where_;
+    std::shared_ptr<stream_acceptor<local_protocol>> inside_;
+    dev_t device_ = 0;
+    ino_t inode_ = 0;
+};
+
+class unix_transport final : public link_transport {
+  public:
+    [[nodiscard]] bool is_exposed(const url&) const override { return false; }
+
+    std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
+                                     const limits& bounds) override {
+        const auto endpoint = endpoint_of(where);
+        local_protocol::acceptor socket{executor};
+        socket.open(endpoint.protocol());
+        error_code code;
+        bind_privately(socket, endpoint, code);
+        if (code == asio::error::address_in_use && !where.path.starts_with('@') && is_stale(where.path, endpoint)) {
+            ::unlink(where.path.c_str());
+            bind_privately(socket, endpoint, code);
+        }
+        if (code) {
+            throw boost::system::system_error{code};
+        }
+        socket.listen();
+        return std::make_unique<unix_acceptor>(std::move(socket), where, bounds);
+    }
+
+    std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
+                               dial_callback done) override {
+        auto dialler = std::make_shared<stream_dialler<local_protocol>>(
+            executor, bounds,
+            identity{.transport = "unix", .address = to_string(where), .name = {}, .uid = {}, .local = true},
+            [](local_protocol::socket&) {}, std::move(done));
+        dialler->start(endpoint_of(where));
+        return [weak = std::weak_ptr{dialler}] {
+            if (const auto alive = weak.lock()) {
+                alive->give_up();
+            }
+        };
+    }
+
+  private:
+    // The file must never be there with wider rights, not even for a moment: fchmod before bind sets those it gets.
+    static void bind_privately(local_protocol::acceptor& socket, const local_protocol::endpoint& endpoint,
+                               error_code& code) {
+        ::fchmod(socket.native_handle(), S_IRUSR | S_IWUSR);
+        socket.bind(endpoint, code);
+    }
+};
+
+} // namespace
+
+std::unique_ptr<link_transport> make_unix() { return std::make_unique<unix_transport>(); }
+
+} // namespace cles::transport

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/link.hpp>
+
+#include "transport/inproc.hpp"
+#include "transport/tcp.hpp"
+#include "transport/unix.hpp"
+
+#include <functional>
+#include <map>
+#include <string>
+#include <utility>
+
+namespace cles {
+namespace {
+
+using table = std::map<std::string, std::unique_ptr<link_transport>, std::less<>>;
+
+table& transports() {
+    static table instance = [] {
+        table t;
+        t.emplace("tcp", transport::make_tcp());
+        t.emplace("unix", transport::make_unix());
+        t.emplace("inproc", transport::make_inproc());
+        return t;
+    }();
+    return instance;
+}
+
+} // namespace
+
+link_transport* find_transport(std::string_view scheme) {
+    const auto found = transports().find(scheme);
+    return found == transports().end() ? nullptr : found->second.get();
+}
+
+void register_transport(std::string_view scheme, std::unique_ptr<link_transport> carrier) {
+    transports().insert_or_assign(std::string{scheme}, std::move(carrier));
+}
+
+} // namespace cles

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "localization.hpp"
+#include "stream_socket.hpp"
+
+#include <cstdint>
+
+/// The baseline: a packed struct over TCP with blocking sockets, as a careful engineer writes it by hand for one task.
+namespace cles::perf::icd {
+
+class server {
+  public:
+    server() : listener_(listen_on_loopback()) {}
+    [[nodiscard]] std::uint16_t port() const noexcept { return listener_.port; }
+    /// Serves one client after the other, for ever.
+    [[noreturn]] void run();
+
+  private:
+    void serve(int client);
+
+    loopback_listener listener_;
+    std::uint64_t served_ = 0;
+};
+
+class client {
+  public:
+    explicit client(std::uint16_t port) : socket_(connect_to_loopback(port)) {}
+    /// Sends the request and waits for the reply.
+    /// \throws std::system_error, or std::runtime_error where the reply is none
+    localization pull();
+
+  private:
+    descriptor socket_;
+};
+
+} // namespace cles::perf::icd

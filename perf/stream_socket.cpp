@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "stream_socket.hpp"
+
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include <arpa/inet.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+namespace cles::perf {
+namespace {
+
+constexpr int stream = SOCK_STREAM | SOCK_CLOEXEC;
+
+sockaddr_in loopback(std::uint16_t port) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(port);
+    return address;
+}
+
+// As the library sets them, so that no flag makes a difference.
+void tune(const descriptor& socket) {
+    const int on = 1;
+    checked(::setsockopt(socket.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on), "TCP_NODELAY");
+    checked(::setsockopt(socket.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on), "SO_KEEPALIVE");
+}
+
+descriptor connect_tcp(const url& where) {
+    addrinfo hints{};
+    hints.ai_socktype = SOCK_STREAM;
+    addrinfo* found = nullptr;
+    const int code = ::getaddrinfo(where.host.c_str(), std::to_string(where.port).c_str(), &hints, &found);
+    if (code != 0) {
+        throw std::runtime_error(to_string(where) + ": " + ::gai_strerror(code));
+    }
+    const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses{found, &::freeaddrinfo};
+    descriptor socket{checked(::socket(found->ai_family, stream, 0), "socket")};
+    tune(socket);
+    checked(::connect(socket.get(), found->ai_addr, found->ai_addrlen), "connect");
+    return socket;
+}
+
+descriptor connect_unix(const url& where) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    if (where.path.size() >= sizeof address.sun_path) {
+        throw std::runtime_error(to_string(where) + ": the path is too long for a socket");
+    }
+    std::memcpy(address.sun_path, where.path.data(), where.path.size());
+    auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + where.path.size() + 1);
+    if (where.path.starts_with('@')) { // abstract: a zero in front, none behind
+        address.sun_path[0] = '\0';
+        --length;
+    }
+    descriptor socket{checked(::socket(AF_UNIX, stream, 0), "socket")};
+    checked(::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), length), "connect");
+    return socket;
+}
+
+} // namespace
+
+loopback_listener listen_on_loopback() {
+    loopback_listener made{descriptor{checked(::socket(AF_INET, stream, 0), "socket")}};
+    auto address = loopback(0);
+    socklen_t length = sizeof address;
+    auto* generic = reinterpret_cast<sockaddr*>(&address);
+    checked(::bind(made.socket.get(), generic, length), "bind");
+    checked(::listen(made.socket.get(), 8), "listen");
+    checked(::getsockname(made.socket.get(), generic, &length), "getsockname");
+    made.port = ntohs(address.sin_port);
+    return made;
+}
+
+descriptor accept_from(const descriptor& listener) {
+    descriptor accepted{checked(::accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept")};
+    tune(accepted);
+    return accepted;
+}
+
+descriptor connect_to_loopback(std::uint16_t port) {
+    const auto address = loopback(port);
+    descriptor socket{checked(::socket(AF_INET, stream, 0), "socket")};
+    tune(socket);
+    checked(::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), "connect");
+    return socket;
+}
+
+descriptor connect_to(const url& where) {
+    if (where.scheme == "tcp") {
+        return connect_tcp(where);
+    }
+    if (where.scheme == "unix") {
+        return connect_unix(where);
+    }
+    throw std::runtime_error(to_string(where) + ": neither tcp nor unix");
+}
+
+void send_all(int socket, std::span<const std::byte> bytes) {
+    while (!bytes.empty()) {
+        const auto sent = ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+        if (sent < 0 && errno == EINTR) {
+            continue;
+        }
+        bytes = bytes.subspan(static_cast<std::size_t>(checked(sent, "send")));
+    }
+}
+
+bool receive_all(int socket, std::span<std::byte> bytes) {
+    std::size_t have = 0;
+    while (have < bytes.size()) {
+        const auto got = ::recv(socket, bytes.data() + have, bytes.size() - have, 0);
+        if (got < 0 && errno == EINTR) {
+            continue;
+        }
+        if (checked(got, "recv") == 0) {
+            if (have == 0) {
+                return false;
+            }
+            throw std::runtime_error("the peer ended within a packet");
+        }
+        have += static_cast<std::size_t>(got);
+    }
+    return true;
+}
+
+} // namespace cles::perf

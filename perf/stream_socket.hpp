@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/url.hpp>
+
+#include "descriptor.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+/// Blocking stream sockets, bare: for what must not go through the library that it measures.
+namespace cles::perf {
+
+struct loopback_listener {
+    descriptor socket;
+    std::uint16_t port = 0;
+};
+
+/// Listens on the loopback, at a port of the system's choice.
+loopback_listener listen_on_loopback();
+/// Takes the next connection. This and `connect_to_loopback` set the flags that the library sets on its own sockets.
+descriptor accept_from(const descriptor& listener);
+
+descriptor connect_to_loopback(std::uint16_t port);
+/// Connects to a `tcp` or `unix` URL.
+/// \throws std::system_error, or std::runtime_error where the host has no address or the scheme is another
+descriptor connect_to(const url& where);
+
+void send_all(int socket, std::span<const std::byte> bytes);
+/// False where the peer ended before the first byte.
+bool receive_all(int socket, std::span<std::byte> bytes);
+
+} // namespace cles::perf

@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Talks to two nodes over bare sockets and prints every line that crosses them: `>` as sent, `<` as received.
+
+    demo_wire.py URL_OF_CAR1 URL_OF_CAR2
+"""
+
+import os
+import socket
+import sys
+
+PATIENCE = 10  # seconds
+BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
+
+
+def heading(text: str) -> None:
+    print(f"\n{BOLD}{text}{PLAIN}", flush=True)
+
+
+class Wire:
+    def __init__(self, url: str, sign: str = ""):
+        scheme, _, rest = url.partition("://")
+        if scheme == "unix":
+            self.link = socket.socket(socket.AF_UNIX)
+            self.link.settimeout(PATIENCE)
+            self.link.connect(rest)
+        else:
+            host, _, port = rest.rpartition(":")
+            self.link = socket.create_connection((host, int(port)), PATIENCE)
+        self.lines = self.link.makefile("r", encoding="utf-8", newline="\n")
+        self.sign = sign
+
+    def send(self, line: str) -> None:
+        print(f"  {self.sign}> {line}", flush=True)
+        self.link.sendall(line.encode() + b"\n")
+
+    def receive(self) -> str:
+        line = self.lines.readline().rstrip("\n")
+        if not line:
+            raise ConnectionError("the node has closed the link")
+        print(f"  {self.sign}< {line}", flush=True)
+        return line
+
+    def ask(self, line: str, begins: str) -> None:
+        self.send(line)
+        self.expect(begins)
+
+    def expect(self, begins: str) -> None:
+        line = self.receive()
+        if not line.startswith(begins):
+            raise ValueError(f"expected a line that begins with {begins}")
+
+
+def show(url1: str, url2: str) -> None:
+    car1, car2 = Wire(url1), Wire(url2)
+
+    heading("PULL: get data once (car1 by TCP, then car2 by its Unix socket)")
+    car1.ask("PULL car1:localization", '{"utc":')
+    car2.ask("PULL car2:localization", '{"utc":')
+
+    heading("PUSH: send parameters and data")
+    car1.ask('PUSH car1:echo {"text":"road works ahead"}', '{"text":')
+
+    heading("DELEGATE: have a task done, with progress")
+    car1.send("DELEGATE car1:sleep/600 id=7 progress=yes")
+    while car1.receive().startswith("id=7 progress="):
+        pass
+
+    heading("BIND: get updates from now on (here on one link), and UPDATE: publish (on another)")
+    binder, asker = Wire(url2, "binder "), Wire(url2, "asker  ")
+    binder.ask("BIND car2:notice", "{}")
+    asker.ask('UPDATE car2:notice {"text":"bridge closed"}', "{")
+    binder.expect("UPDATE car2:notice seq=1 ")
+
+    heading("And when something is wrong")
+    car1.ask("PULL car1:speed", '{"error":"no_task"')
+    car1.ask('PUSH car1:echo {"text":', '{"error":"bad_request"')
+
+
+if __name__ == "__main__":
+    try:
+        show(sys.argv[1], sys.argv[2])
+    except (OSError, ValueError) as problem:
+        sys.exit(f"cles: {problem}")

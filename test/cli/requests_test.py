@@ -1,0 +1,235 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""`cles pull`, `push`, `delegate`, `update`: answers, output forms, exit codes, and what is sent."""
+
+import json
+import signal
+import socket
+import tempfile
+import unittest
+
+from support import NodeTest, ScriptedNode, cles, environment, finish, id_of, read_line, start, wait_until
+
+
+class Answers(NodeTest):
+    def test_pull(self):
+        packet = self.run_json("pull", "car1:localization")
+        self.assertEqual(list(packet), ["utc", "lat", "lon", "velocity", "acceleration"])
+
+    def test_pull_by_unix_socket_and_by_self(self):
+        code, out, _ = cles("pull", "self:echo/1/b%20c", "--at", self.node.unix)
+        self.assertEqual((code, out), (0, '{"parameters":["1","b c"]}\n'))
+
+    def test_peers_are_named(self):
+        code, out, _ = cles("pull", "car1:echo", "--peer", "car2=tcp://127.0.0.1:1", "--peer", f"car1={self.node.url}")
+        self.assertEqual((code, out), (0, '{"parameters":[]}\n'))
+        code, out, err = cles("pull", "car3:echo", "--peer", f"car1={self.node.url}")
+        self.assertEqual((code, out), (3, ""))
+        self.assertEqual(err, "cles: no_target: no --peer is called 'car3', and there is no --at\n")
+        code, out, _ = cles("pull", "self:echo", "--peer", "car2=tcp://127.0.0.1:1", "--at", self.node.url)
+        self.assertEqual((code, out), (0, '{"parameters":[]}\n'))
+
+    def test_the_environment_says_where(self):
+        code, out, _ = cles("pull", "car1:echo", env=environment(CLES_AT=self.node.url))
+        self.assertEqual((code, out), (0, '{"parameters":[]}\n'))
+
+    def test_push(self):
+        self.assertEqual(self.run_ok("push", "car1:echo", "-d", '{"speed": 27.80}'), '{"speed":27.80}\n')
+        self.assertEqual(self.run_ok("push", "car1:echo"), "{}\n")
+        self.assertEqual(self.run_ok("push", "car1:echo", "-d", "[1, 2]"), "[1,2]\n")
+
+    def test_body_from_stdin_and_file(self):
+        pretty = '{\n  "a": [\n    1,\n    "x\\ny"\n  ]\n}\n'
+        self.assertEqual(self.run_ok("delegate", "car1:echo", "-d", "-", stdin=pretty), '{"a":[1,"x\\ny"]}\n')
+        with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+            file.write(pretty)
+            file.flush()
+            self.assertEqual(self.run_ok("push", "car1:echo", "-d", "@" + file.name), '{"a":[1,"x\\ny"]}\n')
+
+    def test_large_body(self):
+        body = json.dumps({"a": "x" * 500_000})
+        self.assertEqual(json.loads(self.run_ok("push", "car1:echo", "-d", "-", stdin=body)), json.loads(body))
+        code, out, err = self.run_at("push", "car1:echo", "-d", "-", stdin=json.dumps({"a": "x" * 1_100_000}))
+        self.assertEqual((code, out), (5, ""))
+        self.assertTrue(err.startswith("cles: too_large: "), err)
+
+    def test_delegate(self):
+        self.assertEqual(self.run_ok("delegate", "car1:sleep/20"), '{"slept_ms":20}\n')
+
+    def test_delegate_shows_progress_when_asked(self):
+        code, out, err = self.run_at("delegate", "car1:sleep/50", "--progress")
+        self.assertEqual((code, out), (0, '{"slept_ms":50}\n'))
+        self.assertEqual(err.splitlines(), [f"cles: progress {10 * i}%" for i in range(1, 10)])
+
+    def test_update(self):
+        s, lines = self.node.connect()
+        with s, lines:
+            s.sendall(b"BIND car1:notice\n")
+            lines.readline()
+            self.assertEqual(self.run_ok("update", "car1:notice", "-d", '{"text": "hi"}'), "{}\n")
+            self.assertTrue(lines.readline().endswith(' {"text":"hi"}\n'))
+
+    def test_count(self):
+        out = self.run_ok("pull", "car1:echo/x", "-n", "3", "-i", "0")
+        self.assertEqual(out, '{"parameters":["x"]}\n' * 3)
+        out = self.run_ok("push", "car1:echo", "-d", '{"a":1}', "--count", "2", "--interval", "10ms")
+        self.assertEqual(out, '{"a":1}\n' * 2)
+
+    def test_tables(self):
+        body = '{"a":1,"b":{"c":"x\\u001b[31m","d":[1,"two"]},"list":[{"n":1,"s":"one"},{"n":10,"t":{"u":null}}],"e":{}}'
+        out = self.run_ok("push", "car1:echo", "-d", body, "-o", "table")
+        self.assertEqual(out, "a    1\n"
+                              "b.c  x\\u001b[31m\n"
+                              "b.d  1, two\n"
+                              "e    {}\n"
+                              "\n"
+                              "list:\n"
+                              " n  s    t.u\n"
+                              " 1  one\n"
+                              "10       null\n")
+        out = self.run_ok("push", "car1:echo", "-d", '[{"a":1},{"a":2}]', "-o", "table")
+        self.assertEqual(out, "a\n1\n2\n")
+        self.assertEqual(self.run_ok("push", "car1:echo", "-d", '[1,"b",[2]]', "-o", "table"), "1\nb\n2\n")
+        self.assertEqual(self.run_ok("push", "car1:echo", "-o", "table"), "{}\n")
+        out = self.run_ok("push", "car1:echo", "-d", '{"key":"abc","n":7}', "-o", "table", "-n", "2", "-i", "0")
+        self.assertEqual(out, "key  n\nabc  7\nabc  7\n")
+
+
+class Failures(NodeTest):
+    def check(self, arguments, code, start_of_error):
+        got, out, err = self.run_at(*arguments)
+        self.assertEqual((got, out), (code, ""), err)
+        self.assertTrue(err.startswith("cles: " + start_of_error), err)
+        self.assertEqual(err.count("\n"), 1, err)
+
+    def test_no_task(self):
+        self.check(("pull", "car1:speed"), 3, "no_task: car1 has no PULL 'speed'")
+        self.check(("push", "car1:localization"), 3, "no_task: ")
+        self.check(("bind", "car1:echo"), 3, "no_task: ")
+
+    def test_no_target(self):
+        self.check(("pull", "car2:localization"), 3, "no_target: ")
+
+    def test_failed(self):
+        self.check(("delegate", "car1:fail"), 5, "failed: car1: this task always fails")
+
+    def test_bad_request(self):
+        self.check(("delegate", "car1:sleep/x"), 5, "bad_request: ")
+
+    def test_deadline(self):
+        self.check(("delegate", "car1:sleep/20000", "-t", "100ms"), 4, "deadline: ")
+        self.check(("delegate", "car1:sleep/20000", "-t", "0.1"), 4, "deadline: ")
+
+    def test_connection_refused(self):
+        with socket.create_server(("127.0.0.1", 0)) as gone:
+            url = f"tcp://127.0.0.1:{gone.getsockname()[1]}"
+        for command in ("pull", "push", "bind", "hz", "ping", "info"):
+            noun = () if command in ("ping", "info") else ("car1:localization",)
+            code, out, err = cles(command, *noun, "--at", url)
+            self.assertEqual((code, out), (1, ""), (command, err))
+            self.assertTrue(err.startswith("cles: "), err)
+            self.assertIn("refused", err)
+            self.assertIn(url, err)
+
+    def test_no_such_socket(self):
+        code, out, err = cles("pull", "car1:localization", "--at", "unix:///nowhere/car1.sock")
+        self.assertEqual((code, out), (1, ""), err)
+        self.assertIn("No such file", err)
+
+    def test_output_that_cannot_be_written(self):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            process = start("pull", "car1:localization", "--at", self.node.url, stdout=full)
+            code, _, err = finish(process)
+        self.assertEqual((code, err), (1, "cles: cannot write the output: No space left on device\n"))
+
+
+class Wire(unittest.TestCase):
+    """What the command sends, and how it takes what a node of another make answers."""
+
+    def ask(self, answer, *arguments):
+        with ScriptedNode(lambda line, send: send(id_of(line) + answer)) as node:
+            return cles(*arguments, "--at", node.url), node
+
+    def test_sends_one_plain_line(self):
+        (code, _, err), node = self.ask("{}", "push", "car1:echo/x", "-d", ' {"a" : 1.50} ', "-t", "2s")
+        self.assertEqual((code, err), (0, ""))
+        self.assertRegex(node.lines[0], r'^PUSH car1:echo/x id=\d+ deadline=(19\d\d|2000) \{"a":1\.50\}$')
+        self.assertEqual(len(node.lines), 1)
+
+    def test_forms_of_output(self):
+        answer = '{ "a":1.50,  "b":[1, 2] }'
+        expected = {"raw": answer + "\n", "json": '{"a":1.50,"b":[1,2]}\n', "table": "a  1.50\nb  1, 2\n"}
+        for form, text in expected.items():
+            (code, out, _), _ = self.ask(answer, "pull", "car1:x", "-o", form)
+            self.assertEqual((code, out), (0, text))
+
+    def test_json_is_the_default_of_a_pipe(self):
+        (code, out, _), _ = self.ask('{ "a":1}', "pull", "car1:x")
+        self.assertEqual((code, out), (0, '{"a":1}\n'))
+
+    def test_exit_codes_of_errors(self):
+        codes = {"bad_request": 5, "denied": 5, "no_target": 3, "no_task": 3, "too_large": 5, "cancelled": 5, "failed": 5,
+                 "unavailable": 5, "busy": 6, "deadline": 4, "from_the_future": 5}
+        for name, expected in codes.items():
+            (code, out, err), _ = self.ask(f'{{"error":"{name}","message":"why \\u001b[2J"}}', "pull", "car1:x")
+            self.assertEqual((code, out), (expected, ""), name)
+            shown = name if name != "from_the_future" else "failed"
+            self.assertTrue(err.startswith(f"cles: {shown}: why "), err)
+            self.assertNotIn("\x1b", err)
+
+    def test_a_link_lost_after_sending(self):
+        with ScriptedNode(lambda line, send: "close") as node:
+            code, out, err = cles("pull", "car1:x", "--at", node.url)
+        self.assertEqual((code, out), (5, ""), err)
+        self.assertTrue(err.startswith("cles: unavailable: "), err)
+
+    def test_an_answer_that_never_comes(self):
+        with ScriptedNode(lambda line, send: None) as node:
+            code, out, err = cles("pull", "car1:x", "--at", node.url, "-t", "100ms")
+        self.assertEqual((code, out), (4, ""), err)
+
+    def test_interrupt_withdraws_the_request(self):
+        with ScriptedNode(lambda line, send: None) as node:
+            process = start("delegate", "car1:x", "--at", node.url)
+            wait_until(lambda: node.lines, "the request")
+            process.send_signal(signal.SIGINT)
+            code, out, err = finish(process)
+            wait_until(node.closed.is_set, "the end of the link")
+        self.assertEqual((code, out, err), (130, "", ""))
+        number = id_of(node.lines[0]).strip().removeprefix("id=")
+        self.assertTrue(node.lines[1].startswith(f"PUSH self:cles/cancel/{number}"), node.lines)
+
+    def test_interrupt_while_waiting_for_the_next(self):
+        with ScriptedNode(lambda line, send: send(id_of(line) + "{}")) as node:
+            process = start("pull", "car1:x", "-n", "0", "-i", "1min", "--at", node.url)
+            self.assertEqual(read_line(process), "{}\n")
+            process.send_signal(signal.SIGINT)
+            code, _, err = finish(process)
+        self.assertEqual((code, err), (130, ""))
+
+    def test_termination(self):
+        with ScriptedNode(lambda line, send: None) as node:
+            process = start("pull", "car1:x", "--at", node.url)
+            wait_until(lambda: node.lines, "the request")
+            process.send_signal(signal.SIGTERM)
+            code, _, err = finish(process)
+        self.assertEqual((code, err), (143, ""))
+
+    def test_progress_is_only_asked_for_where_it_shows(self):
+        (_, _, _), node = self.ask("{}", "delegate", "car1:x")
+        self.assertNotIn("progress", node.lines[0])
+        (_, _, _), node = self.ask("{}", "delegate", "car1:x", "--progress")
+        self.assertIn(" progress=yes", node.lines[0])
+
+    def test_progress_with_details(self):
+        def answer(line, send):
+            send(id_of(line) + 'progress=0.25 {"step":"one"}')
+            send(id_of(line) + '{"ok":true}')
+
+        with ScriptedNode(answer) as node:
+            code, out, err = cles("delegate", "car1:x", "--progress", "--at", node.url)
+        self.assertEqual((code, out, err), (0, '{"ok":true}\n', 'cles: progress 25% {"step":"one"}\n'))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Arguments that cannot be, each with a message that says why; help and version."""
+
+import tempfile
+import unittest
+
+from support import cles, environment
+
+COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "serve")
+
+
+class Usage(unittest.TestCase):
+    def refused(self, *arguments, says="", **options):
+        code, out, err = cles(*arguments, **options)
+        self.assertEqual((code, out), (2, ""), (arguments, err))
+        self.assertTrue(err.startswith("cles: "), err)
+        self.assertIn(says, err, arguments)
+
+    def test_commands(self):
+        self.refused(says="subcommand")
+        self.refused("fly", says="there is no command 'fly'")
+        self.refused("pull", says="noun")
+        self.refused("pull", "car1:a", "car1:b", says="car1:b")
+        self.refused("pull", "car1:a", "--fast", says="--fast")
+
+    def test_nouns(self):
+        for noun, says in (("car1", "NODE:TASK"), (":a", "the node"), ("car1:", "the task"), ("car 1:a", "the node"),
+                           ("car1:a b", "the task"), ("car1:a/", "empty"), ("car1:a//b", "empty"), ("car1:a/b c", "b c"),
+                           ("car1:a/%2", "%2"), ("car1:a/%zz", "%zz"), ("car1:a/ä", "%HH"), ("x" * 65 + ":a", "64"),
+                           ("car1:a/b id=1", "id=1"), ("car1:a\nPULL self:b", "the task")):
+            for command in ("pull", "push", "bind", "hz"):
+                self.refused(command, noun, says=says)
+
+    def test_bodies(self):
+        self.refused("push", "car1:a", "-d", '{"a":}', says="at byte 5")
+        self.refused("push", "car1:a", "-d", '{"a":1', says="the body is no JSON")
+        self.refused("push", "car1:a", "-d", '{"a":01}', says="leading zeros")
+        self.refused("push", "car1:a", "-d", "7", says="an object or an array")
+        self.refused("push", "car1:a", "-d", "", says="the body is no JSON")
+        self.refused("push", "car1:a", "-d", "[" * 33 + "]" * 33, says="32")
+        self.refused("push", "car1:a", "-d", "-", stdin="", says="the body from stdin is no JSON")
+        self.refused("push", "car1:a", "-d", "-", stdin="{,}", says="the body from stdin is no JSON")
+        self.refused("push", "car1:a", "-d", "@/nowhere/x.json", says="cannot read /nowhere/x.json: No such file")
+        self.refused("push", "car1:a", "-d", "@/", says="cannot read /: Is a directory")
+        with tempfile.NamedTemporaryFile("w") as empty:
+            self.refused("push", "car1:a", "-d", "@" + empty.name, says=f"{empty.name} is no JSON")
+
+    def test_verbs_without_a_body(self):
+        self.refused("pull", "car1:a", "-d", "{}", says="PULL takes no body")
+        self.refused("bind", "car1:a", "-d", "{}", says="BIND takes no body")
+
+    def test_addresses(self):
+        self.refused("pull", "car1:a", "--at", "localhost", says="localhost")
+        self.refused("pull", "car1:a", "--at", "tcp://", says="tcp://")
+        self.refused("pull", "car1:a", "--at", "tcp://h:99999", says="99999")
+        self.refused("pull", "car1:a", "--at", "pigeon://x", says="pigeon")
+        self.refused("pull", "car1:a", "--peer", "car1", says="NAME=URL")
+        self.refused("pull", "car1:a", "--peer", "self=tcp://127.0.0.1", says="self")
+        self.refused("pull", "car1:a", "--peer", "car1=nowhere", says="nowhere")
+        self.refused("pull", "car1:a", env=environment(CLES_AT="nowhere"), says="nowhere")
+        self.refused("ping", "a b", says="neither")
+        self.refused("info", "a b", says="neither")
+
+    def test_numbers(self):
+        for text in ("x", "", "-1s", "1h30", "5 s", "inf", "nan", "1e3", "0x10"):
+            self.refused("pull", "car1:a", f"--timeout={text}", says="" if text == "" else "no time")
+        self.refused("pull", "car1:a", "-t", "0", says="too short")
+        self.refused("pull", "car1:a", "-t", "90000", says="more than a day")
+        self.refused("pull", "car1:a", "-i", "soon", says="no time")
+        for text in ("x", "-1", "1.5"):
+            self.refused("pull", "car1:a", "-n", text, says="--count")
+        self.refused("bind", "car1:a", "--keep", "0", says="--keep")
+        self.refused("bind", "car1:a", "--every", "x", says="no time")
+        self.refused("hz", "car1:a", "-w", "0", says="--window")
+
+    def test_forms_of_output(self):
+        self.refused("pull", "car1:a", "-o", "xml", says="xml")
+        self.refused("ping", "-o", "table", says="table")
+
+    def test_help(self):
+        code, out, err = cles("--help")
+        self.assertEqual((code, err), (0, ""))
+        for command in COMMANDS:
+            self.assertIn(f"  {command} ", out)
+            code, text, err = cles(command, "--help")
+            self.assertEqual((code, err), (0, ""), command)
+            self.assertIn("Examples:", text)
+            self.assertIn(f"cles {command}", text)
+        self.assertIn("Exit codes:", out)
+
+    def test_version(self):
+        code, out, err = cles("--version")
+        self.assertEqual((code, err), (0, ""))
+        self.assertRegex(out, r"^cles \d+\.\d+\.\d+\n$")
+
+
+if __name__ == "__main__":
+    unittest.main()

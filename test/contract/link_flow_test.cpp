@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSL-1.0
+// What happens on a link, whatever carries it, when one end is slower than the other.
+
+#include "support/link_pair.hpp"
+#include "support/scripted_peer.hpp"
+
+#include <boost/test/data/monomorphic.hpp>
+#include <boost/test/data/test_case.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+
+BOOST_AUTO_TEST_SUITE(link_flow)
+
+using namespace cles::test;
+
+namespace {
+
+std::string many_lines(std::size_t count, std::size_t length) {
+    std::string text;
+    for (std::size_t i = 0; i < count; ++i) {
+        text += std::to_string(i) + std::string(length, '.') + "\n";
+    }
+    return text;
+}
+
+} // namespace
+
+BOOST_DATA_TEST_CASE(what_a_peer_does_not_read_waits_and_nothing_is_lost, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.far.run([&] { pair.far.link->pause(true); });
+    constexpr std::size_t count = 8000;
+    const auto text = many_lines(count, 1000);
+    pair.near.say(text);
+    run_ready(pair.io);
+    BOOST_TEST(pair.near.link->unsent() > 0U);
+    BOOST_TEST(!pair.near.events->has('r'));
+    pair.near.say("more\n"); // output that waits behind what waits already
+    const auto unsent = pair.near.link->unsent();
+    BOOST_TEST(unsent > 0U);
+
+    pair.far.run([&] { pair.far.link->pause(false); });
+    pair.until([&] { return pair.far.lines() == count + 1; });
+    pair.until([&] { return pair.near.link->unsent() == 0; });
+    pair.until([&] { return pair.near.events->has('r'); });
+    BOOST_TEST(pair.near.link->sent() == text.size() + 5);
+    BOOST_TEST(pair.far.run([&] { return pair.far.events->lines[count - 1].starts_with("7999."); }));
+    BOOST_TEST(pair.far.run([&] { return pair.far.events->lines.back(); }) == "more");
+}
+
+BOOST_DATA_TEST_CASE(on_room_is_not_told_from_inside_flush, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.open();
+    bool flushing = false;
+    bool told_inside = false;
+    pair.near.events->hook = [&](char call) { told_inside = told_inside || (flushing && call != 'b'); };
+    const auto text = many_lines(2000, 1000);
+    for (int i = 0; i < 3; ++i) {
+        flushing = true;
+        pair.near.say(text);
+        flushing = false;
+        pair.until([&] { return pair.near.link->unsent() == 0; });
+    }
+    pair.until([&] { return pair.far.lines() == 6000; });
+    BOOST_TEST(!told_inside);
+}
+
+// Whoever waits for room after a flush that left something behind must be told, however little it was.
+BOOST_DATA_TEST_CASE(room_is_told_after_any_flush_that_left_something, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.far.run([&] { pair.far.link->pause(true); });
+    pair.near.say("little\n");
+    run_ready(pair.io);
+    const bool left = pair.near.link->unsent() != 0;
+    pair.far.run([&] { pair.far.link->pause(false); });
+    pair.until([&] { return pair.far.lines() == 1; });
+    pair.until([&] { return pair.near.link->unsent() == 0; });
+    run_ready(pair.io);
+    BOOST_TEST(pair.near.events->has('r') == left);
+}
+
+BOOST_DATA_TEST_CASE(a_paused_link_hands_nothing_over_until_it_goes_on, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.far.run([&] { pair.far.link->pause(true); });
+    pair.near.say("one\ntwo\n");
+    run_ready(pair.io);
+    BOOST_TEST(pair.far.lines() == 0U);
+    pair.far.run([&] {
+        pair.far.link->pause(true); // twice is once
+        pair.far.link->pause(false);
+    });
+    pair.until([&] { return pair.far.lines() == 2; });
+    pair.near.say("three\n");
+    pair.until([&] { return pair.far.lines() == 3; });
+}
+
+BOOST_DATA_TEST_CASE(a_pause_during_hand_over_holds_back_the_next_line, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.connect();
+    pair.far.run([&] {
+        pair.far.events->hook = [&](char call) {
+            if (call == 'l' && pair.far.events->lines.size() == 3) {
+                pair.far.link->pause(true);
+            }
+        };
+    });
+    pair.near.start();
+    pair.far.start();
+    pair.near.say("1\n2\n3\n4\n5\n");
+    pair.until([&] { return pair.far.lines() == 3; });
+    run_ready(pair.io);
+    BOOST_TEST(pair.far.lines() == 3U);
+    BOOST_TEST(pair.far.run([&] { return pair.far.events->calls.back(); }) == 'b');
+    pair.far.run([&] { pair.far.link->pause(false); });
+    pair.until([&] { return pair.far.lines() == 5; });
+}
+
+BOOST_DATA_TEST_CASE(pausing_and_going_on_at_every_line_loses_nothing, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.connect();
+    pair.far.run([&] {
+        pair.far.events->hook = [&](char call) {
+            if (call == 'l') {
+                pair.far.link->pause(true);
+                boost::asio::post(pair.far_io(), [&] {
+                    if (pair.far.link) {
+                        pair.far.link->pause(false);
+                    }
+                });
+            }
+        };
+    });
+    pair.near.start();
+    pair.far.start();
+    pair.near.say(many_lines(300, 20));
+    pair.until([&] { return pair.far.lines() == 300; });
+    BOOST_TEST(pair.far.run([&] { return pair.far.events->lines.back().starts_with("299."); }));
+}
+
+BOOST_DATA_TEST_CASE(a_paused_link_still_writes, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.far.run([&] { pair.far.link->pause(true); });
+    pair.far.say("said while paused\n");
+    pair.until([&] { return pair.near.lines() == 1; });
+}
+
+BOOST_DATA_TEST_CASE(a_socket_that_nobody_reads_fills_and_drains, every_socket, kind) {
+    link_pair pair{kind};
+    scripted_peer peer{pair.io, to_string(pair.address()), buffers::small};
+    pair.accept();
+    pair.far.start();
+    const auto text = many_lines(12000, 1000);
+    pair.far.say(text);
+    run_ready(pair.io);
+    BOOST_TEST(pair.far.link->unsent() > 0U);
+    BOOST_TEST(pair.far.link->sent() + pair.far.link->unsent() == text.size());
+    std::string got;
+    for (int i = 0; i < 12000; ++i) {
+        got += peer.line() + "\n";
+    }
+    BOOST_TEST((got == text));
+    pair.until([&] { return pair.far.events->has('r'); });
+    BOOST_TEST(pair.far.link->unsent() == 0U);
+    BOOST_TEST(pair.far.events->count('r') == 1U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: BSL-1.0
+"""The code blocks of a Markdown page."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+
+FENCE = re.compile(r"^(?P<mark>```+)(?P<info>.*)$")
+
+
+@dataclass
+class Block:
+    line: int  # of its first line
+    language: str
+    note: str  # what stands behind the language, as in "sh no-test: it needs two machines"
+    lines: list[str] = field(default_factory=list)
+
+    @property
+    def skipped(self) -> bool:
+        return self.note.startswith("no-test")
+
+    @property
+    def reason(self) -> str:
+        return self.note.removeprefix("no-test").removeprefix(":").strip()
+
+
+def blocks_of(path: Path) -> list[Block]:
+    blocks: list[Block] = []
+    mark = ""
+    for number, line in enumerate(path.read_text(encoding="utf-8").split("\n"), 1):
+        fence = FENCE.match(line)
+        if mark:
+            if line.strip() == mark:
+                mark = ""
+            else:
+                blocks[-1].lines.append(line)
+        elif fence:
+            mark = fence["mark"]
+            language, _, note = fence["info"].strip().partition(" ")
+            blocks.append(Block(number + 1, language, note.strip()))
+    return blocks

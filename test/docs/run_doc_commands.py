@@ -1,0 +1,267 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Runs the commands that a page shows, in their order, in one shell.
+
+    run_doc_commands.py --root ROOT --build BUILD --path FOLDER PAGE...
+    run_doc_commands.py --self-test
+
+- In a ```console block, what follows `$ ` is a command (a `\\` at its end goes on in the next line), and what follows the
+  command is what it prints, where `...` stands for anything (alone on a line: for any lines).
+- In a ```sh block every line is a command, and has to succeed.
+- In "console any-numbers" blocks the numbers in what is printed, and the width of gaps, are examples.
+- A command that ends in ` &` goes on in the background; the next one waits until it has printed what the page says, or
+  anything; its log, on stderr, is left out. It is stopped at the end of its page.
+- "sh no-test: REASON" and "console no-test: REASON" are left out.
+
+The commands run from ROOT, with FOLDER (where `cles` is) in the path. So that runs do not meet, ports 253xx stand for free
+ones (the default 25370 too), /tmp for a fresh folder, and build/release for BUILD.
+"""
+
+import argparse
+import os
+import re
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from page import Block, blocks_of
+from transcript import difference, matches, without_numbers
+
+MARK = "--end-of-command--"
+PATIENCE = 30.0
+
+
+class Mistake(Exception):
+    pass
+
+
+class Substitution:
+    """Between what the page says and what is run."""
+
+    def __init__(self, build: Path, scratch: Path):
+        self.build = str(build)
+        self.scratch = str(scratch)
+        self.ports: dict[str, str] = {}
+
+    def to_run(self, command: str) -> str:
+        command = re.sub(r"\b253\d\d\b", lambda m: self.port_for(m[0]), command)
+        return re.sub(r"(?<![\w.])/tmp\b", self.scratch, command).replace("build/release", self.build)
+
+    def as_on_page(self, text: str) -> str:
+        for shown, used in self.ports.items():
+            text = re.sub(rf"\b{used}\b", shown, text)
+        return text.replace(self.scratch, "/tmp").replace(self.build, "build/release")
+
+    def port_for(self, shown: str) -> str:
+        if shown not in self.ports:
+            with socket.socket() as probe:
+                probe.bind(("127.0.0.1", 0))
+                self.ports[shown] = str(probe.getsockname()[1])
+        return self.ports[shown]
+
+
+class Shell:
+    def __init__(self, root: Path, environment: dict[str, str], scratch: Path):
+        self.scratch = scratch
+        self.background: list[int] = []
+        self.process = subprocess.Popen(
+            ["bash", "--noprofile", "--norc"], cwd=root, env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT)
+
+    def run(self, command: str) -> tuple[int, str]:
+        """Its exit status, and what it printed."""
+        self._send(f"{{ {command}\n}} </dev/null\n")
+        return self._finish(command)
+
+    def start(self, command: str, expected: list[str], substitution: Substitution) -> None:
+        log = self.scratch / f"background-{len(self.background)}.log"
+        self._send(f"{command} </dev/null >'{log}' 2>'{log}.err' &\necho $!\n")
+        self.background.append(int(self._finish(command)[1]))
+        until = time.monotonic() + PATIENCE
+        while True:
+            printed = substitution.as_on_page(log.read_text() if log.exists() else "").splitlines()
+            if matches(expected, printed) if expected else printed:
+                return
+            if time.monotonic() > until:
+                said = Path(f"{log}.err").read_text()
+                raise Mistake(f"in the background it printed\n{difference(expected, printed)}\n{said}")
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        for pid in self.background:
+            try:
+                os.kill(pid, signal.SIGTERM)
+            except ProcessLookupError:
+                pass
+        self.process.stdin.close()
+        try:
+            self.process.wait(5)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+
+    def _send(self, text: str) -> None:
+        self.process.stdin.write(text.encode())
+
+    def _finish(self, command: str) -> tuple[int, str]:
+        self._send(f"printf '%s%d\\n' '{MARK}' $?\n")
+        self.process.stdin.flush()
+        out = b""
+        until = time.monotonic() + PATIENCE
+        while not (found := re.search(rf"{MARK}(\d+)\n$", out.decode(errors="replace"))):
+            ready, _, _ = select.select([self.process.stdout], [], [], max(0.0, until - time.monotonic()))
+            chunk = os.read(self.process.stdout.fileno(), 65536) if ready else b""
+            if not chunk:
+                raise Mistake(f"'{command}' did not end within {PATIENCE:.0f} s; so far it printed\n{out.decode(errors='replace')}")
+            out += chunk
+        text = out.decode(errors="replace")
+        return int(found[1]), text[: found.start()]
+
+
+def commands_of(block: Block) -> list[tuple[int, str, list[str]]]:
+    """(line, command, what it prints), the last being empty for a block without outputs."""
+    result: list[tuple[int, str, list[str]]] = []
+    goes_on = False
+    for number, line in enumerate(block.lines, block.line):
+        is_command = goes_on or block.language == "sh" or line.startswith("$ ")
+        text = line.removeprefix("$ ") if block.language == "console" and not goes_on else line
+        if goes_on:
+            at, command, printed = result[-1]
+            result[-1] = (at, command[:-1].rstrip() + " " + text.strip(), printed)
+        elif is_command:
+            command = re.sub(r"\s+#\s.*$", "", text).strip()
+            if not command or command.startswith("#"):
+                continue
+            result.append((number, command, []))
+        elif result:
+            result[-1][2].append(line)
+        elif line.strip():
+            raise Mistake(f"line {number}: in a console block a command begins with '$ '")
+        goes_on = is_command and line.rstrip().endswith("\\")
+    return result
+
+
+def agree(block: Block, expected: list[str], printed: list[str]) -> bool:
+    if block.note == "any-numbers":
+        return matches(without_numbers(expected), without_numbers(printed))
+    return matches(expected, printed)
+
+
+def run_page(page: Path, root: Path, build: Path, path: Path) -> list[str]:
+    problems: list[str] = []
+    scratch = Path(tempfile.mkdtemp(prefix="cles-docs-"))
+    substitution = Substitution(build, scratch)
+    programs = scratch / "bin"
+    programs.mkdir()
+    if not shutil.which("nc"):
+        (programs / "nc").symlink_to(Path(__file__).resolve().parent / "netcat.py")
+    environment = {**os.environ, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "COLUMNS": "120",
+                   "CLES_AT": f"tcp://127.0.0.1:{substitution.port_for('25370')}",
+                   "PATH": os.pathsep.join([str(path), str(programs), os.environ["PATH"]])}
+    shell = Shell(root, environment, scratch)
+    count = 0
+    try:
+        for block in blocks_of(page):
+            if block.language not in ("sh", "console"):
+                continue
+            if block.skipped:
+                if not block.reason:
+                    problems.append(f"{page}:{block.line}: 'no-test' needs a reason, as in 'no-test: two machines'")
+                continue
+            for line, command, expected in commands_of(block):
+                count += 1
+                where = f"{page}:{line}: $ {command}"
+                to_run = substitution.to_run(command)
+                if to_run.endswith(" &"):
+                    shell.start(to_run.removesuffix(" &"), expected, substitution)
+                    print(f"ok   {where}")
+                    continue
+                status, output = shell.run(to_run)
+                printed = substitution.as_on_page(output).splitlines()
+                if block.language == "sh" and status != 0:
+                    problems.append(f"{where}\nended with {status}:\n" + "\n".join(printed))
+                elif block.language == "console" and not agree(block, expected, printed):
+                    problems.append(f"{where}\n{difference(expected, printed)}")
+                else:
+                    print(f"ok   {where}")
+    except Mistake as mistake:
+        problems.append(f"{page}: {mistake}")
+    finally:
+        shell.close()
+        shutil.rmtree(scratch, ignore_errors=True)
+    print(f"{page.name}: {count} commands, {len(problems)} problems")
+    return problems
+
+
+GOOD = """\
+```console
+$ echo one; echo two 253; false
+one
+...
+$ (echo up; exec sleep 20) &
+up
+$ printf '%s\\n' a \\
+    b
+a
+b
+$ echo 25370 /tmp/x
+25370 /tmp/x
+$ cat
+```
+```console any-numbers
+$ echo '1  -2.5 {"a":3.25} x4'
+10 3 {"a":7} x4
+```
+```sh
+true # why
+test -d /tmp
+```
+```sh no-test: it would fail
+false
+```
+"""
+BAD = [("```console\n$ echo one\ntwo\n```\n", "+one"), ("```console any-numbers\n$ echo 1 b\n1 c\n```\n", "+1 b"),
+       ("```sh\nfalse\n```\n", "ended with 1"),
+       ("```sh no-test\ntrue\n```\n", "needs a reason"), ("```console\necho\n```\n", "begins with '$ '")]
+
+
+def self_test() -> int:
+    failures = []
+    with tempfile.TemporaryDirectory() as folder:
+        page = Path(folder) / "page.md"
+
+        def problems(text: str) -> list[str]:
+            page.write_text(text, encoding="utf-8")
+            return run_page(page, Path(folder), Path(folder), Path(folder))
+
+        failures += problems(GOOD)
+        for text, expected in BAD:
+            found = problems(text)
+            if len(found) != 1 or expected not in found[0]:
+                failures.append(f"{text!r}: expected '{expected}', found {found}")
+    print("\n".join([*failures, f"self-test: {len(failures)} mistakes"]))
+    return 1 if failures else 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--self-test", action="store_true")
+    parser.add_argument("--root", type=Path)
+    parser.add_argument("--build", type=Path)
+    parser.add_argument("--path", type=Path)
+    parser.add_argument("pages", type=Path, nargs="*")
+    options = parser.parse_args()
+    if options.self_test:
+        return self_test()
+    problems = [problem for page in options.pages for problem in run_page(page, options.root, options.build, options.path)]
+    print("\n\n".join(problems))
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: BSL-1.0
+// The pieces of code that the pages show, in one file that compiles. test/docs/code_in_docs.py looks for each of them
+// here and in the examples.
+#include <cles/service.hpp>
+
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/io_context.hpp>
+
+#include <iostream>
+
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+
+struct position {
+    double lat = 0, lon = 0;
+};
+BOOST_DESCRIBE_STRUCT(position, (), (lat, lon))
+
+enum class gear { park, reverse, drive };
+BOOST_DESCRIBE_ENUM(gear, park, reverse, drive)
+
+struct state {
+    gear selected = gear::park;
+    std::vector<double> pressures{};
+    std::optional<std::string> driver{}; // may be absent
+};
+BOOST_DESCRIBE_STRUCT(state, (), (selected, pressures, driver))
+
+bool only_look(const cles::access& asked) { return asked.verb == cles::verb::pull || asked.verb == cles::verb::bind; }
+
+void a_service();
+void an_open_service();
+void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
+asio::awaitable<void> asking(cles::service& car);
+asio::awaitable<void> errors(cles::service& car);
+asio::awaitable<void> feeds(cles::service& car, position here);
+void blocking(cles::service& me);
+asio::awaitable<double> drive_to(position where);
+double pressure_of(const cles::request& asked);
+void follow(const position& where);
+void slow_down(const std::string& why);
+
+void a_service() {
+    asio::io_context io;
+    cles::service car{io, {.name = "car1", .listen = {"tcp://127.0.0.1:0"}, .peers = {{"car0", "tcp://10.0.0.7"}}}};
+    car.on_pull("speed", [] { return 27.5; });
+    io.run();
+}
+
+void an_open_service() {
+    asio::io_context io;
+    cles::service open{io, {.name = "car1", .listen = {"tcp://0.0.0.0:0"}, .insecure = true}};
+}
+
+void handlers(cles::service& car, position& target, std::array<double, 4>& tyres) {
+    car.on_pull("tyre", [&](const cles::request& asked) { return tyres.at(asked.parameter<std::size_t>(0)); });
+    car.on_push("target", [&](const position& to) { target = to; });
+    car.on_delegate("park", [&](cles::request, position where) -> asio::awaitable<double> {
+        const double metres = co_await drive_to(where);
+        co_return metres;
+    });
+    car.on_pull("tyre", pressure_of, {.description = "Pressure in bar", .parameters = {"which"}, .idempotent = true});
+}
+
+asio::awaitable<void> asking(cles::service& car) {
+    const auto where = co_await car.async_pull<position>("car0:position");
+    co_await car.async_push("car0:target", where);
+    const auto metres = co_await car.async_delegate<double>("car0:park", where, cles::call_options{}.deadline(20s));
+    const auto answer = co_await car.async_request("PULL car0:tyre/2"); // JSON, as text
+    std::cout << metres << answer.text;
+}
+
+asio::awaitable<void> errors(cles::service& car) {
+    try {
+        co_await car.async_pull<double>("car0:altitude");
+    } catch (const cles::error& failure) {
+        if (failure.code() == cles::errc::no_task) {
+            std::cerr << failure.message() << '\n'; // car0 has no PULL 'altitude'
+        }
+    }
+}
+
+asio::awaitable<void> feeds(cles::service& car, position here) {
+    car.update("position", here); // to all that are bound; never blocks
+
+    auto feed = co_await car.async_bind<position>("car0:position", cles::bind_options{}.every(100ms));
+    for (;;) {
+        const auto event = co_await feed.async_next();
+        if (event.has_value()) {
+            follow(event.value);
+        } else if (event.kind == cles::feed_event::lost) {
+            slow_down(event.text);
+        }
+    }
+}
+
+void blocking(cles::service& me) {
+    const std::string json = me.request("PULL car:speed");
+    std::cout << json;
+}

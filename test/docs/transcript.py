@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: BSL-1.0
+"""Compares what a program printed with what a page says it prints, where `...` stands for anything."""
+
+import difflib
+import re
+
+
+def _pattern(line: str) -> re.Pattern:
+    return re.compile(".*".join(re.escape(part) for part in line.rstrip().split("...")))
+
+
+def matches(expected: list[str], printed: list[str]) -> bool:
+    """A line that is only `...` stands for any number of lines; elsewhere `...` stands for any text within its line."""
+    if not expected:
+        return not printed
+    if expected[0].strip() == "...":
+        return any(matches(expected[1:], printed[at:]) for at in range(len(printed) + 1))
+    return bool(printed and _pattern(expected[0]).fullmatch(printed[0].rstrip()) and matches(expected[1:], printed[1:]))
+
+
+def without_numbers(lines: list[str]) -> list[str]:
+    """The same with every number as `0` and every gap as one space, for output whose figures differ from run to run."""
+    return [re.sub(r" +", " ", re.sub(r"(?<![\w.])-?\d+(\.\d+)?", "0", line)) for line in lines]
+
+
+def difference(expected: list[str], printed: list[str]) -> str:
+    return "\n".join(difflib.unified_diff(expected, printed, "as the page says", "as it came", lineterm=""))

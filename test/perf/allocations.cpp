@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSL-1.0
+// In steady state, a PULL allocates nothing at the service. The service runs in this process, whose every allocation is
+// counted; the client in another.
+#include <cles/service.hpp>
+
+#include "scripted_client.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <sys/prctl.h>
+#include <sys/wait.h>
+
+// --- Counting
+// ----------------------------------------------------------------------------------------------------------
+
+// glibc's own names, below the ones that are replaced here. `operator new` comes by `malloc` too.
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+}
+
+namespace {
+std::uint64_t allocations = 0;
+}
+
+extern "C" {
+void* malloc(std::size_t size) {
+    ++allocations;
+    return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+    ++allocations;
+    return __libc_calloc(count, size);
+}
+void* realloc(void* memory, std::size_t size) {
+    ++allocations;
+    return __libc_realloc(memory, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+    ++allocations;
+    return __libc_memalign(alignment, size);
+}
+}
+
+namespace {
+
+// --- The service
+// -------------------------------------------------------------------------------------------------------
+
+struct localization {
+    double utc = 1'700'000'000.5;
+    double lat = 48.137154;
+    double lon = 11.576124;
+    double velocity = 27.31;
+    double acceleration = 0.12;
+};
+BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon, velocity, acceleration))
+
+constexpr std::uint64_t warm_up = 5'000;
+constexpr std::uint64_t counted = 10'000;
+// A handler of `std::function` and the like must not be what makes the difference: the client sends some requests more.
+constexpr std::uint64_t sent = warm_up + counted + 64;
+
+/// How many allocations there were between the first counted request and the last.
+std::uint64_t allocations_of(const std::function<void(const std::string&)>& client) {
+    boost::asio::io_context io{1};
+    cles::service car{io, {.name = "car1", .listen = {"tcp://127.0.0.1:0"}}};
+    std::uint64_t pulls = 0;
+    std::uint64_t before = 0;
+    std::uint64_t after = 0;
+    car.on_pull("localization", [&] {
+        ++pulls;
+        if (pulls == warm_up) {
+            before = allocations;
+        } else if (pulls == warm_up + counted) {
+            after = allocations;
+        }
+        return localization{.utc = 1'700'000'000.5 + static_cast<double>(pulls) / 1000};
+    });
+    car.on_push("done", [&] { io.stop(); });
+
+    const auto endpoint = car.endpoints().front();
+    const auto child = ::fork();
+    if (child < 0) {
+        throw std::system_error(errno, std::generic_category(), "fork");
+    }
+    if (child == 0) {
+        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+        try {
+            client(endpoint);
+            ::_exit(0);
+        } catch (const std::exception& failure) {
+            std::fprintf(stderr, "client: %s\n", failure.what());
+            ::_exit(1);
+        }
+    }
+    // Should the client fail, the service learns it by the end of its link only: it must not wait for ever.
+    io.run_for(std::chrono::seconds{30});
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+    if (pulls < sent) {
+        throw std::runtime_error("only " + std::to_string(pulls) + " of " + std::to_string(sent) + " requests came");
+    }
+    return after - before;
+}
+
+// --- The clients
+// -------------------------------------------------------------------------------------------------------
+
+void one_by_one(const std::string& url, const std::function<std::string(std::uint64_t)>& request) {
+    scripted_client client{url};
+    for (std::uint64_t i = 1; i <= sent; ++i) {
+        client.send(request(i));
+        client.receive_line();
+    }
+    client.send("PUSH self:done reply=no\n");
+    client.receive_line();
+}
+
+void in_batches(const std::string& url, std::uint64_t size) {
+    scripted_client client{url};
+    for (std::uint64_t i = 0; i < sent; i += size) {
+        std::string batch;
+        for (std::uint64_t n = i; n < i + size; ++n) {
+            batch += "PULL car1:localization id=" + std::to_string(n + 1) + " deadline=5000\n";
+        }
+        client.send(batch);
+        for (std::uint64_t n = 0; n < size; ++n) {
+            client.receive_line();
+        }
+    }
+    client.send("PUSH self:done reply=no\n");
+    client.receive_line();
+}
+
+struct scenario {
+    const char* name;
+    std::function<void(const std::string&)> client;
+};
+
+} // namespace
+
+int main() {
+    const std::vector<scenario> scenarios{
+        {"a person's request, without id",
+         [](const std::string& url) { one_by_one(url, [](std::uint64_t) { return "PULL self:localization\n"; }); }},
+        {"a node's request, with id and deadline",
+         [](const std::string& url) {
+             one_by_one(url, [](std::uint64_t i) {
+                 return "PULL car1:localization id=" + std::to_string(i) + " deadline=5000\n";
+             });
+         }},
+        {"64 in flight", [](const std::string& url) { in_batches(url, 64); }},
+    };
+    bool good = true;
+    for (const auto& each : scenarios) {
+        try {
+            const auto found = allocations_of(each.client);
+            std::printf("%-40s %llu allocations in %llu PULLs\n", each.name, static_cast<unsigned long long>(found),
+                        static_cast<unsigned long long>(counted));
+            good = good && found == 0;
+        } catch (const std::exception& failure) {
+            std::printf("%-40s %s\n", each.name, failure.what());
+            good = false;
+        }
+        std::fflush(stdout);
+    }
+    return good ? 0 : 1;
+}

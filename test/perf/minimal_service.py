@@ -1,0 +1,74 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""The minimal service fits a weak node: its size, what it links, the memory it takes while it serves.
+
+    minimal_service.py STRIPPED_PROGRAM
+"""
+
+import json
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+MAX_SIZE = 1_000_000
+MAX_PRIVATE = 1 << 20
+MAX_RESIDENT = 4 << 20
+REQUESTS = 2_000
+# The system's own: the C and C++ libraries, the loader, and what the kernel maps.
+ALLOWED = re.compile(r"^(libc|libm|libstdc\+\+|libgcc_s)\.so\.|^ld-linux.*\.so\.|^linux-(vdso|gate)\.so\.")
+
+failures = []
+
+
+def expect(good: bool, what: str) -> None:
+    print(("  ok    " if good else "  FAIL  ") + what)
+    if not good:
+        failures.append(what)
+
+
+def linked_libraries(program: str) -> list[str]:
+    listed = subprocess.run(["ldd", program], capture_output=True, text=True, check=True).stdout
+    return sorted(Path(line.split()[0]).name for line in listed.splitlines() if line.strip())
+
+
+def memory_of(process: int) -> dict[str, int]:
+    """Bytes by the names that the kernel gives them."""
+    text = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
+    return {name: int(kib) * 1024 for name, kib in re.findall(r"^(\w+):\s+(\d+) kB", text, re.MULTILINE)}
+
+
+def ask(endpoint: str) -> None:
+    host, port = re.fullmatch(r"tcp://([\d.]+):(\d+)", endpoint).groups()
+    with socket.create_connection((host, int(port)), timeout=10) as link, link.makefile("r", encoding="utf-8") as lines:
+        for number in range(1, REQUESTS + 1):
+            link.sendall(f"PULL car1:position id={number} deadline=5000\n".encode())
+            reply = lines.readline()
+            assert json.loads(reply.removeprefix(f"id={number} "))["lat"] == 48.137154, reply
+
+
+def main(program: str) -> int:
+    size = Path(program).stat().st_size
+    expect(size <= MAX_SIZE, f"size {size} bytes, allowed {MAX_SIZE}")
+
+    libraries = linked_libraries(program)
+    foreign = [name for name in libraries if not ALLOWED.search(name)]
+    expect(not foreign, f"links {' '.join(libraries)}" + (f": foreign are {' '.join(foreign)}" if foreign else ""))
+
+    with subprocess.Popen([program, "tcp://127.0.0.1:0"], stdout=subprocess.PIPE, text=True) as service:
+        try:
+            endpoint = service.stdout.readline().strip()
+            ask(endpoint)
+            memory = memory_of(service.pid)
+        finally:
+            service.kill()
+    private = memory["Private_Clean"] + memory["Private_Dirty"]
+    detail = f"of it {memory['Private_Dirty'] // 1024} KiB written"
+    expect(private <= MAX_PRIVATE, f"private memory {private // 1024} KiB ({detail}), allowed {MAX_PRIVATE // 1024} KiB")
+    expect(memory["Rss"] <= MAX_RESIDENT, f"resident memory {memory['Rss'] // 1024} KiB, allowed {MAX_RESIDENT // 1024} KiB")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,409 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Checks who may see whom in the source tree, and a few other rules that no compiler checks.
+
+    include_rules.py [ROOT]        checks the tree; prints each violation; exits 1 where there is one
+    include_rules.py --self-test   plants violations in a scratch tree and expects to find every one of them
+
+The rooms and what they may see are the tables below: a new folder under libcles/src needs its line in ROOMS.
+"""
+
+import re
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+SOURCE_SUFFIXES = {".cpp", ".hpp", ".h", ".ipp"}
+
+# Where files live: the longest prefix that fits names the room. "src" is what stands in libcles/src itself, the bodies
+# of the public face.
+ROOMS = {
+    "libcles/include/cles/": "public",
+    "libcles/src/protocol/": "protocol",
+    "libcles/src/core/": "core",
+    "libcles/src/transport/": "transport",
+    "libcles/src/shell/": "shell",
+    "libcles/src/": "src",
+    "runtime/": "runtime",
+    "plugins/": "plugins",
+    "apps/": "apps",
+    "perf/": "perf",
+    "test/": "test",
+}
+LIBRARY = {"public", "protocol", "core", "transport", "shell", "src"}
+
+# room -> the rooms whose files it may include besides its own. "plain" are the public headers that reach nothing of
+# NOT_SANS_IO, directly or through others; "face" are all public headers but FACADE_HEADERS.
+MAY_SEE = {
+    "public": set(),
+    "protocol": {"plain"},
+    "core": {"protocol", "face"},
+    "transport": {"protocol", "plain", "link"},
+    "shell": {"public", "protocol", "core", "transport", "src"},
+    "src": {"public", "protocol", "core", "transport", "shell"},
+    "runtime": {"public"},
+    "plugins": {"public"},
+    "apps": {"public"},
+    "perf": {"public"},
+    "test": LIBRARY | {"runtime", "plugins"},
+}
+
+# The part of the public face that a transport knows, even where it is not plain.
+LINK_HEADERS = {"cles/link.hpp"}
+# What stands above everything inside: only the bodies of the public face and the shell look up to it.
+FACADE_HEADERS = {f"cles/{name}.hpp" for name in ("service", "feed", "plugin", "run")}
+
+# file -> rooms it may see beyond those of its own room, each with a reason:
+#     "perf/grammar_speed.cpp": {"protocol"},  # measures the parser without a link
+EXCEPTIONS: dict[str, set[str]] = {}
+
+# Headers that move bytes, wait, or start threads: nothing for rooms where time is a parameter.
+NOT_SANS_IO = re.compile(
+    r"""boost/(asio|beast|dll|process|thread|interprocess)(\.hpp$|/)
+      | (thread|mutex|shared_mutex|condition_variable|future|semaphore|latch|barrier|stop_token)$
+      | (iostream|fstream|filesystem|csignal|print)$
+      | (sys|net|netinet|arpa|linux)/
+      | (unistd|poll|fcntl|netdb|signal|pthread|ifaddrs)\.h$
+    """,
+    re.VERBOSE,
+)
+SANS_IO = {"protocol", "core"}
+
+# What sans-I/O code must not say, for time and chance are given to it.
+NOT_SANS_IO_WORDS = [
+    (re.compile(r"\b\w*_?clock\s*::\s*now\b"), "reads a clock: take the time as a parameter"),
+    (re.compile(r"\b(clock_gettime|gettimeofday|timespec_get)\b"), "reads a clock: take the time as a parameter"),
+    (re.compile(r"\bstd::time\s*\("), "reads a clock: take the time as a parameter"),
+    (re.compile(r"\brandom_device\b|\bstd::s?rand\s*\(|(?<![\w:.>])s?rand\s*\("), "draws from global chance: take a generator"),
+    (re.compile(r"\b(static|thread_local|inline)\s+(thread_local\s+)?(std::)?(mt19937\w*|minstd_rand\w*|default_random_engine)\b"),
+     "keeps a global generator: take one"),
+    (re.compile(r"\bthis_thread\b|\bstd::(j?thread|async|mutex)\b"), "waits, locks or starts threads"),
+    (re.compile(r"\b(std::)?getenv\s*\("), "reads the environment: take an option"),
+]
+
+# (pattern of the header, where it may stand, what to say)
+RESERVED_HEADERS = [
+    (re.compile(r"yaml-cpp/"), re.compile(r"runtime/(src/)?config[^/]*(/.*)?$"), "yaml-cpp belongs to runtime/config alone"),
+    (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/(src/)?plugin_host[^/]*(/.*)?$"),
+     "Boost.DLL belongs to runtime/plugin_host alone"),
+    (re.compile(r"spdlog/"), re.compile(r"(?!libcles/)"), "the library logs through its sink; spdlog is for programs"),
+]
+
+# Costs every user of the header seconds.
+HEAVY_IN_PUBLIC = re.compile(r"boost/asio\.hpp$|boost/asio/(use_future|experimental/awaitable_operators)\.hpp$|boost/json\.hpp$")
+
+MAX_LINES = 400
+
+INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
+
+
+# --- Reading sources -----------------------------------------------------------------------------------------------------
+
+TOKEN = re.compile(
+    r"""(?P<comment>//[^\n]*|/\*.*?\*/)
+      | (?P<raw>\bR"(?P<tag>[^()\s\\]{0,16})\(.*?\)(?P=tag)")
+      | (?P<string>"(?:\\.|[^"\\\n])*")
+      | (?P<char>(?<![0-9a-fA-F])'(?:\\.|[^'\\\n])+')
+    """,
+    re.VERBOSE | re.DOTALL,
+)
+
+
+def without_comments_and_strings(text: str, keep_strings: bool = False) -> str:
+    """The same text with as many lines, its comments and the contents of its strings blanked."""
+
+    def blank(match: re.Match) -> str:
+        if keep_strings and match.lastgroup != "comment":
+            return match.group(0)
+        lines = "\n" * match.group(0).count("\n")
+        return lines if match.lastgroup == "comment" else '""' + lines
+
+    return TOKEN.sub(blank, text)
+
+
+def includes_of(text: str) -> list[tuple[int, str, str]]:
+    """(line, '<' or '"', header) for each include that is not commented out."""
+    clean = without_comments_and_strings(text, keep_strings=True)
+    return [(clean.count("\n", 0, m.start()) + 1, m.group(1), m.group(2)) for m in INCLUDE.finditer(clean)]
+
+
+def statements_of(clean: str):
+    """(line, text) of each stretch between ';', '{' and '}'."""
+    start = 0
+    for match in re.finditer(r"[;{}]|\Z", clean):
+        text = clean[start : match.start()].strip()
+        yield clean.count("\n", 0, clean.find(text, start)) + 1, text
+        start = match.end()
+
+
+OPERATOR = re.compile(r"\bco_await\b|\band\b|\bor\b|(?<=\s)(?:&&|\|\|)(?=\s)|\?|[()\[\],]|<<=|[^=!<>]=(?!=)")
+
+
+def has_conditional_await(statement: str) -> bool:
+    """Whether a co_await stands under ?:, && or ||, which g++ 12 compiles wrongly.
+
+    Only operators beside the co_await, or around it, count: those in its operand or in another argument do not.
+    """
+    if "co_await" not in statement:
+        return False
+    # A group is the parts between two commas inside one pair of brackets; path: the groups around a token.
+    path, next_group = [0], 1
+    awaits, operators = [], []
+    for match in OPERATOR.finditer(statement):
+        token = match.group(0)
+        if token in "([":
+            path = path + [next_group]
+            next_group += 1
+        elif token in ")]":
+            path = path[:-1] or [next_group]
+            next_group += 1
+        elif token == ",":
+            path = path[:-1] + [next_group]
+            next_group += 1
+        elif token == "co_await":
+            awaits.append(path)
+        elif token in ("&&", "||", "?", "and", "or"):
+            operators.append(path)
+    return any(a[: len(o)] == o for a in awaits for o in operators)
+
+
+# --- The checks ----------------------------------------------------------------------------------------------------------
+
+
+class Tree:
+    def __init__(self, root: Path):
+        self.root = root
+        self.violations: list[str] = []
+        self.texts: dict[str, str] = {}
+        for room in sorted({prefix.split("/")[0] for prefix in ROOMS}):
+            for path in sorted((root / room).rglob("*")):
+                if path.suffix in SOURCE_SUFFIXES and path.is_file():
+                    self.texts[path.relative_to(root).as_posix()] = path.read_text(encoding="utf-8")
+        self.includes = {name: includes_of(text) for name, text in self.texts.items()}
+        self.reasons: dict[str, str] = {}
+
+    def complain(self, name: str, line: int, what: str) -> None:
+        self.violations.append(f"{name}:{line}: {what}")
+
+    def room_of(self, name: str) -> str:
+        return ROOMS[max((p for p in ROOMS if name.startswith(p)), key=len)]
+
+    def resolve(self, name: str, quote: str, header: str) -> str | None:
+        """The file of this tree that an include means, or nothing where it is another project's."""
+        bases = ["libcles/include", "libcles/src", "runtime/include", "runtime/src", "runtime", "test"]
+        if quote == '"':
+            bases.insert(0, str(Path(name).parent))
+        for base in bases:
+            parts: list[str] = []
+            for part in (Path(base) / header).as_posix().split("/"):
+                if part == "..":
+                    if parts:
+                        parts.pop()
+                elif part != ".":
+                    parts.append(part)
+            candidate = "/".join(parts)
+            if candidate in self.texts:
+                return candidate
+        return None
+
+    def why_not_plain(self, name: str, seen: frozenset = frozenset()) -> str:
+        """How a header reaches what is not sans-I/O, as 'a.hpp -> b.hpp -> boost/asio.hpp'; empty where it does not."""
+        if name in self.reasons:
+            return self.reasons[name]
+        short = name.removeprefix("libcles/include/")
+        reason = ""
+        for _, quote, header in self.includes[name]:
+            if NOT_SANS_IO.match(header):
+                reason = f"{short} -> {header}"
+                break
+            inner = self.resolve(name, quote, header)
+            if inner and inner not in seen and inner != name:
+                further = self.why_not_plain(inner, seen | {name})
+                if further:
+                    reason = f"{short} -> {further}"
+                    break
+        if not seen or reason:
+            self.reasons[name] = reason
+        return reason
+
+    def check_include(self, name: str, line: int, quote: str, header: str) -> None:
+        room = self.room_of(name)
+
+        for pattern, allowed, what in RESERVED_HEADERS:
+            if pattern.match(header) and not allowed.match(name):
+                self.complain(name, line, f"<{header}>: {what}")
+        if room in SANS_IO and NOT_SANS_IO.match(header):
+            self.complain(name, line, f"<{header}>: {room} is sans-I/O")
+        if room == "public" and HEAVY_IN_PUBLIC.match(header):
+            self.complain(name, line, f"<{header}> costs every user seconds: keep it out of public headers")
+
+        target = self.resolve(name, quote, header)
+        if target is None:
+            if (quote == '"' and room in LIBRARY) or header.startswith("cles/"):
+                self.complain(name, line, f'"{header}" is no file of this project')
+            return
+        seen = self.room_of(target)
+        allowed = MAY_SEE[room] | EXCEPTIONS.get(name, set()) | {room}
+        if seen in allowed:
+            return
+        if seen == "public":
+            public = target.removeprefix("libcles/include/")
+            if "link" in allowed and public in LINK_HEADERS:
+                return
+            if public in FACADE_HEADERS and room in LIBRARY:
+                self.complain(name, line, f"{room} must not see the facade: <{public}>")
+                return
+            if "face" in allowed:
+                return
+            if "plain" in allowed:
+                reason = self.why_not_plain(target)
+                if reason:
+                    self.complain(name, line, f"{room} may see only public headers that are sans-I/O: {reason}")
+                return
+        self.complain(name, line, f"{room} must not see {seen}: {target}")
+
+    def check_file(self, name: str) -> None:
+        text = self.texts[name]
+        room = self.room_of(name)
+        for line, quote, header in self.includes[name]:
+            self.check_include(name, line, quote, header)
+
+        parts = name.split("/")
+        if room == "src" and len(parts) > 3:
+            self.complain(name, 1, f"libcles/src/{parts[2]}/ is no room yet: give it its line in test/rules/include_rules.py")
+
+        clean = without_comments_and_strings(text)
+        if room in SANS_IO:
+            for pattern, what in NOT_SANS_IO_WORDS:
+                for match in pattern.finditer(clean):
+                    self.complain(name, clean.count("\n", 0, match.start()) + 1, f"'{match.group(0)}': sans-I/O code {what}")
+        if "co_await" in clean:
+            for line, statement in statements_of(clean):
+                if has_conditional_await(statement):
+                    self.complain(name, line, "co_await under ?:, && or ||: g++ 12 compiles it wrongly; await first, then decide")
+
+        lines = text.count("\n")
+        if name.startswith("libcles/") and lines > MAX_LINES:
+            self.complain(name, lines, f"{lines} lines, {MAX_LINES} are allowed: a file holds one concept")
+
+    def check(self) -> list[str]:
+        for name in self.texts:
+            self.check_file(name)
+        return self.violations
+
+    def report(self) -> str:
+        lengths = {n: t.count("\n") for n, t in self.texts.items() if n.startswith("libcles/")}
+        if not lengths:
+            return "include rules: no library sources yet"
+        longest = sorted(lengths, key=lambda n: -lengths[n])[:5]
+        lines = [f"include rules: {len(self.texts)} files, {sum(map(len, self.includes.values()))} includes checked",
+                 f"libcles: median {statistics.median(lengths.values()):.0f} lines, longest:"]
+        lines += [f"  {lengths[n]:4} {n}" for n in longest]
+        return "\n".join(lines)
+
+
+# --- The self-test -------------------------------------------------------------------------------------------------------
+
+# A tree that keeps the rules, and does what looks forbidden but is not.
+GOOD = {
+    "libcles/include/cles/error.hpp": "#pragma once\n#include <string>\n",
+    "libcles/include/cles/link.hpp": "#pragma once\n#include <cles/error.hpp>\n#include <boost/asio/awaitable.hpp>\n",
+    "libcles/include/cles/registrar.hpp": "#pragma once\n#include <cles/link.hpp>\n",
+    "libcles/include/cles/service.hpp": "#pragma once\n#include <boost/asio/io_context.hpp>\n",
+    "libcles/src/protocol/line.hpp": '#include <cles/error.hpp>\n#include <chrono>\n// #include <boost/asio.hpp>\n',
+    "libcles/src/core/session.cpp": '#include "protocol/line.hpp"\n#include <cles/registrar.hpp>\n#include <random>\n'
+    'const char* text = "steady_clock::now()"; // steady_clock::now()\nvoid f(std::mt19937& chance);\n',
+    "libcles/src/transport/tcp.cpp": '#include <cles/link.hpp>\n#include "protocol/line.hpp"\n#include <boost/asio/ip/tcp.hpp>\n'
+    "task f() {\n  auto&& x = co_await g(a && b);\n  if (a && b) {\n    co_await h(c ? d : e);\n  }\n  z(a || b, co_await q());\n}\n",
+    "libcles/src/shell/connection.cpp": '#include "core/session.hpp"\n#include "transport/tcp.hpp"\n#include <cles/service.hpp>\n',
+    "libcles/src/core/session.hpp": "#pragma once\n",
+    "libcles/src/transport/tcp.hpp": "#pragma once\n",
+    "libcles/src/service.cpp": '#include <cles/service.hpp>\n#include "shell/connection.hpp"\n',
+    "libcles/src/shell/connection.hpp": "#pragma once\n",
+    "runtime/config.cpp": "#include <yaml-cpp/yaml.h>\n#include <cles/service.hpp>\n",
+    "runtime/plugin_host.cpp": "#include <boost/dll/shared_library.hpp>\n",
+    "apps/car/main.cpp": '#include <cles/service.hpp>\n#include <spdlog/spdlog.h>\n#include "car.hpp"\n#include <boost/asio.hpp>\n',
+    "apps/car/car.hpp": "#pragma once\n",
+    "test/unit/session_test.cpp": '#include "core/session.hpp"\n#include "support/clock.hpp"\n',
+    "test/support/clock.hpp": "#pragma once\n",
+}
+
+# One violation each: the file, what it says, and a piece of the complaint.
+PLANTED = [
+    ("libcles/src/protocol/a.cpp", '#include "core/session.hpp"\n', "protocol must not see core"),
+    ("libcles/src/protocol/a.cpp", '#include "../core/session.hpp"\n', "protocol must not see core"),
+    ("libcles/src/protocol/a.cpp", "#include <cles/service.hpp>\n", "must not see the facade"),
+    ("libcles/src/protocol/a.cpp", "#include <cles/registrar.hpp>\n", "registrar.hpp -> cles/link.hpp -> boost/asio/awaitable.hpp"),
+    ("libcles/src/protocol/a.cpp", "#include <boost/asio/buffer.hpp>\n", "protocol is sans-I/O"),
+    ("libcles/src/core/a.cpp", "#include <cles/service.hpp>\n", "must not see the facade"),
+    ("libcles/src/core/a.cpp", "#include <boost/asio/any_io_executor.hpp>\n", "core is sans-I/O"),
+    ("libcles/src/core/a.cpp", "#  include <thread>\n", "core is sans-I/O"),
+    ("libcles/src/core/a.cpp", "#include <sys/socket.h>\n", "core is sans-I/O"),
+    ("libcles/src/core/a.cpp", '#include "transport/tcp.hpp"\n', "core must not see transport"),
+    ("libcles/src/core/a.cpp", '#include "shell/connection.hpp"\n', "core must not see shell"),
+    ("libcles/src/core/a.cpp", "auto t = std::chrono::steady_clock::now();\n", "reads a clock"),
+    ("libcles/src/core/a.cpp", "auto t = clock::now();\n", "reads a clock"),
+    ("libcles/src/core/a.cpp", "std::random_device entropy;\n", "global chance"),
+    ("libcles/src/core/a.cpp", "static std::mt19937 chance;\n", "global generator"),
+    ("libcles/src/transport/a.cpp", '#include "core/session.hpp"\n', "transport must not see core"),
+    ("libcles/src/transport/a.cpp", '#include "shell/connection.hpp"\n', "transport must not see shell"),
+    ("libcles/src/transport/a.cpp", "#include <cles/service.hpp>\n", "must not see the facade"),
+    ("libcles/src/shell/a.cpp", "#include <spdlog/spdlog.h>\n", "spdlog is for programs"),
+    ("libcles/src/shell/a.cpp", '#include "nowhere.hpp"\n', "is no file of this project"),
+    ("libcles/src/util/a.cpp", "int a;\n", "is no room yet"),
+    ("libcles/include/cles/a.hpp", '#include "protocol/line.hpp"\n', "public must not see protocol"),
+    ("libcles/include/cles/a.hpp", "#include <boost/asio/use_future.hpp>\n", "costs every user seconds"),
+    ("libcles/include/cles/a.hpp", "#include <boost/asio/experimental/awaitable_operators.hpp>\n", "costs every user seconds"),
+    ("libcles/include/cles/a.hpp", "#include <boost/asio.hpp>\n", "costs every user seconds"),
+    ("apps/a.cpp", '#include "../libcles/src/core/session.hpp"\n', "apps must not see core"),
+    ("apps/a.cpp", '#include "protocol/line.hpp"\n', "apps must not see protocol"),
+    ("apps/a.cpp", "#include <yaml-cpp/yaml.h>\n", "runtime/config alone"),
+    ("perf/a.cpp", '#include "shell/connection.hpp"\n', "perf must not see shell"),
+    ("plugins/a.cpp", '#include "runtime/config.hpp"\n#include <cles/nowhere.hpp>\n', "is no file of this project"),
+    ("runtime/a.cpp", "#include <boost/dll.hpp>\n", "runtime/plugin_host alone"),
+    ("runtime/a.cpp", '#include "core/session.hpp"\n', "runtime must not see core"),
+    ("apps/a.cpp", "task f() { if (ready && co_await g()) { } }\n", "co_await under"),
+    ("apps/a.cpp", "task f() { x = co_await g() || y; }\n", "co_await under"),
+    ("apps/a.cpp", "task f() { return use(ready ? (co_await g()).x : 0); }\n", "co_await under"),
+    ("apps/a.cpp", "task f() { auto x = a\n  && b(1, co_await g()); }\n", "co_await under"),
+    ("libcles/src/core/a.cpp", "\n" * (MAX_LINES + 1), "lines, 400 are allowed"),
+]
+
+
+def write_tree(root: Path, files: dict[str, str]) -> None:
+    for name, text in files.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+
+def self_test() -> int:
+    failures = []
+    with tempfile.TemporaryDirectory() as scratch:
+        write_tree(Path(scratch), GOOD)
+        failures += [f"found in a tree that keeps the rules: {v}" for v in Tree(Path(scratch)).check()]
+    for name, text, expected in PLANTED:
+        with tempfile.TemporaryDirectory() as scratch:
+            write_tree(Path(scratch), {**GOOD, name: text})
+            found = Tree(Path(scratch)).check()
+            if len(found) != 1 or not found[0].startswith(name) or expected not in found[0]:
+                failures.append(f"{name}: {text.strip()[:60]!r}: expected one '{expected}', found {found}")
+    for failure in failures:
+        print(failure)
+    print(f"include rules, self-test: {len(PLANTED)} violations planted, {len(failures)} mistakes")
+    return 1 if failures else 0
+
+
+def main(arguments: list[str]) -> int:
+    if arguments == ["--self-test"]:
+        return self_test()
+    tree = Tree(Path(arguments[0] if arguments else Path(__file__).parents[2]))
+    for violation in tree.check():
+        print(violation)
+    print(tree.report())
+    return 1 if tree.violations else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "support/link_recorder.hpp"
+#include "support/run_until.hpp"
+#include "support/side_thread.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <array>
+#include <chrono>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+
+namespace cles::test {
+
+/// All ways to make a link, each of which keeps the one contract.
+enum class carrier { tcp4, tcp6, unix_file, unix_abstract, inproc, inproc_threads };
+
+inline constexpr std::array every_carrier{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
+                                          carrier::unix_abstract, carrier::inproc, carrier::inproc_threads};
+inline constexpr std::array every_socket{carrier::tcp4, carrier::tcp6, carrier::unix_file, carrier::unix_abstract};
+
+std::ostream& operator<<(std::ostream& out, carrier kind);
+
+/// An address to listen on that nobody else uses.
+std::string fresh_address(carrier kind);
+
+/// One end of a link, with its owner.
+struct link_end {
+    std::shared_ptr<link_recorder> events = std::make_shared<link_recorder>();
+    link_ptr link{};
+    side_thread* home = nullptr; ///< where it lives, if not on the test's thread
+
+    /// Does something with the link or its owner, where they live.
+    template <class F>
+    auto run(F f) -> std::invoke_result_t<F&> {
+        return home != nullptr ? home->run(std::move(f)) : f();
+    }
+    /// Hands the owner to the link.
+    void start();
+    /// Writes the lines and flushes.
+    void say(std::string_view lines);
+    [[nodiscard]] std::size_t lines() {
+        return run([this] { return events->lines.size(); });
+    }
+    [[nodiscard]] std::size_t unsent() {
+        return run([this] { return link->unsent(); });
+    }
+    [[nodiscard]] bool lost() {
+        return run([this] { return events->lost(); });
+    }
+    [[nodiscard]] bool over() {
+        return run([this] { return events->over(); });
+    }
+    /// Ends it and lets go of it.
+    void drop();
+};
+
+/// A listener and links of one kind. `near` is the end that dials, on the test's thread; `far` the one that came in.
+class link_pair {
+  public:
+    explicit link_pair(carrier kind, const limits& bounds = {});
+    ~link_pair();
+    link_pair(const link_pair&) = delete;
+    link_pair& operator=(const link_pair&) = delete;
+
+    boost::asio::io_context io;
+    link_end near;
+    link_end far;
+
+    [[nodiscard]] link_transport& transport() const noexcept { return *transport_; }
+    [[nodiscard]] const limits& bounds() const noexcept { return bounds_; }
+    [[nodiscard]] url address() const { return address_; }
+    /// The other end's context.
+    [[nodiscard]] boost::asio::io_context& far_io() { return thread_ ? thread_->io() : io; }
+
+    /// Makes the link; its ends are not started.
+    void connect();
+    /// Makes the link and starts both ends.
+    void open();
+    /// Waits for somebody to come in, who was not dialled by `connect`.
+    void accept();
+    void stop_listening();
+
+    template <class Condition>
+    void until(Condition&& holds, const std::source_location& where = std::source_location::current()) {
+        run_until(io, std::forward<Condition>(holds), patience, where);
+    }
+
+  private:
+    std::unique_ptr<side_thread> thread_;
+    limits bounds_;
+    link_transport* transport_;
+    url address_;
+    std::unique_ptr<acceptor> acceptor_;
+    link_ptr arrived_; // used on the far end's thread
+};
+
+} // namespace cles::test

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <boost/describe.hpp>
+
+namespace cles::test {
+
+/// The paper's example of what vehicles tell each other.
+struct localization {
+    double utc = 0;
+    double lat = 0;
+    double lon = 0;
+    bool operator==(const localization&) const = default;
+};
+BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon))
+
+} // namespace cles::test

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "core/outlet.hpp"
+
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace cles::test {
+
+/// A link as a session sees it, which keeps what is sent and remembers what was asked of it.
+class recording_outlet : public core::outlet {
+  public:
+    recording_outlet() = default;
+
+    std::string& output() override { return text_; }
+    void wake() override { ++wakes; }
+    void pause(bool stop) override {
+        paused = stop;
+        ++pauses;
+    }
+    void finish() override { ++finishes; }
+    void close() override { ++closes; }
+
+    /// What has been sent since the last time.
+    std::string take() { return std::exchange(text_, {}); }
+    /// The same, line by line and without LF. A last line that is not ended shows as "... <no LF>".
+    std::vector<std::string> take_lines() {
+        std::vector<std::string> lines;
+        const auto text = take();
+        for (std::size_t from = 0; from < text.size();) {
+            const auto end = text.find('\n', from);
+            if (end == std::string::npos) {
+                lines.push_back(text.substr(from) + " <no LF>");
+                break;
+            }
+            lines.push_back(text.substr(from, end - from));
+            from = end + 1;
+        }
+        return lines;
+    }
+
+    int wakes = 0;
+    int pauses = 0;
+    int finishes = 0;
+    int closes = 0;
+    bool paused = false;
+
+  protected:
+    ~recording_outlet() = default;
+
+  private:
+    std::string text_;
+};
+
+} // namespace cles::test

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/request.hpp>
+
+#include "core/call.hpp"
+#include "core/node.hpp"
+#include "core/session.hpp"
+#include "support/manual_clock.hpp"
+#include "support/recorded_reply.hpp"
+#include "support/recording_outlet.hpp"
+#include "support/reply_text.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace cles::test {
+
+/// A node without a network, whose time a test moves.
+class test_node {
+  public:
+    explicit test_node(limits bounds = {}, authoriser rules = {})
+        : host(std::make_shared<core::node>(
+              core::node_setup{.name = "car1", .epoch = 0x5f3a09c1, .bounds = bounds, .authorise = std::move(rules)},
+              clock, [this] { ++wakes; })) {}
+
+    /// Moves time and lets what is due happen.
+    void pass(std::chrono::milliseconds by) {
+        clock.advance(by);
+        host->deadlines.expire(clock.now());
+    }
+
+    using plain = std::function<void(const request&, json_writer&)>;
+    void on(verb v, std::string_view task, plain handler) { host->tasks.add(v, task, {.plain = std::move(handler)}); }
+    /// A task that answers with JSON that is known already.
+    void on(verb v, std::string_view task, std::string json) {
+        on(v, task, [json = std::move(json)](const request&, json_writer& w) { w.raw(json); });
+    }
+
+    /// A handler that has been started and has not answered.
+    struct running {
+        std::shared_ptr<core::call> call;
+        std::vector<std::string> parameters;
+        std::string body;
+        bool stopped = false;
+    };
+    /// A task whose handlers wait in `started` until the test answers for them.
+    void on_later(verb v, std::string_view task) {
+        host->tasks.add(v, task, {.start = [this](const request& r, const std::shared_ptr<core::call>& call) {
+                            auto entry = std::make_shared<running>();
+                            entry->call = call;
+                            for (const auto p : r.parameters()) {
+                                entry->parameters.emplace_back(p);
+                            }
+                            entry->body = r.body();
+                            call->on_stop([weak = std::weak_ptr{entry}] {
+                                if (const auto alive = weak.lock()) {
+                                    alive->stopped = true;
+                                }
+                            });
+                            started.push_back(std::move(entry));
+                        }});
+    }
+    void open(std::string_view task) { host->tasks.add(verb::bind, task, {}); }
+
+    void publish(std::string_view path, std::string_view body) { host->published.publish_body(path, body); }
+    /// What the shell does when it is woken.
+    void drain() { host->published.drain(clock.now()); }
+    void publish_now(std::string_view path, std::string_view body) {
+        publish(path, body);
+        drain();
+    }
+    [[nodiscard]] core::counters& counts() const { return host->counts; }
+
+    manual_clock clock;
+    int wakes = 0;
+    std::shared_ptr<core::node> host;
+    std::vector<std::shared_ptr<running>> started;
+};
+
+/// One link of a node, with the test at its other end.
+class test_link final : public recording_outlet, public core::binder {
+  public:
+    explicit test_link(test_node& at) : at_(at), session_(at.host, *this, *this, peer_) {}
+
+    /// Feeds a line and tells what was sent meanwhile.
+    std::string ask(std::string_view line) {
+        session_.on_line(line, at_.clock.now());
+        return take();
+    }
+    /// The same, for exactly one answer: "id=7 no_task", "ok", or "" for no answer.
+    std::string kind(std::string_view line) { return kinds(ask(line)); }
+    reply_parts reply(std::string_view line) {
+        session_.on_line(line, at_.clock.now());
+        const auto lines = take_lines();
+        return lines.size() == 1 ? read_reply(lines[0])
+                                 : reply_parts{.error = std::to_string(lines.size()) + " replies"};
+    }
+    /// What was sent, as "kind, kind, ...".
+    std::string sent() { return kinds(take()); }
+
+    void overlong(std::string_view head) { session_.on_overlong(head, at_.clock.now()); }
+    void half_close() { session_.on_end(at_.clock.now()); }
+    void reset() { session_.on_lost("the link was lost"); }
+    /// The link has room again.
+    void make_room() {
+        takes = true;
+        session_.serving().drain(at_.clock.now());
+    }
+    [[nodiscard]] core::session& session() { return session_; }
+
+    [[nodiscard]] bool takes_updates() const override { return takes; }
+    void put_updates(std::string_view lines) override { output().append(lines); }
+
+    bool takes = true;
+
+  private:
+    static std::string kinds(std::string_view text) {
+        std::string all;
+        while (!text.empty()) {
+            const auto end = text.find('\n');
+            all.append(all.empty() ? "" : ", ").append(kind_of(text.substr(0, end)));
+            text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+        }
+        return all;
+    }
+
+    test_node& at_;
+    identity peer_{.transport = "tcp", .address = "tcp://127.0.0.1:1", .local = true};
+    core::session session_;
+};
+
+} // namespace cles::test

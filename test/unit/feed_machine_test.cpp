@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/feed_machine.hpp"
+#include "support/manual_clock.hpp"
+#include "support/recorded_reply.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace {
+
+using cles::errc;
+using cles::feed_event;
+using namespace std::chrono_literals;
+using event_ptr = cles::core::feed_machine::event_ptr;
+
+class counting_host final : public cles::core::feed_host {
+  public:
+    void bind(cles::core::feed_machine&) override { ++binds; }
+    void unbind(cles::core::feed_machine&) override { ++unbinds; }
+    int binds = 0;
+    int unbinds = 0;
+};
+
+/// One wait for an event. It lives on the stack of its test, which is why nothing deletes it.
+class wait final : public cles::detail::pending_event {
+  public:
+    void deliver(const cles::detail::raw_event& event) override {
+        switch (event.kind) {
+        case feed_event::current: text = "current " + std::string{event.body}; break;
+        case feed_event::update: text = "update " + std::to_string(event.seq) + " " + std::string{event.body}; break;
+        case feed_event::gap: text = "gap " + std::to_string(event.missed); break;
+        case feed_event::lost: text = "lost " + std::string{event.text}; break;
+        case feed_event::rebound: text = "rebound"; break;
+        }
+    }
+    void fail(boost::system::error_code code, std::string_view) override { text = "failed: " + code.message(); }
+    void discard() noexcept override {}
+    std::string text = "(waiting)";
+};
+
+struct fixture {
+    explicit fixture(cles::limits bounds = {}) : feed(host, deadlines, bounds, "car1", "speed", false, 7) {}
+
+    /// Binds for the first time, the publisher answering with this.
+    void bound(std::string_view last = "{}") {
+        first = begin();
+        feed.on_bound(last);
+    }
+    std::shared_ptr<cles::test::outcome> begin() {
+        auto [operation, result] = cles::test::record();
+        feed.start(std::move(operation));
+        return result;
+    }
+    void update(std::uint64_t seq, std::string_view epoch = "0000000a", std::string_view body = "{}") {
+        const auto line =
+            "UPDATE car1:speed seq=" + std::to_string(seq) + " epoch=" + std::string{epoch} + " " + std::string{body};
+        cles::protocol::request_line update;
+        cles::protocol::malformed_request error;
+        BOOST_REQUIRE(cles::protocol::parse_request(line, update, error));
+        feed.take(update);
+    }
+    /// The next event that is there, or "(nothing)".
+    std::string next() {
+        wait w;
+        if (!feed.next(cles::core::feed_machine::event_ptr{&w})) {
+            feed.cancel();
+            return "(nothing)";
+        }
+        feed.pump();
+        return w.text;
+    }
+    void pass(std::chrono::milliseconds by) {
+        clock.advance(by);
+        deadlines.expire(clock.now());
+    }
+    void lose() { feed.on_lost("the link was lost", clock.now()); }
+
+    cles::test::manual_clock clock;
+    cles::core::deadline_queue deadlines;
+    counting_host host;
+    cles::core::feed_machine feed;
+    std::shared_ptr<cles::test::outcome> first;
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(feed_machine, fixture)
+
+BOOST_AUTO_TEST_CASE(starting_binds_and_the_answer_completes_it) {
+    const auto result = begin();
+    BOOST_TEST(host.binds == 1);
+    BOOST_TEST(!result->ended);
+    feed.on_bound("{}");
+    BOOST_TEST(result->ended);
+    BOOST_TEST(!result->code);
+    BOOST_TEST(next() == "(nothing)"); // there was no last value
+}
+
+BOOST_AUTO_TEST_CASE(the_last_value_comes_as_the_first_event) {
+    bound("{\"v\":3}");
+    BOOST_TEST(first->text == "{\"v\":3}");
+    update(5);
+    BOOST_TEST(next() == "current {\"v\":3}");
+    BOOST_TEST(next() == "update 5 {}");
+}
+
+BOOST_AUTO_TEST_CASE(a_refusal_of_the_first_bind_closes_it) {
+    const auto result = begin();
+    feed.on_refused(errc::no_task, "car1 has no BIND 'speed'", clock.now());
+    BOOST_TEST((result->code == errc::no_task));
+    BOOST_TEST(result->text == "car1 has no BIND 'speed'");
+    BOOST_TEST(feed.closed());
+    pass(1h);
+    BOOST_TEST(host.binds == 1);
+}
+
+BOOST_AUTO_TEST_CASE(an_event_goes_to_whoever_waits) {
+    bound();
+    wait w;
+    BOOST_TEST(!feed.next(cles::core::feed_machine::event_ptr{&w}));
+    BOOST_TEST(feed.has_waiter());
+    update(1);
+    BOOST_TEST(w.text == "update 1 {}");
+    BOOST_TEST(!feed.has_waiter());
+    BOOST_TEST(next() == "(nothing)");
+}
+
+BOOST_AUTO_TEST_CASE(a_gap_is_told_before_the_update_that_shows_it) {
+    bound();
+    update(1);
+    update(4);
+    BOOST_TEST(next() == "update 1 {}");
+    BOOST_TEST(next() == "gap 2");
+    BOOST_TEST(next() == "update 4 {}");
+}
+
+BOOST_AUTO_TEST_CASE(a_lost_publisher_is_told_and_bound_again_after_a_pause) {
+    bound();
+    lose();
+    BOOST_TEST(next() == "lost the link was lost");
+    BOOST_TEST(host.binds == 1);
+    pass(74ms); // the first pause lasts from 75 to 100 ms
+    BOOST_TEST(host.binds == 1);
+    pass(26ms);
+    BOOST_TEST(host.binds == 2);
+    feed.on_bound("{\"v\":9}");
+    BOOST_TEST(next() == "rebound");
+    BOOST_TEST(next() == "current {\"v\":9}");
+}
+
+BOOST_AUTO_TEST_CASE(pauses_grow_while_the_publisher_stays_away_and_begin_anew_once_it_was_there) {
+    bound();
+    lose();
+    auto longest = 100ms;
+    for (int i = 2; i < 12; ++i) {
+        pass(longest * 3 / 4 - 1ms);
+        BOOST_TEST(host.binds == i - 1);
+        pass(longest / 4 + 1ms);
+        BOOST_TEST(host.binds == i);
+        feed.on_refused(errc::unavailable, "cannot connect", clock.now());
+        longest = std::min(longest * 2, 5000ms);
+    }
+    BOOST_TEST(next() == "lost the link was lost");
+    BOOST_TEST(next() == "(nothing)"); // tries that fail are no events
+    pass(5s);
+    feed.on_bound("{}");
+    lose();
+    const auto before = host.binds;
+    pass(100ms);
+    BOOST_TEST(host.binds == before + 1);
+}
+
+BOOST_AUTO_TEST_CASE(the_gap_of_an_outage_is_told) {
+    bound();
+    update(3);
+    lose();
+    pass(100ms);
+    feed.on_bound("{}");
+    update(7);
+    for (const std::string_view expected :
+         {"update 3 {}", "lost the link was lost", "rebound", "gap 3", "update 7 {}"}) {
+        BOOST_TEST(next() == expected);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_restarted_publisher_is_no_gap_and_its_earlier_run_is_not_heard_again) {
+    bound();
+    update(3);
+    lose();
+    pass(100ms);
+    feed.on_bound("{}");
+    update(1, "0000000b");
+    update(4, "0000000a");
+    for (const std::string_view expected :
+         {"update 3 {}", "lost the link was lost", "rebound", "update 1 {}", "(nothing)"}) {
+        BOOST_TEST(next() == expected);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_loss_while_it_is_not_bound_changes_nothing) {
+    const auto result = begin();
+    lose(); // the refusal of the BIND that was under way follows
+    BOOST_TEST(!result->ended);
+    BOOST_TEST(next() == "(nothing)");
+    feed.on_refused(errc::unavailable, "lost", clock.now());
+    BOOST_TEST((result->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_CASE(answers_that_come_too_late_change_nothing) {
+    bound();
+    feed.on_bound("{\"v\":1}");
+    feed.on_refused(errc::failed, "late", clock.now());
+    BOOST_TEST(next() == "(nothing)");
+    BOOST_TEST(!feed.closed());
+    pass(1h);
+    BOOST_TEST(host.binds == 1);
+}
+
+BOOST_AUTO_TEST_CASE(closing_unbinds_once_and_ends_the_wait) {
+    bound();
+    wait w;
+    feed.next(cles::core::feed_machine::event_ptr{&w});
+    feed.close(errc::cancelled);
+    BOOST_TEST(w.text == "failed: the request was withdrawn");
+    BOOST_TEST(feed.closed());
+    feed.close(errc::stopped);
+    BOOST_TEST(host.unbinds == 1);
+    update(1);
+    feed.on_bound("{\"v\":1}");
+    pass(1h);
+    BOOST_TEST(host.binds == 1);
+}
+
+BOOST_AUTO_TEST_CASE(closing_while_it_binds_for_the_first_time_fails_that) {
+    const auto result = begin();
+    feed.close(errc::stopped);
+    BOOST_TEST((result->code == errc::stopped));
+}
+
+BOOST_AUTO_TEST_CASE(closing_while_it_pauses_ends_the_tries) {
+    bound();
+    lose();
+    feed.close(errc::cancelled);
+    BOOST_TEST(deadlines.size() == 0U);
+    pass(1h);
+    BOOST_TEST(host.binds == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_wait_can_be_cancelled_without_harm_to_the_feed) {
+    bound();
+    wait w;
+    feed.next(cles::core::feed_machine::event_ptr{&w});
+    feed.cancel();
+    BOOST_TEST(w.text == "failed: the request was withdrawn");
+    feed.cancel();
+    update(1);
+    BOOST_TEST(next() == "update 1 {}");
+}
+
+BOOST_AUTO_TEST_CASE(an_event_that_is_there_is_delivered_by_the_pump_and_not_inside_next) {
+    bound();
+    update(1);
+    wait w;
+    BOOST_TEST(feed.next(cles::core::feed_machine::event_ptr{&w}));
+    BOOST_TEST(w.text == "(waiting)");
+    update(2); // keeps its place behind the first
+    BOOST_TEST(w.text == "(waiting)");
+    feed.pump();
+    BOOST_TEST(w.text == "update 1 {}");
+    feed.pump(); // nobody waits
+    BOOST_TEST(next() == "update 2 {}");
+}
+
+BOOST_AUTO_TEST_CASE(a_caller_who_does_not_fetch_keeps_the_newest_and_learns_of_a_gap) {
+    fixture small{cles::limits{.feed = 2}};
+    small.bound();
+    for (std::uint64_t seq = 1; seq <= 5; ++seq) {
+        small.update(seq);
+    }
+    BOOST_TEST(small.next() == "gap 3");
+    BOOST_TEST(small.next() == "update 4 {}");
+    BOOST_TEST(small.next() == "update 5 {}");
+}
+
+BOOST_AUTO_TEST_SUITE_END()

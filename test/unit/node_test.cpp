@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/version.hpp>
+
+#include "core/node.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/json/parse.hpp>
+#include <boost/json/serialize.hpp>
+#include <boost/json/value.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace {
+
+using cles::verb;
+using namespace std::chrono_literals;
+
+struct fixture {
+    boost::json::value pull(std::string_view noun) { return boost::json::parse(link.ask("PULL " + std::string{noun})); }
+    std::int64_t metric(std::string_view name) { return pull("self:cles/metrics").at(name).as_int64(); }
+
+    cles::test::test_node node;
+    cles::test::test_link link{node};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(node, fixture)
+
+BOOST_AUTO_TEST_SUITE(description)
+
+BOOST_AUTO_TEST_CASE(pull_self_cles_tells_name_version_protocol_epoch_uptime_endpoints_and_tasks) {
+    node.host->endpoints = {"tcp://127.0.0.1:25370", "unix:///run/car1.sock"};
+    node.pass(1500ms);
+    BOOST_TEST(link.ask("PULL self:cles id=7") ==
+               "id=7 {\"node\":\"car1\",\"version\":\"" + std::string{cles::version} +
+                   "\",\"protocol\":1,\"epoch\":\"5f3a09c1\",\"uptime_ms\":1500,"
+                   "\"endpoints\":[\"tcp://127.0.0.1:25370\",\"unix:///run/car1.sock\"],"
+                   "\"tasks\":[]}\n");
+    BOOST_TEST(link.kind("PULL car1:cles") == "ok");
+}
+
+BOOST_AUTO_TEST_CASE(each_task_is_told_with_its_verb_and_where_there_are_such_description_and_parameters) {
+    node.host->tasks.add(verb::pull, "speed",
+                         {.info = {.description = "in \"m/s\"", .parameters = {"unit", "place"}},
+                          .plain = [](const cles::request&, cles::json_writer&) {}});
+    node.on(verb::push, "speed", std::string{});
+    const auto tasks = boost::json::serialize(pull("self:cles").at("tasks"));
+    BOOST_TEST(tasks == "[{\"verb\":\"PULL\",\"task\":\"speed\",\"description\":\"in "
+                        "\\\"m/s\\\"\",\"parameters\":[\"unit\",\"place\"]},"
+                        "{\"verb\":\"PUSH\",\"task\":\"speed\"}]");
+}
+
+BOOST_AUTO_TEST_CASE(what_can_be_bound_is_told_however_it_came_to_be) {
+    node.open("a_opened");
+    node.on(verb::update, "b_updated", std::string{});
+    node.on(verb::pull, "c_pulled", std::string{});
+    node.publish_now("d_published/fast", "[1]");
+    node.publish_now("c_pulled", "[1]");
+    const auto tasks = boost::json::serialize(pull("self:cles").at("tasks"));
+    BOOST_TEST(tasks == "[{\"verb\":\"BIND\",\"task\":\"a_opened\"},"
+                        "{\"verb\":\"BIND\",\"task\":\"b_updated\"},{\"verb\":\"UPDATE\",\"task\":\"b_updated\"},"
+                        "{\"verb\":\"PULL\",\"task\":\"c_pulled\"},{\"verb\":\"BIND\",\"task\":\"c_pulled\"},"
+                        "{\"verb\":\"BIND\",\"task\":\"d_published\"}]");
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE(metrics)
+
+BOOST_AUTO_TEST_CASE(requests_are_counted_by_verb) {
+    node.on(verb::push, "log", std::string{});
+    link.ask("PUSH car1:log");
+    link.ask("PUSH car1:log reply=no");
+    link.ask("PULL car1:nothing");
+    const auto requests = pull("self:cles/metrics").at("requests");
+    BOOST_TEST(boost::json::serialize(requests) == "{\"PULL\":2,\"PUSH\":2,\"DELEGATE\":0,\"BIND\":0,\"UPDATE\":0}");
+}
+
+BOOST_AUTO_TEST_CASE(errors_are_counted_whether_or_not_they_are_sent) {
+    link.ask("PULL car1:nothing");
+    link.ask("FLY");
+    link.ask("PUSH car1:nothing reply=no");
+    BOOST_TEST(metric("errors") == 2);
+    BOOST_TEST(metric("errors_unsent") == 1);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_dropped_is_counted) {
+    link.ask("id=7 {}");
+    link.ask("UPDATE car2:speed seq=1 epoch=0000000a {}");
+    BOOST_TEST(metric("replies_dropped") == 1);
+    BOOST_TEST(metric("updates_dropped") == 1);
+}
+
+BOOST_AUTO_TEST_CASE(updates_are_counted_on_their_way_out) {
+    node.open("pose");
+    cles::test::test_link binder{node};
+    binder.ask("BIND car1:pose keep=1");
+    node.publish_now("pose", "[1]");
+    binder.takes = false;
+    node.publish("pose", "[2]");
+    node.publish("pose", "[3]");
+    node.drain();
+    BOOST_TEST(metric("updates_published") == 3);
+    BOOST_TEST(metric("updates_delivered") == 1);
+    BOOST_TEST(metric("updates_shed") == 1);
+}
+
+BOOST_AUTO_TEST_CASE(handlers_that_run_are_counted_until_they_let_go) {
+    node.on_later(verb::delegate, "work");
+    link.ask("DELEGATE car1:work id=7");
+    BOOST_TEST(metric("handlers_running") == 1);
+    node.started.at(0)->call->done("[1]");
+    link.take();
+    node.started.clear();
+    BOOST_TEST(metric("handlers_running") == 0);
+}
+
+BOOST_AUTO_TEST_CASE(latency_quantiles_are_told_in_microseconds) {
+    node.on_later(verb::delegate, "work");
+    for (std::size_t i = 0; i < 10; ++i) {
+        link.ask("DELEGATE car1:work id=7");
+        node.pass(8ms);
+        node.started.at(i)->call->done("[1]");
+        link.take();
+    }
+    const auto quantiles = pull("self:cles/metrics").at("handler_us");
+    BOOST_TEST(quantiles.at("samples").as_int64() == 10);
+    for (const std::string_view name : {"p50", "p99", "p999"}) {
+        const auto us = quantiles.at(name).to_number<double>();
+        BOOST_TEST(us >= 8000.0);
+        BOOST_TEST(us <= 9000.0);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(plain_handlers_are_sampled) {
+    node.on(verb::pull, "speed", [this](const cles::request&, cles::json_writer&) { node.clock.advance(2ms); });
+    for (int i = 0; i < 100; ++i) {
+        link.ask("PULL car1:speed");
+    }
+    const auto samples = pull("self:cles/metrics").at("handler_us").at("samples").as_int64();
+    BOOST_TEST(samples > 0);
+    BOOST_TEST(samples < 100);
+}
+
+BOOST_AUTO_TEST_CASE(the_uptime_is_told) {
+    node.pass(2s);
+    BOOST_TEST(metric("uptime_ms") == 2000);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_CASE(an_epoch_is_the_runs_own) { BOOST_TEST(node.host->epoch == "5f3a09c1"); }
+
+BOOST_AUTO_TEST_CASE(a_node_without_a_log_sink_says_nothing) {
+    node.host->say(cles::log_level::warning, "nobody hears this");
+    BOOST_TEST(link.kind("PULL self:cles") == "ok");
+}
+
+BOOST_AUTO_TEST_SUITE_END()

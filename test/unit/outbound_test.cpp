@@ -1,0 +1,265 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/outbound.hpp"
+#include "support/recorded_reply.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+using cles::errc;
+using cles::verb;
+using cles::test::outcome;
+using namespace std::chrono_literals;
+
+struct fixture {
+    std::shared_ptr<outcome> send(std::uint64_t id, verb v = verb::pull, std::chrono::milliseconds limit = 5s,
+                                  cles::core::outbound::progress_function progress = {}) {
+        auto [operation, result] = cles::test::record();
+        const auto now = node.clock.now();
+        link.session().asking().send({.verb = v, .noun = "car2:speed", .id = id}, now + limit, now,
+                                     std::move(operation), std::move(progress));
+        return result;
+    }
+    std::size_t in_flight() { return link.session().asking().in_flight(); }
+    std::uint64_t dropped() { return node.counts().replies_dropped; }
+
+    cles::test::test_node node;
+    cles::test::test_link link{node};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(outbound, fixture)
+
+BOOST_AUTO_TEST_CASE(a_request_goes_out_with_its_id_and_is_answered_by_it) {
+    const auto seven = send(7);
+    const auto eight = send(8, verb::delegate, 30s);
+    BOOST_TEST(link.take() == "PULL car2:speed id=7\nDELEGATE car2:speed id=8\n");
+    BOOST_TEST(link.wakes == 2);
+    BOOST_TEST(node.counts().requests_sent == 2U);
+    BOOST_TEST(link.ask("id=8 {\"b\":2}").empty());
+    BOOST_TEST(eight->ended);
+    BOOST_TEST(eight->text == "{\"b\":2}");
+    BOOST_TEST(!seven->ended);
+    link.ask("id=7 [1]");
+    BOOST_TEST(seven->text == "[1]");
+    BOOST_TEST(in_flight() == 0U);
+    BOOST_TEST(dropped() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_deadline_other_than_the_default_is_told_to_the_peer) {
+    send(1, verb::pull, 1500ms);
+    send(2, verb::delegate, 5s);
+    send(3, verb::pull, 5s);
+    send(4, verb::pull, 24h);
+    BOOST_TEST(link.take() == "PULL car2:speed id=1 deadline=1500\n"
+                              "DELEGATE car2:speed id=2 deadline=5000\n"
+                              "PULL car2:speed id=3\n"
+                              "PULL car2:speed id=4 deadline=86400000\n");
+}
+
+BOOST_AUTO_TEST_CASE(what_is_told_is_what_is_left) {
+    auto [operation, result] = cles::test::record();
+    const auto due = node.clock.now() + 1s;
+    node.pass(400ms);
+    link.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 7}, due, node.clock.now(),
+                                 std::move(operation));
+    BOOST_TEST(link.take() == "PULL car2:speed id=7 deadline=600\n");
+    node.pass(599ms);
+    BOOST_TEST(!result->ended);
+    node.pass(1ms);
+    BOOST_TEST((result->code == errc::deadline));
+}
+
+BOOST_AUTO_TEST_CASE(a_request_without_an_answer_ends_at_its_deadline) {
+    const auto result = send(7, verb::pull, 200ms);
+    node.pass(199ms);
+    BOOST_TEST(!result->ended);
+    node.pass(1ms);
+    BOOST_TEST((result->code == errc::deadline));
+    BOOST_TEST(in_flight() == 0U);
+    link.ask("id=7 {}"); // too late
+    BOOST_TEST(dropped() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_failure_is_told_by_its_code_with_the_peers_words) {
+    const auto result = send(7);
+    link.ask("id=7 {\"error\":\"no_task\",\"message\":\"car2 has no PULL 'speed'\"}");
+    BOOST_TEST((result->code == errc::no_task));
+    BOOST_TEST(result->text == "car2 has no PULL 'speed'");
+}
+
+BOOST_AUTO_TEST_CASE(an_unknown_error_code_counts_as_failed) {
+    const auto result = send(7);
+    link.ask("id=7 {\"error\":\"overheated\",\"message\":\"99\"}");
+    BOOST_TEST((result->code == errc::failed));
+    BOOST_TEST(result->text == "99");
+}
+
+BOOST_AUTO_TEST_CASE(a_reply_is_never_answered_and_counted_where_it_answers_nothing) {
+    const std::string_view stray[] = {"id=7 {}",
+                                      "{}",
+                                      "[1]",
+                                      "id=0 {}",
+                                      "id=x {}",
+                                      "id=7",
+                                      "{",
+                                      "[",
+                                      "id=7 {\"error\":\"busy\"}",
+                                      "id=7 progress=0.5 {}",
+                                      "id=9223372036854775808 {}"};
+    std::uint64_t count = 0;
+    for (const auto line : stray) {
+        BOOST_TEST(link.ask(line).empty(), line);
+        BOOST_TEST(dropped() == ++count, line);
+    }
+    BOOST_TEST(link.closes == 0);
+    BOOST_TEST(link.finishes == 0);
+}
+
+BOOST_AUTO_TEST_CASE(a_malformed_reply_is_dropped_while_its_request_goes_on_waiting) {
+    const auto result = send(7, verb::pull, 200ms);
+    const std::string_view broken[] = {"id=7 {\"a\":", "id=7 {\"a\":1} x",   "id=7 [\xFF]", "id=7 {\"error\":\"busy\"",
+                                       "id=7",         "id=7 progress=2 {}", "id=7 {'a':1}"};
+    std::uint64_t count = 0;
+    for (const auto line : broken) {
+        link.ask(line);
+        BOOST_TEST(!result->ended, line);
+        BOOST_TEST(dropped() == ++count, line);
+    }
+    link.ask("id=7 {\"a\":1}");
+    BOOST_TEST(result->text == "{\"a\":1}");
+}
+
+BOOST_AUTO_TEST_CASE(a_malformed_reply_does_not_move_the_deadline) {
+    const auto result = send(7, verb::pull, 200ms);
+    node.pass(150ms);
+    link.ask("id=7 {");
+    node.pass(49ms);
+    BOOST_TEST(!result->ended);
+    node.pass(1ms);
+    BOOST_TEST((result->code == errc::deadline));
+}
+
+BOOST_AUTO_TEST_CASE(interim_replies_precede_the_result) {
+    std::vector<std::string> reports;
+    const auto result = send(7, verb::delegate, 1s, [&](double fraction, std::string_view body) {
+        reports.push_back(std::to_string(static_cast<int>(fraction * 100)) + " " + std::string{body});
+    });
+    BOOST_TEST(link.take() == "DELEGATE car2:speed id=7 deadline=1000 progress=yes\n");
+    link.ask("id=7 progress=0 {}");
+    link.ask("id=7 progress=0.5 {\"at\":\"x\"}");
+    link.ask("id=7 progress=1 {}");
+    BOOST_TEST(!result->ended);
+    link.ask("id=7 {\"done\":true}");
+    BOOST_TEST(result->text == "{\"done\":true}");
+    const std::vector<std::string> expected{"0 {}", "50 {\"at\":\"x\"}", "100 {}"};
+    BOOST_TEST(reports == expected, boost::test_tools::per_element());
+    BOOST_TEST(dropped() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(progress_does_not_move_the_deadline) {
+    const auto result = send(7, verb::delegate, 200ms, [](double, std::string_view) {});
+    node.pass(150ms);
+    link.ask("id=7 progress=0.9 {}");
+    node.pass(50ms);
+    BOOST_TEST((result->code == errc::deadline));
+}
+
+BOOST_AUTO_TEST_CASE(progress_that_nobody_asked_for_or_that_is_broken_is_dropped) {
+    int reports = 0;
+    const auto quiet = send(7);
+    const auto loud = send(8, verb::delegate, 1s, [&](double, std::string_view) { ++reports; });
+    link.ask("id=7 progress=0.5 {}");
+    link.ask("id=8 progress=0.5 {\"a\":");
+    BOOST_TEST(dropped() == 2U);
+    BOOST_TEST(reports == 0);
+    BOOST_TEST(!quiet->ended);
+    BOOST_TEST(!loud->ended);
+}
+
+BOOST_AUTO_TEST_CASE(cancelling_withdraws_at_the_peer_and_ends_at_once) {
+    const auto result = send(7, verb::delegate);
+    link.take();
+    BOOST_TEST(link.session().asking().cancel(7));
+    BOOST_TEST(link.take() == "PUSH self:cles/cancel/7 reply=no\n");
+    BOOST_TEST((result->code == errc::cancelled));
+    BOOST_TEST(!link.session().asking().cancel(7));
+    BOOST_TEST(link.take().empty());
+    link.ask("id=7 {\"error\":\"cancelled\",\"message\":\"x\"}");
+    BOOST_TEST(dropped() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_report_may_withdraw_its_own_request) {
+    std::shared_ptr<outcome> result;
+    result = send(7, verb::delegate, 1s, [&](double, std::string_view) { link.session().asking().cancel(7); });
+    link.ask("id=7 progress=0.5 {}");
+    BOOST_TEST((result->code == errc::cancelled));
+    BOOST_TEST(in_flight() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_in_flight_when_the_link_is_lost_is_unavailable_at_once) {
+    const auto seven = send(7);
+    const auto eight = send(8, verb::delegate);
+    link.reset();
+    BOOST_TEST((seven->code == errc::unavailable));
+    BOOST_TEST((eight->code == errc::unavailable));
+    BOOST_TEST(seven->text == "the link was lost");
+    BOOST_TEST(node.host->deadlines.size() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_in_flight_when_the_peer_ends_its_stream_is_unavailable_at_once) {
+    const auto result = send(7);
+    link.half_close();
+    BOOST_TEST((result->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_CASE(an_answer_that_is_longer_than_a_line_fails_its_request_and_the_link_ends) {
+    const auto seven = send(7);
+    const auto eight = send(8);
+    link.take();
+    link.overlong("id=7 {\"a\":\"xxxx");
+    BOOST_TEST((seven->code == errc::too_large));
+    BOOST_TEST(!eight->ended);
+    BOOST_TEST(link.take().empty()); // a reply is never answered
+    BOOST_TEST(link.finishes == 1);
+    link.reset();
+    BOOST_TEST((eight->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_CASE(what_waits_can_be_taken_out_without_a_word) {
+    const auto result = send(7);
+    {
+        const auto taken = link.session().asking().take_all();
+        BOOST_TEST(taken.size() == 1U);
+        BOOST_TEST(!result->ended);
+    }
+    BOOST_TEST(result->discarded);
+    BOOST_TEST(in_flight() == 0U);
+    BOOST_TEST(node.host->deadlines.size() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_session_that_goes_discards_what_waits) {
+    std::shared_ptr<outcome> result;
+    {
+        cles::test::test_link other{node};
+        auto [operation, recorded] = cles::test::record();
+        const auto now = node.clock.now();
+        other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 1s, now,
+                                      std::move(operation));
+        result = recorded;
+    }
+    BOOST_TEST(!result->ended);
+    BOOST_TEST(result->discarded);
+    BOOST_TEST(node.host->deadlines.size() == 0U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,313 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
+
+#include "core/publications.hpp"
+#include "support/manual_clock.hpp"
+#include "support/recorded_reply.hpp"
+#include "support/recording_binder.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <cstdint>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using cles::errc;
+using cles::json_writer;
+using cles::test::outcome;
+using cles::test::recording_binder;
+
+struct fixture {
+    explicit fixture(cles::limits wanted = {})
+        : bounds(wanted),
+          all({deadlines, counts, bounds.binding_bytes}, bounds, "car1", "5f3a09c1", [this] { ++wakes; }) {}
+
+    void bind(recording_binder& b, std::string_view path, std::uint32_t keep = 64) {
+        all.open(path).bind(b, {.keep = keep});
+    }
+    void drain() { all.drain(clock.now()); }
+    /// Publishes when there is room. Null: at once.
+    std::shared_ptr<outcome> when_room(std::string_view path, std::string_view body) {
+        auto [operation, result] = cles::test::record();
+        if (all.publish_when_room(path, body, operation)) {
+            operation.release()->offer("{}");
+            return nullptr;
+        }
+        return result;
+    }
+
+    cles::test::manual_clock clock;
+    cles::core::deadline_queue deadlines;
+    cles::core::counters counts;
+    cles::limits bounds;
+    int wakes = 0;
+    cles::core::publications all;
+};
+
+bool is_busy(const cles::error& e) { return e.code() == errc::busy; }
+bool is_too_large(const cles::error& e) { return e.code() == errc::too_large; }
+bool is_failed(const cles::error& e) { return e.code() == errc::failed; }
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(publications, fixture)
+
+BOOST_AUTO_TEST_CASE(an_update_bears_publisher_noun_seq_and_epoch) {
+    recording_binder b;
+    bind(b, "localization/fast");
+    all.publish_body("localization/fast", "{\"utc\":1}");
+    all.publish_body("localization/fast", "{\"utc\":2}");
+    drain();
+    BOOST_TEST(b.take() == "UPDATE car1:localization/fast seq=1 epoch=5f3a09c1 {\"utc\":1}\n"
+                           "UPDATE car1:localization/fast seq=2 epoch=5f3a09c1 {\"utc\":2}\n");
+}
+
+BOOST_AUTO_TEST_CASE(seq_counts_each_nouns_publications_from_1_whether_or_not_anybody_is_bound) {
+    all.publish_body("speed", "{}");
+    all.publish_body("speed", "{}");
+    all.publish_body("speed/left", "{}");
+    recording_binder b;
+    bind(b, "speed");
+    bind(b, "speed/left");
+    all.publish_body("speed", "[]");
+    all.publish_body("speed/left", "[]");
+    drain();
+    BOOST_TEST(b.take() == "UPDATE car1:speed seq=3 epoch=5f3a09c1 []\n"
+                           "UPDATE car1:speed/left seq=2 epoch=5f3a09c1 []\n");
+}
+
+BOOST_AUTO_TEST_CASE(parameters_belong_to_the_noun) {
+    recording_binder b;
+    bind(b, "speed/left");
+    all.publish_body("speed", "{}");
+    all.publish_body("speed/right", "{}");
+    drain();
+    BOOST_TEST(b.take().empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_scalar_is_published_wrapped_and_nothing_as_an_empty_object) {
+    all.publish("speed", [](json_writer& w) { w.value(2.5); });
+    BOOST_TEST(all.find("speed")->last_body() == "{\"value\":2.5}");
+    all.publish("speed", [](json_writer&) {});
+    BOOST_TEST(all.find("speed")->last_body() == "{}");
+    all.publish("speed", [](json_writer& w) { w.value(std::string_view{"{}"}); });
+    BOOST_TEST(all.find("speed")->last_body() == "{\"value\":\"{}\"}");
+}
+
+BOOST_AUTO_TEST_CASE(an_update_longer_than_a_line_is_refused_and_leaves_no_trace) {
+    fixture small{cles::limits{.line = 100}};
+    small.all.publish_body("speed", "[1]");
+    BOOST_CHECK_EXCEPTION(small.all.publish_body("speed", "[\"" + std::string(100, 'x') + "\"]"), cles::error,
+                          is_too_large);
+    BOOST_TEST(small.all.find("speed")->last_body() == "[1]");
+    BOOST_TEST(small.all.find("speed")->seq() == 1U);
+    BOOST_CHECK_EXCEPTION(small.all.publish_body("other", "[\"" + std::string(100, 'x') + "\"]"), cles::error,
+                          is_too_large);
+    BOOST_TEST(!small.all.knows("other"));
+}
+
+BOOST_AUTO_TEST_CASE(an_update_of_exactly_a_lines_length_passes) {
+    const std::string head = "UPDATE car1:speed seq=1 epoch=5f3a09c1 ";
+    fixture small{cles::limits{.line = head.size() + 10}};
+    BOOST_CHECK_EXCEPTION(small.all.publish_body("speed", "[12345678.]"), cles::error, is_too_large);
+    small.all.publish_body("speed", "[12345678]");
+    BOOST_TEST(small.all.find("speed")->seq() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(an_update_whose_first_key_is_error_is_refused) {
+    BOOST_CHECK_EXCEPTION(all.publish_body("speed", "{\"error\":1}"), cles::error, is_failed);
+    BOOST_TEST(all.find("speed") == nullptr);
+    all.publish_body("speed", "{\"a\":1,\"error\":1}");
+    BOOST_TEST(all.find("speed")->seq() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_writer_that_throws_publishes_nothing) {
+    all.publish_body("speed", "[1]");
+    BOOST_CHECK_THROW(all.publish("speed",
+                                  [](json_writer& w) {
+                                      w.value(1.5);
+                                      throw std::runtime_error{"sensor"};
+                                  }),
+                      std::runtime_error);
+    BOOST_TEST(all.find("speed")->last_body() == "[1]");
+    all.publish_body("speed", "[2]");
+    BOOST_TEST(all.find("speed")->last_body() == "[2]");
+    BOOST_TEST(all.find("speed")->seq() == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(a_task_has_so_many_nouns_at_most) {
+    fixture small{cles::limits{.nouns = 3}};
+    small.all.publish_body("speed", "{}");
+    small.all.publish_body("speed/a", "{}");
+    small.all.publish_body("speed/b", "{}");
+    BOOST_CHECK_EXCEPTION(small.all.publish_body("speed/c", "{}"), cles::error, is_busy);
+    BOOST_CHECK_EXCEPTION(small.all.open("speed/c"), cles::error, is_busy);
+    small.all.publish_body("speed/a", "[]"); // what is there goes on
+    small.all.publish_body("load/c", "{}");  // and other tasks too
+    BOOST_TEST(small.all.find("speed/c") == nullptr);
+}
+
+BOOST_AUTO_TEST_CASE(a_noun_that_nobody_needs_any_more_is_forgotten) {
+    fixture small{cles::limits{.nouns = 1}};
+    recording_binder b;
+    small.bind(b, "speed/a");
+    BOOST_TEST(small.all.knows("speed"));
+    auto& noun = *small.all.find("speed/a");
+    small.all.tidy(noun);
+    BOOST_TEST(small.all.find("speed/a") != nullptr); // somebody is bound
+    noun.unbind(b);
+    small.all.tidy(noun);
+    BOOST_TEST(small.all.find("speed/a") == nullptr);
+    BOOST_TEST(!small.all.knows("speed"));
+    small.all.open("speed/b");
+}
+
+BOOST_AUTO_TEST_CASE(a_noun_that_was_published_is_remembered) {
+    all.publish_body("speed", "[1]");
+    all.tidy(*all.find("speed"));
+    BOOST_TEST(all.find("speed")->last_body() == "[1]");
+}
+
+BOOST_AUTO_TEST_CASE(it_asks_to_be_drained_once) {
+    recording_binder b;
+    all.publish_body("speed", "{}");
+    BOOST_TEST(wakes == 0); // nobody is bound
+    BOOST_TEST(!all.dirty());
+    bind(b, "speed");
+    bind(b, "load");
+    all.publish_body("speed", "{}");
+    all.publish_body("speed", "{}");
+    all.publish_body("load", "{}");
+    BOOST_TEST(wakes == 1);
+    BOOST_TEST(all.dirty());
+    drain();
+    BOOST_TEST(!all.dirty());
+    all.publish_body("load", "{}");
+    BOOST_TEST(wakes == 2);
+}
+
+BOOST_AUTO_TEST_CASE(the_tasks_that_were_published_are_known) {
+    recording_binder b;
+    all.publish_body("speed/a", "{}");
+    all.publish_body("speed/b", "{}");
+    all.publish_body("load", "{}");
+    bind(b, "never");
+    const std::vector<std::string> expected{"load", "speed"};
+    BOOST_TEST(all.tasks() == expected, boost::test_tools::per_element());
+    BOOST_TEST(all.knows("speed"));
+    BOOST_TEST(!all.knows("speed/a"));
+    BOOST_TEST(!all.knows("spee"));
+}
+
+BOOST_AUTO_TEST_SUITE(when_room)
+
+BOOST_AUTO_TEST_CASE(it_publishes_at_once_where_there_is_room) {
+    BOOST_TEST(when_room("speed", "[1]") == nullptr);
+    BOOST_TEST(all.find("speed")->last_body() == "[1]");
+}
+
+BOOST_AUTO_TEST_CASE(it_waits_until_every_binders_queue_has_room) {
+    recording_binder slow;
+    recording_binder quick;
+    bind(slow, "speed", 2);
+    bind(quick, "speed", 2);
+    slow.room = 0;
+    BOOST_TEST(when_room("speed", "[1]") == nullptr);
+    BOOST_TEST(when_room("speed", "[2]") == nullptr);
+    drain();
+    const auto third = when_room("speed", "[3]");
+    BOOST_REQUIRE(third != nullptr);
+    BOOST_TEST(!third->ended);
+    BOOST_TEST(all.find("speed")->seq() == 2U);
+    slow.room = 100;
+    drain(); // nothing is new, so that nothing is drained
+    all.find("speed")->drain(clock.now());
+    all.admit(*all.find("speed"));
+    BOOST_TEST(third->ended);
+    BOOST_TEST(!third->code);
+    BOOST_TEST(all.find("speed")->seq() == 3U);
+    drain();
+    BOOST_TEST(slow.take().ends_with("seq=3 epoch=5f3a09c1 [3]\n"));
+    BOOST_TEST(counts.updates_shed == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(those_that_wait_are_published_in_their_order) {
+    recording_binder slow;
+    bind(slow, "speed", 1);
+    slow.room = 0;
+    when_room("speed", "[1]");
+    drain();
+    const auto second = when_room("speed", "[2]");
+    const auto third = when_room("speed", "[3]");
+    BOOST_REQUIRE((second && third));
+    slow.room = 100;
+    auto& noun = *all.find("speed");
+    noun.drain(clock.now());
+    all.admit(noun);
+    BOOST_TEST(second->ended);
+    BOOST_TEST(!third->ended); // the queue is full again
+    drain();
+    BOOST_TEST(third->ended);
+    drain();
+    BOOST_TEST(slow.take() == "UPDATE car1:speed seq=1 epoch=5f3a09c1 [1]\n"
+                              "UPDATE car1:speed seq=2 epoch=5f3a09c1 [2]\n"
+                              "UPDATE car1:speed seq=3 epoch=5f3a09c1 [3]\n");
+}
+
+BOOST_AUTO_TEST_CASE(one_that_comes_later_does_not_overtake) {
+    recording_binder slow;
+    bind(slow, "speed", 1);
+    slow.room = 0;
+    when_room("speed", "[1]");
+    drain();
+    when_room("speed", "[2]");
+    slow.room = 100;
+    all.find("speed")->drain(clock.now()); // room, but nobody has been let in yet
+    BOOST_TEST(when_room("speed", "[3]") != nullptr);
+}
+
+BOOST_AUTO_TEST_CASE(one_that_cannot_be_published_fails_when_its_turn_comes) {
+    fixture small{cles::limits{.line = 100}};
+    recording_binder slow;
+    small.bind(slow, "speed", 1);
+    slow.room = 0;
+    small.when_room("speed", "[1]");
+    small.drain();
+    const auto large = small.when_room("speed", "[\"" + std::string(100, 'x') + "\"]");
+    const auto next = small.when_room("speed", "[3]");
+    slow.room = 100;
+    auto& noun = *small.all.find("speed");
+    noun.drain(small.clock.now());
+    small.all.admit(noun);
+    BOOST_TEST((large->code == errc::too_large));
+    BOOST_TEST(next->ended);
+    BOOST_TEST(!next->code);
+}
+
+BOOST_AUTO_TEST_CASE(what_waits_can_be_taken_out_when_the_node_stops) {
+    recording_binder slow;
+    bind(slow, "speed", 1);
+    slow.room = 0;
+    when_room("speed", "[1]");
+    drain();
+    const auto second = when_room("speed", "[2]");
+    {
+        auto taken = all.take_waiters();
+        BOOST_TEST(taken.size() == 1U);
+        BOOST_TEST(!second->ended);
+        taken.front().release()->fail(errc::stopped, "the service has been stopped");
+    }
+    BOOST_TEST((second->code == errc::stopped));
+    BOOST_TEST(all.take_waiters().empty());
+    BOOST_TEST(all.find("speed")->seq() == 1U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE_END()

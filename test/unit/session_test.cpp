@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/session.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+using cles::feed_event;
+using cles::verb;
+
+/// What a binder on the link hears.
+class listener final : public cles::core::subscription {
+  public:
+    using subscription::subscription;
+    std::string heard;
+
+  private:
+    void on_event(const cles::detail::raw_event& event) override {
+        if (event.kind == feed_event::gap) {
+            heard += "gap" + std::to_string(event.missed) + " ";
+        } else {
+            heard += std::to_string(event.seq) + std::string{event.body} + " ";
+        }
+    }
+};
+
+struct fixture {
+    fixture() {
+        node.on(verb::pull, "speed", "{\"v\":3}");
+        node.on(verb::push, "log", std::string{});
+    }
+    const cles::core::counters& counts() { return node.counts(); }
+
+    cles::test::test_node node;
+    cles::test::test_link link{node};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(session, fixture)
+
+BOOST_AUTO_TEST_SUITE(lines)
+
+BOOST_AUTO_TEST_CASE(a_request_is_answered_with_one_line) {
+    BOOST_TEST(link.ask("PULL car1:speed") == "{\"v\":3}\n");
+    BOOST_TEST(link.ask("PULL car1:speed id=7") == "id=7 {\"v\":3}\n");
+}
+
+BOOST_AUTO_TEST_CASE(a_cr_before_the_lf_is_dropped_and_so_is_sp_at_either_end) {
+    for (const std::string_view line :
+         {"PULL car1:speed\r", "  PULL car1:speed", "PULL car1:speed   ", "  PULL  car1:speed  \r"}) {
+        BOOST_TEST(link.ask(line) == "{\"v\":3}\n", "'" << line << "'");
+    }
+}
+
+BOOST_AUTO_TEST_CASE(an_empty_line_is_ignored) {
+    for (const std::string_view line : {"", "\r", " ", "   \r"}) {
+        BOOST_TEST(link.ask(line).empty(), "'" << line << "'");
+    }
+    BOOST_TEST(counts().errors == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(tab_is_not_sp) {
+    BOOST_TEST(link.kind("PULL\tcar1:speed") == "bad_request");
+    BOOST_TEST(link.kind("\t") == "bad_request");
+    BOOST_TEST(link.kind("PULL car1:speed\t") == "bad_request");
+}
+
+BOOST_AUTO_TEST_CASE(verbs_come_in_any_case_and_names_do_not) {
+    BOOST_TEST(link.kind("pull car1:speed") == "ok");
+    BOOST_TEST(link.kind("PuLl car1:speed") == "ok");
+    BOOST_TEST(link.kind("PULL car1:Speed") == "no_task");
+    BOOST_TEST(link.kind("PULL Car1:speed") == "no_target");
+}
+
+BOOST_AUTO_TEST_CASE(requests_and_replies_cross_one_link_in_both_directions) {
+    auto [operation, result] = cles::test::record();
+    const auto now = node.clock.now();
+    link.session().asking().send({.verb = verb::pull, .noun = "car2:load", .id = 7}, now + std::chrono::seconds{5}, now,
+                                 std::move(operation));
+    BOOST_TEST(link.take() == "PULL car2:load id=7\n");
+    BOOST_TEST(link.ask("PULL car1:speed id=7") == "id=7 {\"v\":3}\n"); // ids of the two directions do not meet
+    BOOST_TEST(!result->ended);
+    link.ask("id=7 [4]");
+    BOOST_TEST(result->text == "[4]");
+}
+
+BOOST_AUTO_TEST_CASE(a_reply_is_never_answered) {
+    for (const std::string_view line :
+         {"{}", "[", "id=7 {}", "id=", "id=7 5", "{\"error\":\"busy\"}", "id=x PULL car1:speed"}) {
+        BOOST_TEST(link.ask(line).empty(), line);
+    }
+    BOOST_TEST(counts().replies_dropped == 7U);
+    BOOST_TEST(counts().errors == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_web_clients_line_closes_the_link_unanswered) {
+    for (const std::string_view line :
+         {"POST / HTTP/1.1", "GET /cles HTTP/1.0\r", "Host: localhost:25370", "host: x", "PULL car1:speed HTTP/1.1"}) {
+        cles::test::test_link web{node};
+        BOOST_TEST(web.ask(line).empty(), line);
+        BOOST_TEST(web.closes == 1, line);
+        BOOST_TEST(web.ask("PULL car1:speed").empty(), line); // whatever follows it is not read
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_web_client_ends_what_ran_before_it) {
+    node.on_later(verb::delegate, "work");
+    link.ask("DELEGATE car1:work id=7");
+    BOOST_TEST(link.ask("POST / HTTP/1.1").empty());
+    BOOST_TEST(node.started.at(0)->stopped);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE(updates)
+
+BOOST_AUTO_TEST_CASE(an_update_is_taken_only_from_where_the_binder_bound) {
+    listener speed{"car2", "speed", false};
+    link.session().bound().add(speed);
+    link.ask("UPDATE car2:speed seq=1 epoch=0000000a {\"v\":1}");
+    link.ask("UPDATE car3:speed seq=2 epoch=0000000a {\"v\":2}");
+    link.ask("UPDATE car2:speed/left seq=3 epoch=0000000a {\"v\":3}");
+    link.ask("UPDATE car2:load seq=4 epoch=0000000a {\"v\":4}");
+    BOOST_TEST(speed.heard == "1{\"v\":1} ");
+    BOOST_TEST(counts().updates_received == 1U);
+    BOOST_TEST(counts().updates_dropped == 3U);
+
+    cles::test::test_link other{node};
+    other.ask("UPDATE car2:speed seq=5 epoch=0000000a {}");
+    BOOST_TEST(speed.heard == "1{\"v\":1} ");
+}
+
+BOOST_AUTO_TEST_CASE(an_update_is_never_answered) {
+    for (const std::string_view line :
+         {"UPDATE car2:speed seq=1 epoch=0000000a {}", "UPDATE car2:speed seq=2 epoch=0000000a id=7 {}",
+          "UPDATE car1:speed seq=3 epoch=0000000a {bad", "UPDATE car2:speed seq=4 epoch=0000000a {\"error\":\"x\"}",
+          "UPDATE car2speed seq=5 epoch=0000000a {}", "UPDATE car2:speed seq=6 epoch=0000000a deadline=0 {}",
+          "UPDATE car2:speed seq=7 epoch=0000000a must_x=1 id=8 {}"}) {
+        BOOST_TEST(link.ask(line).empty(), line);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(an_update_whose_body_is_broken_is_dropped_and_shows_as_a_gap) {
+    listener speed{"car2", "speed", false};
+    link.session().bound().add(speed);
+    link.ask("UPDATE car2:speed seq=1 epoch=0000000a {}");
+    link.ask("UPDATE car2:speed seq=2 epoch=0000000a {\"v\":}");
+    link.ask("UPDATE car2:speed seq=3 epoch=0000000a {\"error\":1}");
+    link.ask("UPDATE car2:speed seq=4 epoch=0000000a [\"\xFF\"]");
+    link.ask("UPDATE car2:speed seq=5 epoch=0000000a {}");
+    BOOST_TEST(speed.heard == "1{} gap3 5{} ");
+    BOOST_TEST(counts().updates_dropped == 3U);
+}
+
+BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_dropped_and_counted) {
+    listener speed{"car2", "speed", false};
+    link.session().bound().add(speed);
+    link.ask("UPDATE car2:speed seq=5 epoch=0000000a");
+    link.ask("UPDATE car2:speed seq=5 epoch=0000000a");
+    link.ask("UPDATE car2:speed seq=4 epoch=0000000a");
+    BOOST_TEST(speed.heard == "5{} ");
+    BOOST_TEST(counts().updates_dropped == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(an_update_of_a_restarted_publisher_is_news_and_what_its_earlier_run_said_is_not) {
+    listener speed{"car2", "speed", false};
+    link.session().bound().add(speed);
+    link.ask("UPDATE car2:speed seq=90 epoch=0000000a");
+    link.ask("UPDATE car2:speed seq=2 epoch=0000000b");
+    link.ask("UPDATE car2:speed seq=91 epoch=0000000a");
+    BOOST_TEST(speed.heard == "90{} 2{} ");
+}
+
+BOOST_AUTO_TEST_CASE(nouns_of_updates_are_compared_decoded) {
+    listener log{"car2", "log/aA", false};
+    link.session().bound().add(log);
+    link.ask("UPDATE car2:log/a%41 seq=1 epoch=0000000a");
+    BOOST_TEST(log.heard == "1{} ");
+}
+
+BOOST_AUTO_TEST_CASE(an_update_with_only_one_of_seq_and_epoch_is_bad_request) {
+    BOOST_TEST(link.kind("UPDATE car1:speed seq=1 {}") == "bad_request");
+    BOOST_TEST(link.kind("UPDATE car1:speed epoch=0000000a {}") == "bad_request");
+    BOOST_TEST(link.kind("UPDATE car1:speed epoch=0000000a seq=0 id=7 {}") == "id=7 bad_request");
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE_END()

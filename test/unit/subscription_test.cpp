@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/subscription.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+using cles::feed_event;
+
+class recorder final : public cles::core::subscription {
+  public:
+    using subscription::subscription;
+
+    std::vector<std::string> events;
+
+  private:
+    void on_event(const cles::detail::raw_event& event) override {
+        if (event.kind == feed_event::gap) {
+            events.push_back("gap of " + std::to_string(event.missed));
+        } else {
+            events.push_back(std::string{event.publisher} + " " + std::to_string(event.seq) + " " +
+                             std::string{event.body});
+        }
+    }
+};
+
+bool take(recorder& s, std::string_view line) {
+    cles::protocol::request_line update;
+    cles::protocol::malformed_request error;
+    BOOST_REQUIRE(cles::protocol::parse_request(line, update, error));
+    return s.take(update);
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(subscription)
+
+BOOST_AUTO_TEST_CASE(an_update_is_handed_on_with_its_publisher_seq_and_body) {
+    recorder s{"car1", "speed", false};
+    BOOST_TEST(take(s, "UPDATE car1:speed seq=17 epoch=0000000a {\"v\":3}"));
+    BOOST_TEST(s.events == std::vector<std::string>{"car1 17 {\"v\":3}"}, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(a_missing_body_counts_as_an_empty_object) {
+    recorder s{"car1", "speed", false};
+    BOOST_TEST(take(s, "UPDATE car1:speed seq=1 epoch=0000000a"));
+    BOOST_TEST(s.events == std::vector<std::string>{"car1 1 {}"}, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(a_gap_comes_before_the_update_that_shows_it) {
+    recorder s{"car1", "speed", false};
+    take(s, "UPDATE car1:speed seq=1 epoch=0000000a");
+    take(s, "UPDATE car1:speed seq=4 epoch=0000000a");
+    const std::vector<std::string> expected{"car1 1 {}", "gap of 2", "car1 4 {}"};
+    BOOST_TEST(s.events == expected, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(what_every_thins_is_no_gap) {
+    recorder s{"car1", "speed", true};
+    take(s, "UPDATE car1:speed seq=1 epoch=0000000a");
+    take(s, "UPDATE car1:speed seq=4 epoch=0000000a");
+    const std::vector<std::string> expected{"car1 1 {}", "car1 4 {}"};
+    BOOST_TEST(s.events == expected, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_not_handed_on) {
+    recorder s{"car1", "speed", false};
+    take(s, "UPDATE car1:speed seq=5 epoch=0000000a");
+    BOOST_TEST(!take(s, "UPDATE car1:speed seq=5 epoch=0000000a"));
+    BOOST_TEST(!take(s, "UPDATE car1:speed seq=4 epoch=0000000a"));
+    BOOST_TEST(s.events.size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(one_subscription_per_publisher_and_noun) {
+    cles::core::subscriptions all;
+    recorder first{"car1", "speed", false};
+    recorder second{"car1", "speed", false};
+    recorder other_node{"car2", "speed", false};
+    recorder other_noun{"car1", "speed/fast", false};
+    BOOST_TEST(all.empty());
+    BOOST_TEST(all.add(first));
+    BOOST_TEST(!all.add(second));
+    BOOST_TEST(all.add(other_node));
+    BOOST_TEST(all.add(other_noun));
+    BOOST_TEST(all.find("car1", "speed") == &first);
+    BOOST_TEST(all.find("car2", "speed") == &other_node);
+    BOOST_TEST(all.find("car1", "speed/fast") == &other_noun);
+    BOOST_TEST(all.find("car3", "speed") == nullptr);
+    BOOST_TEST(all.find("car1", "speed/slow") == nullptr);
+}
+
+BOOST_AUTO_TEST_CASE(what_was_removed_is_found_no_more) {
+    cles::core::subscriptions all;
+    recorder one{"car1", "speed", false};
+    recorder two{"car2", "speed", false};
+    all.add(one);
+    all.add(two);
+    all.remove(one);
+    BOOST_TEST(all.find("car1", "speed") == nullptr);
+    BOOST_TEST(all.find("car2", "speed") == &two);
+    all.remove(one); // once more does no harm
+    all.remove(two);
+    BOOST_TEST(all.empty());
+}
+
+BOOST_AUTO_TEST_CASE(self_is_whoever_is_at_the_other_end) {
+    cles::core::subscriptions all;
+    recorder by_self{"self", "speed", false};
+    recorder by_name{"car1", "speed", false};
+    all.add(by_self);
+    BOOST_TEST(all.find("car1", "speed") == &by_self);
+    all.add(by_name);
+    BOOST_TEST(all.find("car1", "speed") == &by_name); // the name goes first
+    BOOST_TEST(all.find("car2", "speed") == &by_self);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
