@@ -323,6 +323,53 @@ BOOST_DATA_TEST_CASE(a_context_may_go_with_everything_in_flight, carriers, kind)
     BOOST_TEST(true);
 }
 
+// Of two services that talk, the one whose context is somebody else's may go with that context, at any moment.
+BOOST_DATA_TEST_CASE(a_peers_context_may_go_first, carriers, kind) {
+    for (int turns = 0; turns < 12; ++turns) {
+        asio::io_context io;
+        cles::service car{io, listening("car1", kind)};
+        car.on_pull("speed", [] { return 42; });
+        answer<int> early;
+        {
+            asio::io_context other;
+            cles::service tower{other, knowing("tower", car)};
+            tower.async_pull<int>("car1:speed", early.take());
+            for (int i = 0; i < turns; ++i) {
+                other.poll_one();
+                io.poll_one();
+            }
+        }
+        run_ready(io);
+        cles::service tower{io, knowing("tower", car)};
+        answer<int> a;
+        tower.async_pull<int>("car1:speed", a.take());
+        run_until(io, [&] { return a.done(); });
+        BOOST_TEST(a.value == 42);
+    }
+}
+
+BOOST_DATA_TEST_CASE(a_publishers_context_may_go_first, carriers, kind) {
+    for (int turns = 0; turns < 12; ++turns) {
+        asio::io_context io;
+        auto other = std::make_unique<asio::io_context>();
+        auto car = std::make_unique<cles::service>(*other, listening("car1", kind));
+        car->on_bind("place");
+        cles::service tower{io, knowing("tower", *car)};
+        feed_log feed;
+        feed.bind(tower, "car1:place");
+        for (int i = 0; i < turns; ++i) {
+            other->poll_one();
+            io.poll_one();
+        }
+        car.reset();
+        other.reset();
+        answer<int> a;
+        tower.async_pull<int>("car1:speed", a.take());
+        run_until(io, [&] { return a.done(); });
+        BOOST_TEST(a.code.failed());
+    }
+}
+
 BOOST_DATA_TEST_CASE(stopping_twice_and_asking_a_stopped_service_fails_with_stopped, carriers, kind) {
     asio::io_context io;
     busy_nodes n{io, kind};

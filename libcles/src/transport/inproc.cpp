@@ -9,6 +9,7 @@
 #include <boost/asio/post.hpp>
 
 #include <map>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <utility>
@@ -18,25 +19,48 @@ namespace asio = boost::asio;
 
 namespace {
 
-class inproc_acceptor;
-
 // Where dialling threads leave their links for a listener.
-struct doorway {
-    doorway(asio::any_io_executor where, url address) : executor(std::move(where)), local(std::move(address)) {}
+class doorway : public std::enable_shared_from_this<doorway> {
+  public:
+    doorway(asio::any_io_executor executor, url address, const limits& bounds)
+        : local(std::move(address)), executor_(std::move(executor)), bounds_(bounds) {}
 
-    const asio::any_io_executor executor;
     const url local;
-    // Both are used on the executor only.
-    std::function<void(link_ptr)> on_link{};
-    bool closed = false;
 
+    void open(std::function<void(link_ptr)> on_link) { on_link_ = std::move(on_link); }
+
+    // The executor's context may go from now on.
+    void shut() {
+        const std::lock_guard lock{mutex_};
+        executor_ = nullptr;
+        on_link_ = nullptr;
+    }
+
+    // By any thread; false where the door has been shut.
+    bool admit(const std::shared_ptr<inproc_link>& near) {
+        const std::lock_guard lock{mutex_};
+        if (!executor_) {
+            return false;
+        }
+        auto far = std::make_shared<inproc_link>(executor_, to_string(local), bounds_);
+        inproc_link::join(near, far);
+        asio::post(executor_, [self = shared_from_this(), far] { self->come_in(far); });
+        return true;
+    }
+
+  private:
     void come_in(link_ptr arrived) {
-        if (closed || !on_link) {
+        if (!on_link_) {
             arrived->close();
         } else {
-            on_link(std::move(arrived));
+            on_link_(std::move(arrived));
         }
     }
+
+    std::mutex mutex_;
+    asio::any_io_executor executor_;
+    limits bounds_;
+    std::function<void(link_ptr)> on_link_; // used on the executor only
 };
 
 // The listeners of the process by name; services may be made on several threads.
@@ -80,11 +104,10 @@ class inproc_acceptor final : public acceptor {
     ~inproc_acceptor() override { close(); }
 
     [[nodiscard]] url local() const override { return door_->local; }
-    void start(std::function<void(link_ptr)> on_link) override { door_->on_link = std::move(on_link); }
+    void start(std::function<void(link_ptr)> on_link) override { door_->open(std::move(on_link)); }
     void close() override {
         all_doorways().remove(door_);
-        door_->closed = true;
-        door_->on_link = nullptr;
+        door_->shut();
     }
 
   private:
@@ -95,8 +118,9 @@ class inproc_transport final : public link_transport {
   public:
     [[nodiscard]] bool is_exposed(const url&) const override { return false; }
 
-    std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where, const limits&) override {
-        auto door = std::make_shared<doorway>(executor, where);
+    std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
+                                     const limits& bounds) override {
+        auto door = std::make_shared<doorway>(executor, where, bounds);
         if (!all_doorways().add(door)) {
             throw boost::system::system_error{asio::error::address_in_use};
         }
@@ -105,29 +129,25 @@ class inproc_transport final : public link_transport {
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
-        auto given_up = std::make_shared<bool>(false);
-        auto give_up = [given_up] { *given_up = true; };
+        auto near = std::make_shared<inproc_link>(executor, to_string(where), bounds);
         const auto door = all_doorways().find(where.host);
-        if (!door) {
-            asio::post(executor, [given_up, done = std::move(done)] {
-                if (!*given_up) {
-                    done(asio::error::connection_refused, nullptr);
-                }
-            });
-            return give_up;
+        if (!door || !door->admit(near)) {
+            near->close();
+            near.reset();
         }
-        const auto near = std::make_shared<inproc_link>(executor, to_string(where), bounds);
-        const auto far = std::make_shared<inproc_link>(door->executor, to_string(where), bounds);
-        inproc_link::join(near, far);
-        asio::post(door->executor, [door, far] { door->come_in(far); });
+        auto given_up = std::make_shared<bool>(false);
         asio::post(executor, [given_up, near, done = std::move(done)] {
             if (*given_up) {
-                near->close();
-            } else {
+                if (near) {
+                    near->close();
+                }
+            } else if (near) {
                 done({}, near);
+            } else {
+                done(asio::error::connection_refused, nullptr);
             }
         });
-        return give_up;
+        return [given_up] { *given_up = true; };
     }
 };
 

@@ -23,18 +23,23 @@ inproc_link::inproc_link(asio::any_io_executor executor, std::string address, co
                                             .name = {},
                                             .uid = {},
                                             .local = true},
-      bounds_(bounds), patience_(executor_) {}
+      bounds_(bounds), inlet_(std::make_shared<mailbox>(executor_)), patience_(executor_) {}
+
+inproc_link::~inproc_link() { inproc_link::close(); }
 
 void inproc_link::join(const std::shared_ptr<inproc_link>& a, const std::shared_ptr<inproc_link>& b) {
     a->other_ = b;
     b->other_ = a;
-    a->other_executor_ = b->executor_;
-    b->other_executor_ = a->executor_;
+    a->outlet_ = b->inlet_;
+    b->outlet_ = a->inlet_;
 }
 
 template <class F>
 void inproc_link::tell_other(F action) {
-    asio::post(other_executor_, [weak = other_, action = std::move(action)]() mutable {
+    if (!outlet_) {
+        return;
+    }
+    outlet_->post([weak = other_, action = std::move(action)]() mutable {
         if (const auto other = weak.lock()) {
             action(*other);
         }
@@ -281,9 +286,8 @@ void inproc_link::close() {
     patience_.cancel();
     discard_input();
     owner_.reset();
-    if (other_executor_) {
-        tell_other([](inproc_link& other) { other.on_other_closed(); });
-    }
+    inlet_->shut();
+    tell_other([](inproc_link& other) { other.on_other_closed(); });
 }
 
 } // namespace cles::transport

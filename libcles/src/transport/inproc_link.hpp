@@ -3,6 +3,8 @@
 
 #include <cles/link.hpp>
 
+#include "transport/mailbox.hpp"
+
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/steady_timer.hpp>
 
@@ -21,6 +23,9 @@ namespace cles::transport {
 class inproc_link final : public link, public std::enable_shared_from_this<inproc_link> {
   public:
     inproc_link(boost::asio::any_io_executor executor, std::string address, const limits& bounds);
+    inproc_link(const inproc_link&) = delete;
+    inproc_link& operator=(const inproc_link&) = delete;
+    ~inproc_link() override;
 
     /// Joins two ends.
     static void join(const std::shared_ptr<inproc_link>& a, const std::shared_ptr<inproc_link>& b);
@@ -64,9 +69,9 @@ class inproc_link final : public link, public std::enable_shared_from_this<inpro
     boost::asio::any_io_executor executor_;
     identity peer_;
     limits bounds_;
-    // The other end; it is reached only by posting to its executor, which stays known.
-    std::weak_ptr<inproc_link> other_;
-    boost::asio::any_io_executor other_executor_;
+    std::weak_ptr<inproc_link> other_; // reached by way of its mailbox alone
+    std::shared_ptr<mailbox> outlet_;
+    std::shared_ptr<mailbox> inlet_; // shut when this end closes: its context may go before the other end
     std::shared_ptr<link_events> owner_;
     boost::asio::steady_timer patience_;
     std::string output_;
