@@ -29,7 +29,10 @@ class counting_host final : public cles::core::feed_host {
 /// One wait for an event. It lives on the stack of its test, which is why nothing deletes it.
 class wait final : public cles::detail::pending_event {
   public:
-    void deliver(const cles::detail::raw_event& event) override {
+    bool deliver(const cles::detail::raw_event& event) override {
+        if (!event.checked && !cles::is_valid_json(event.body)) {
+            return false;
+        }
         switch (event.kind) {
         case feed_event::current: text = "current " + std::string{event.body}; break;
         case feed_event::update: text = "update " + std::to_string(event.seq) + " " + std::string{event.body}; break;
@@ -37,6 +40,7 @@ class wait final : public cles::detail::pending_event {
         case feed_event::lost: text = "lost " + std::string{event.text}; break;
         case feed_event::rebound: text = "rebound"; break;
         }
+        return true;
     }
     void fail(boost::system::error_code code, std::string_view) override { text = "failed: " + code.message(); }
     void discard() noexcept override {}

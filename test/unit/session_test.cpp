@@ -21,12 +21,16 @@ class listener final : public cles::core::subscription {
     std::string heard;
 
   private:
-    void on_event(const cles::detail::raw_event& event) override {
+    bool on_event(const cles::detail::raw_event& event) override {
+        if (!cles::is_valid_json(event.body)) {
+            return false;
+        }
         if (event.kind == feed_event::gap) {
             heard += "gap" + std::to_string(event.missed) + " ";
         } else {
             heard += std::to_string(event.seq) + std::string{event.body} + " ";
         }
+        return true;
     }
 };
 
@@ -157,6 +161,40 @@ BOOST_AUTO_TEST_CASE(an_update_whose_body_is_broken_is_dropped_and_shows_as_a_ga
     link.ask("UPDATE car2:speed seq=5 epoch=0000000a {}");
     BOOST_TEST(speed.heard == "1{} gap3 5{} ");
     BOOST_TEST(counts().updates_dropped == 3U);
+}
+
+BOOST_AUTO_TEST_CASE(a_stream_of_updates_is_judged_line_by_line) {
+    listener speed{"car2", "speed", false};
+    link.session().bound().add(speed);
+    for (int seq = 1; seq <= 4; ++seq) {
+        link.ask("UPDATE car2:speed seq=" + std::to_string(seq) + " epoch=0000000a {}");
+    }
+    link.ask("UPDATE car2:speed seq=4 epoch=0000000a {}");
+    link.ask("UPDATE car2:speed seq=5 epoch=0000000a {\"v\":}");
+    link.ask("UPDATE car2:speed seq=6 epoch=0000000a {\"error\":1}");
+    link.ask("UPDATE car2:speed seq=7 epoch=0000000a {}\r");
+    link.ask("UPDATE car2:speed seq=8 epoch=0000000a {}");
+    link.ask("UPDATE car2:load seq=9 epoch=0000000a {}");
+    link.ask("UPDATE car2:speed seq=1 epoch=0000000b {}");
+    link.ask("UPDATE car2:speed seq=9 epoch=0000000a {}");
+    link.ask("UPDATE car2:speed seq=2 epoch=0000000b {}");
+    BOOST_TEST(speed.heard == "1{} 2{} 3{} 4{} gap2 7{} 8{} 1{} 2{} ");
+    BOOST_TEST(counts().updates_received == 8U);
+    BOOST_TEST(counts().updates_dropped == 5U);
+
+    link.session().bound().remove(speed);
+    link.ask("UPDATE car2:speed seq=3 epoch=0000000b {}");
+    BOOST_TEST(counts().updates_dropped == 6U);
+    listener again{"self", "speed", false};
+    link.session().bound().add(again);
+    for (int seq = 4; seq <= 7; ++seq) {
+        link.ask("UPDATE car2:speed seq=" + std::to_string(seq) + " epoch=0000000b {}");
+    }
+    listener closer{"car2", "speed", false};
+    link.session().bound().add(closer);
+    link.ask("UPDATE car2:speed seq=8 epoch=0000000b {}");
+    BOOST_TEST(again.heard == "4{} 5{} 6{} 7{} ");
+    BOOST_TEST(closer.heard == "8{} ");
 }
 
 BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_dropped_and_counted) {

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/json_reader.hpp>
+
 #include "core/subscription.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -18,13 +20,17 @@ class recorder final : public cles::core::subscription {
     std::vector<std::string> events;
 
   private:
-    void on_event(const cles::detail::raw_event& event) override {
+    bool on_event(const cles::detail::raw_event& event) override {
+        if (!cles::is_valid_json(event.body)) {
+            return false;
+        }
         if (event.kind == feed_event::gap) {
             events.push_back("gap of " + std::to_string(event.missed));
         } else {
             events.push_back(std::string{event.publisher} + " " + std::to_string(event.seq) + " " +
                              std::string{event.body});
         }
+        return true;
     }
 };
 

@@ -51,32 +51,29 @@ class feed_control {
     [[nodiscard]] virtual const boost::asio::any_io_executor& executor() const = 0;
 };
 
+/// False where the body is no JSON. What a type reads of it is checked by reading it.
 template <class T>
-boost::system::error_code fill(const raw_event& event, feed_item<T>& item, std::string& why) {
+bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code& code, std::string& why) {
     item.kind = event.kind;
     item.publisher = event.publisher;
     item.seq = event.seq;
     item.missed = event.missed;
     item.text = event.text;
     if (!item.has_value()) {
-        return {};
+        return true;
     }
-    bool fits = false;
-    if constexpr (std::is_same_v<T, json_text>) { // checked when it came
+    constexpr std::string_view what = "the update";
+    if constexpr (std::is_same_v<T, json_text>) {
         item.value.text = event.body;
-        fits = true;
+        return event.checked || is_valid_json(event.body, answer_depth);
     } else if constexpr (comes_wrapped<T>) {
         wrapped<T> value{};
-        fits = from_json(event.body, value, &why);
+        const auto verdict = read_result(event.body, value, code, why, what);
         item.value = std::move(value.value);
+        return verdict == pending::verdict::completed;
     } else {
-        fits = from_json(event.body, item.value, &why);
+        return read_result(event.body, item.value, code, why, what) == pending::verdict::completed;
     }
-    if (fits) {
-        return {};
-    }
-    why.insert(0, "the update does not fit: ");
-    return errc::conversion;
 }
 
 template <class T, bool Throws, class Handler>
@@ -85,11 +82,15 @@ class event_operation final : public pending_event {
     event_operation(Handler handler, const boost::asio::any_io_executor& service)
         : complete_(std::move(handler), service) {}
 
-    void deliver(const raw_event& event) override {
+    bool deliver(const raw_event& event) override {
         feed_item<T> item;
         std::string why;
-        const auto code = fill(event, item, why);
+        boost::system::error_code code;
+        if (!fill(event, item, code, why)) {
+            return false;
+        }
         end_operation(this, complete_, code, why, std::move(item));
+        return true;
     }
 
     void fail(boost::system::error_code code, std::string_view message) override {

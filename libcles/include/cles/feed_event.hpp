@@ -23,6 +23,7 @@ namespace detail {
 struct raw_event {
     feed_event kind = feed_event::update;
     std::string_view body = "{}";
+    bool checked = false; ///< that the body is valid JSON
     std::string_view publisher{};
     std::uint64_t seq = 0;
     std::uint64_t missed = 0;
@@ -35,7 +36,8 @@ class pending_event {
     pending_event() = default;
     pending_event(const pending_event&) = delete;
     pending_event& operator=(const pending_event&) = delete;
-    virtual void deliver(const raw_event& event) = 0;
+    /// False where the event's body is no JSON: the operation goes on waiting. Else it has ended.
+    virtual bool deliver(const raw_event& event) = 0;
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
     /// Destroys it without calling its handler.
     virtual void discard() noexcept = 0;

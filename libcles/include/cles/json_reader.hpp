@@ -67,6 +67,7 @@ class json_reader {
     static constexpr bool is_space(char c) noexcept { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
     bool expected(std::string_view what);
     bool enter();
+    bool fail_too_deep();
     bool literal(std::string_view word);
     bool scan_number(std::string_view& out, bool& integral);
     bool scan_string(std::string_view& raw, bool& escaped);

@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string_view>
@@ -11,6 +12,9 @@
 /// applications.
 
 namespace cles::detail {
+
+/// How many brackets deep an answer may be: as deep as a body by default, and what may be wrapped around it.
+inline constexpr std::size_t answer_depth = 32 + 3;
 
 /// One operation that waits for its result. Whoever holds it has it ended once, by `offer`, `fail` or `discard`, which
 /// consume it.

@@ -18,16 +18,17 @@ namespace cles::detail {
 
 /// A text result read as a T. `json_text` is handed over as it came.
 template <class T>
-pending::verdict read_result(std::string_view json, T& value, boost::system::error_code& code, std::string& why) {
-    json_reader reader{json};
+pending::verdict read_result(std::string_view json, T& value, boost::system::error_code& code, std::string& why,
+                             std::string_view what = "the answer") {
+    json_reader reader{json, answer_depth};
     if (read_json(reader, value) && reader.at_end()) {
         return pending::verdict::completed;
     }
-    if (!is_valid_json(json)) {
+    if (!is_valid_json(json, answer_depth)) {
         return pending::verdict::malformed;
     }
     code = errc::conversion;
-    why = "the answer does not fit: " + reader.error();
+    why = std::string{what} + " does not fit: " + reader.error();
     return pending::verdict::completed;
 }
 
@@ -41,7 +42,7 @@ class reply_operation final : public pending {
         boost::system::error_code code;
         std::string why;
         if constexpr (std::is_void_v<T>) {
-            if (!is_valid_json(json)) {
+            if (!is_valid_json(json, answer_depth)) {
                 return verdict::malformed;
             }
             finish(code, why);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/feed_machine.hpp"
 
+#include <cles/json_reader.hpp>
+
 #include <utility>
 
 namespace cles::core {
@@ -29,7 +31,7 @@ void feed_machine::on_bound(std::string_view last) {
     }
     was_bound_ = true;
     if (body != "{}") {
-        on_event({.kind = feed_event::current, .body = body});
+        on_event({.kind = feed_event::current, .body = body, .checked = true});
     }
     if (first_) {
         first_.release()->offer(body);
@@ -78,19 +80,27 @@ bool feed_machine::next(event_ptr operation) {
 void feed_machine::pump() {
     if (waiter_ != nullptr && !queue_.empty()) {
         auto* operation = waiter_.release();
-        queue_.pop([operation](const detail::raw_event& event) { operation->deliver(event); });
+        queue_.pop([operation](const detail::raw_event& event) { operation->deliver(event); }); // checked when queued
     }
 }
 
-void feed_machine::on_event(const detail::raw_event& event) {
+bool feed_machine::on_event(const detail::raw_event& event) {
     if (state_ == state::closed) {
-        return;
+        return true;
     }
     if (waiter_ != nullptr && queue_.empty()) {
-        waiter_.release()->deliver(event);
-    } else {
-        queue_.push(event);
+        auto* operation = waiter_.release();
+        if (!operation->deliver(event)) {
+            waiter_.reset(operation);
+            return false;
+        }
+        return true;
     }
+    if (!event.checked && !is_valid_json(event.body, detail::answer_depth)) {
+        return false;
+    }
+    queue_.push(event);
+    return true;
 }
 
 void feed_machine::cancel() {

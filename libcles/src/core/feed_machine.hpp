@@ -71,7 +71,7 @@ class feed_machine final : public subscription, private deadline {
   private:
     enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
 
-    void on_event(const detail::raw_event& event) override;
+    bool on_event(const detail::raw_event& event) override;
     void on_deadline(time_point now) override;
     void pause(time_point now);
 

@@ -33,6 +33,7 @@ class feed_queue {
         forget(e);
         deliver(detail::raw_event{.kind = e.kind,
                                   .body = e.body,
+                                  .checked = true,
                                   .publisher = e.publisher,
                                   .seq = e.seq,
                                   .missed = e.missed,

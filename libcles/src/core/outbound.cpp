@@ -78,7 +78,7 @@ void outbound::on_reply(const protocol::reply_line& reply) {
     const auto due = e->due();
     bool ended = false;
     if (reply.progress) {
-        if (e->progress && is_valid_json(reply.body)) {
+        if (e->progress && is_valid_json(reply.body, detail::answer_depth)) {
             // Called from a copy: it may withdraw its own request.
             const auto report = e->progress;
             const auto id = e->id;

@@ -14,8 +14,15 @@ session::session(std::shared_ptr<node> host, outlet& out, binder& updates, const
     : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {}
 
 void session::on_line(std::string_view line, time_point now) {
+    if (closed_) {
+        return;
+    }
+    if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
+        on_update(found);
+        return;
+    }
     line = protocol::trim(line);
-    if (line.empty() || closed_) {
+    if (line.empty()) {
         return;
     }
     if (protocol::is_reply(line)) {
@@ -33,7 +40,7 @@ void session::on_line(std::string_view line, time_point now) {
     if (!protocol::parse_request(line, request, malformed)) {
         inbound_.on_malformed(line, malformed, now);
     } else if (request.is_update()) {
-        on_update(request);
+        on_update(subscriptions_.find(line, request));
     } else {
         inbound_.on_request(line, request, now);
     }
@@ -48,12 +55,9 @@ void session::on_reply(std::string_view line) {
     }
 }
 
-void session::on_update(const protocol::request_line& update) {
-    std::string scratch;
-    auto* s = subscriptions_.find(update.noun.target, protocol::canonical_path(update.noun, scratch));
-    const bool valid = s != nullptr && (update.body.empty() || is_valid_json(update.body, node_->bounds.depth)) &&
-                       !protocol::looks_like_failure(update.body);
-    if (!valid || !s->take(update)) {
+void session::on_update(const subscriptions::match& found) {
+    const auto& update = *found.update;
+    if (found.whose == nullptr || protocol::looks_like_failure(update.body) || !found.whose->take(update)) {
         ++node_->counts.updates_dropped;
     } else {
         ++node_->counts.updates_received;

@@ -33,7 +33,7 @@ class session {
 
   private:
     void on_reply(std::string_view line);
-    void on_update(const protocol::request_line& update);
+    void on_update(const subscriptions::match& found);
 
     std::shared_ptr<node> node_;
     outlet& out_;

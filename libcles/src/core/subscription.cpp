@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/subscription.hpp"
 
+#include <cles/json_reader.hpp>
+#include <cles/pending.hpp>
+
 #include <algorithm>
 
 namespace cles::core {
 
 bool subscription::take(const protocol::request_line& update) {
+    const auto before = order_;
     const auto verdict = order_.take(*update.epoch, *update.seq);
     if (!verdict.news) {
         return false;
@@ -14,10 +18,19 @@ bool subscription::take(const protocol::request_line& update) {
                             .publisher = update.noun.target,
                             .seq = *update.seq};
     if (verdict.missed != 0 && !thinned_) {
+        event.checked = is_valid_json(event.body, detail::answer_depth);
+        if (!event.checked) {
+            order_ = before;
+            return false;
+        }
         on_event({.kind = feed_event::gap, .publisher = event.publisher, .seq = event.seq, .missed = verdict.missed});
     }
-    on_event(event);
-    return true;
+    // Once it has been handed on, this may be gone: whoever took it may have closed the feed.
+    if (on_event(event)) {
+        return true;
+    }
+    order_ = before; // a later update shows that this one is missing
+    return false;
 }
 
 bool subscriptions::has(std::string_view target, std::string_view path) const {
@@ -30,12 +43,13 @@ bool subscriptions::add(subscription& s) {
     if (has(s.target(), s.path())) {
         return false;
     }
+    forget_recent();
     by_path_[s.path()].push_back(&s);
     return true;
 }
 
 void subscriptions::remove(const subscription& s) {
-    recent_ = nullptr;
+    forget_recent();
     const auto found = by_path_.find(s.path());
     if (found != by_path_.end()) {
         std::erase(found->second, &s);
@@ -63,6 +77,32 @@ subscription* subscriptions::find(std::string_view publisher, std::string_view p
         }
     }
     return by_self;
+}
+
+subscriptions::match subscriptions::recognise(std::string_view line) noexcept {
+    const auto* update = head_.recognise(line);
+    if (update == nullptr) {
+        return {};
+    }
+    last_ = head_of_;
+    return {.update = update, .whose = head_of_};
+}
+
+subscriptions::match subscriptions::find(std::string_view line, const protocol::request_line& update) {
+    auto* s = find(update.noun.target, protocol::canonical_path(update.noun, scratch_));
+    if (s != nullptr && s == last_) {
+        head_.remember(line, update);
+        head_of_ = s;
+    }
+    last_ = s;
+    return {.update = &update, .whose = s};
+}
+
+void subscriptions::forget_recent() noexcept {
+    recent_ = nullptr;
+    last_ = nullptr;
+    head_of_ = nullptr;
+    head_.forget();
 }
 
 } // namespace cles::core

@@ -5,6 +5,7 @@
 
 #include "core/update_order.hpp"
 #include "protocol/message.hpp"
+#include "protocol/update_head.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
 
@@ -29,15 +30,16 @@ class subscription {
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
     [[nodiscard]] const std::string& target() const noexcept { return target_; }
 
-    /// Hands an update on: first a gap that it shows, then itself. False where it is old or repeated, or from a node
-    /// that is not bound to.
+    /// Hands an update on: first a gap that it shows, then itself. False where it is old or repeated, or its body is no
+    /// JSON.
     bool take(const protocol::request_line& update);
 
   protected:
     ~subscription() = default;
 
   private:
-    virtual void on_event(const detail::raw_event& event) = 0;
+    /// False where the event's body is no JSON.
+    virtual bool on_event(const detail::raw_event& event) = 0;
 
     std::string target_;
     std::string path_;
@@ -54,15 +56,31 @@ class subscriptions {
     [[nodiscard]] bool has(std::string_view target, std::string_view path) const;
     /// The subscription that an update is for, or null.
     [[nodiscard]] subscription* find(std::string_view publisher, std::string_view path) const;
+
+    /// An update and whom it is for; `whose` is null where the line is none or nobody wants it.
+    struct match {
+        const protocol::request_line* update = nullptr;
+        subscription* whose = nullptr;
+    };
+    /// Recognises an update that follows one of the same noun. Valid until the next call.
+    [[nodiscard]] match recognise(std::string_view line) noexcept;
+    /// Finds whom a parsed update is for, and keeps its head in mind where updates of the noun follow each other.
+    [[nodiscard]] match find(std::string_view line, const protocol::request_line& update);
     [[nodiscard]] bool empty() const noexcept { return by_path_.empty(); }
 
   private:
+    void forget_recent() noexcept;
+
     struct text_hash : boost::hash<std::string_view> {
         using is_transparent = void;
     };
     // Mostly one node publishes a path on a link, so that a short list is quicker than a second key.
     boost::unordered_flat_map<std::string, std::vector<subscription*>, text_hash, std::equal_to<>> by_path_;
     mutable subscription* recent_ = nullptr; // most updates are of the noun of the one before
+    subscription* last_ = nullptr;
+    subscription* head_of_ = nullptr;
+    protocol::update_head head_;
+    std::string scratch_;
 };
 
 } // namespace cles::core

@@ -2,6 +2,7 @@
 #include <cles/json_reader.hpp>
 
 #include "protocol/json_scan.hpp"
+#include "protocol/json_skip.hpp"
 
 #include <charconv>
 #include <system_error>
@@ -87,9 +88,11 @@ json_reader::kind json_reader::peek() noexcept {
     }
 }
 
+bool json_reader::fail_too_deep() { return fail("deeper than " + std::to_string(max_depth_) + " brackets"); }
+
 bool json_reader::enter() {
     if (depth_ == max_depth_) {
-        return fail("deeper than " + std::to_string(max_depth_) + " brackets");
+        return fail_too_deep();
     }
     ++depth_;
     ++at_;
@@ -291,36 +294,18 @@ bool json_reader::read(std::string& out) {
 }
 
 bool json_reader::skip() {
-    std::string_view ignored;
-    bool flag = false;
-    switch (peek()) {
-    case kind::object:
-        if (!begin_object()) {
-            return false;
-        }
-        while (next_key(ignored)) {
-            if (!skip()) {
-                return false;
-            }
-        }
-        return ok();
-    case kind::array:
-        if (!begin_array()) {
-            return false;
-        }
-        while (next_element()) {
-            if (!skip()) {
-                return false;
-            }
-        }
-        return ok();
-    case kind::string: return read(ignored);
-    case kind::number: return scan_number(ignored, flag);
-    case kind::boolean: return read(flag);
-    case kind::null: return read_null();
-    case kind::invalid: break;
+    if (!ok()) {
+        return false;
     }
-    return expected("a value");
+    const auto flaw = protocol::skip_json(text_, at_, max_depth_ - depth_);
+    switch (flaw.what) {
+    case protocol::json_flaw::kind::none: break;
+    case protocol::json_flaw::kind::expected: return expected(flaw.text);
+    case protocol::json_flaw::kind::bad: return fail(flaw.text);
+    case protocol::json_flaw::kind::too_deep: return fail_too_deep();
+    }
+    first_ = false;
+    return true;
 }
 
 bool json_reader::read_raw(std::string_view& out) {

@@ -89,44 +89,46 @@ bool unescape_unit(std::string_view raw, std::size_t& at, std::string& out) {
 } // namespace
 
 std::string_view scan_number(std::string_view text, std::size_t& at, bool& integral) noexcept {
-    const auto here = [&](char c) { return at < text.size() && text[at] == c; };
-    const auto digits = [&] {
-        const auto from = at;
-        while (at < text.size() && is_digit(text[at])) {
-            ++at;
+    const auto* p = text.data() + at;
+    const auto* const end = text.data() + text.size();
+    const auto here = [&](char c) { return p != end && *p == c; };
+    const auto skip_digits = [&] {
+        const auto* const from = p;
+        while (p != end && is_digit(*p)) {
+            ++p;
         }
-        return at != from;
+        return p != from;
+    };
+    const auto stop = [&](std::string_view wrong) {
+        at = static_cast<std::size_t>(p - text.data());
+        return wrong;
     };
     integral = true;
-    if (here('-')) {
-        ++at;
-    }
+    p += here('-') ? 1 : 0;
     if (here('0')) {
-        ++at;
-        if (at < text.size() && is_digit(text[at])) {
-            return "a number has no leading zeros";
+        ++p;
+        if (p != end && is_digit(*p)) {
+            return stop("a number has no leading zeros");
         }
-    } else if (!digits()) {
-        return "'-' without a digit";
+    } else if (!skip_digits()) {
+        return stop("'-' without a digit");
     }
     if (here('.')) {
         integral = false;
-        ++at;
-        if (!digits()) {
-            return "'.' without a digit";
+        ++p;
+        if (!skip_digits()) {
+            return stop("'.' without a digit");
         }
     }
     if (here('e') || here('E')) {
         integral = false;
-        ++at;
-        if (here('+') || here('-')) {
-            ++at;
-        }
-        if (!digits()) {
-            return "an exponent without a digit";
+        ++p;
+        p += here('+') || here('-') ? 1 : 0;
+        if (!skip_digits()) {
+            return stop("an exponent without a digit");
         }
     }
-    return {};
+    return stop({});
 }
 
 bool read_short_decimal(std::string_view text, std::size_t& at, double& out) noexcept {

@@ -19,7 +19,7 @@ class bind_reply final : public detail::pending {
         : host_(std::move(host)), handle_(std::move(handle)), feed_(feed) {}
 
     verdict offer(std::string_view json) override {
-        if (!is_valid_json(json)) {
+        if (!is_valid_json(json, detail::answer_depth)) {
             return verdict::malformed;
         }
         const std::unique_ptr<bind_reply> self{this};
