@@ -17,17 +17,17 @@ void register_localization(cles::registrar& tasks) {
     tasks.on_pull("localization", [served = std::uint64_t{0}]() mutable { return sample(served++); });
 }
 
-void serve_localization(std::string_view url, const child_process::announce& announce) {
+void serve_localization(std::string_view url, const run_options& how, const child_process::announce& announce) {
     asio::io_context io{1};
     cles::service car{io, {.name = "car1", .listen = {std::string{url}}}};
     register_localization(car);
     announce(car.endpoints().front());
-    io.run();
+    run(io, how);
 }
 
 pull_load::pull_load(asio::io_context& io, cles::service& client, std::string noun, handler_style style,
-                     bool check_samples)
-    : io_(io), client_(client), noun_(std::move(noun)), style_(style), check_samples_(check_samples) {}
+                     bool check_samples, run_options how)
+    : io_(io), client_(client), noun_(std::move(noun)), style_(style), check_samples_(check_samples), how_(how) {}
 
 std::chrono::nanoseconds pull_load::run(std::size_t in_flight, std::chrono::nanoseconds at_most,
                                         latency_recorder& record) {
@@ -50,7 +50,7 @@ std::chrono::nanoseconds pull_load::run(std::size_t in_flight, std::chrono::nano
         }
     }
     io_.restart();
-    io_.run(); // until the last lane has ended
+    cles::run(io_, how_); // until the last lane has ended
     if (failure_) {
         const auto failure = failure_;
         client_.stop();

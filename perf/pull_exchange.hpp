@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/run.hpp>
 #include <cles/service.hpp>
 
 #include "child_process.hpp"
@@ -25,14 +26,14 @@ namespace cles::perf {
 void register_localization(cles::registrar& tasks);
 
 /// A node that serves it, for ever.
-void serve_localization(std::string_view url, const child_process::announce& announce);
+void serve_localization(std::string_view url, const run_options& how, const child_process::announce& announce);
 
 /// Keeps a number of PULLs in flight from one client.
 class pull_load {
   public:
     /// `noun` names the task at its node, to which the client must know the way.
     pull_load(boost::asio::io_context& io, cles::service& client, std::string noun, handler_style style,
-              bool check_samples);
+              bool check_samples, run_options how = {});
 
     /// Runs until the recorder is full or the time is over. A request counts once its result, as a C++ value, is in the
     /// hands of the caller's code. Returns how long the requests took that were counted.
@@ -56,6 +57,7 @@ class pull_load {
     std::string noun_;
     handler_style style_;
     bool check_samples_;
+    run_options how_;
 
     latency_recorder* record_ = nullptr;
     clock::time_point until_;

@@ -178,7 +178,7 @@ update_tally take(asio::io_context& io, cles::service& client, const update_load
         binders.back()->start(io, client);
     }
     io.restart();
-    io.run();
+    run(io, load.how);
     // What is still under way refers to the binders.
     if (all.failed()) {
         client.stop();
@@ -193,14 +193,14 @@ update_tally take(asio::io_context& io, cles::service& client, const update_load
 
 } // namespace
 
-void serve_updates(std::string_view url, const child_process::announce& announce) {
+void serve_updates(std::string_view url, const run_options& how, const child_process::announce& announce) {
     asio::io_context io{1};
     cles::service car{io, {.name = "car1", .listen = {std::string{url}}}};
     car.on_bind("localization");
     car.on_push("publish",
                 [&](const publish_order& order) { asio::co_spawn(io, publish(car, order.updates), rethrow); });
     announce(car.endpoints().front());
-    io.run();
+    run(io, how);
 }
 
 update_tally take_updates(asio::io_context& io, cles::service& client, const update_load& load) {

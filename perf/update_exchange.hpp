@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/run.hpp>
 #include <cles/service.hpp>
 
 #include "child_process.hpp"
@@ -23,7 +24,7 @@ struct publish_order {
 BOOST_DESCRIBE_STRUCT(publish_order, (), (updates))
 
 /// A node that publishes when it is told to, for ever.
-void serve_updates(std::string_view url, const child_process::announce& announce);
+void serve_updates(std::string_view url, const run_options& how, const child_process::announce& announce);
 
 /// In what form a binder takes a value.
 enum class value_form : std::uint8_t {
@@ -42,6 +43,7 @@ struct update_load {
     std::uint64_t updates = 0;
     value_form form = value_form::raw;
     handler_style style = handler_style::coroutine;
+    run_options how{};
     std::uint32_t keep = 0; ///< updates that the publisher queues for a slow binder; 0: the protocol's default
 };
 

@@ -14,6 +14,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <chrono>
 #include <map>
 #include <memory>
 #include <string>
@@ -31,11 +32,13 @@ constexpr const char* examples = "Examples:\n"
                                  "  cles bench\n"
                                  "  cles bench --transport unix\n"
                                  "  cles bench --in-flight 64 --style callback -o json\n"
+                                 "  cles bench --busy-poll 50\n"
                                  "  cles bench --against tcp://10.0.0.2\n"
                                  "  cles bench --updates --binders 8\n";
 
 constexpr std::size_t most_in_flight = 4096;
 constexpr std::size_t most_binders = 1024;
+constexpr int most_busy_poll_us = 1'000'000;
 
 const std::map<std::string, carrier> carriers{
     {"tcp", carrier::tcp}, {"unix", carrier::unix_socket}, {"inproc", carrier::inproc}};
@@ -59,12 +62,14 @@ struct arguments {
     std::string duration{};
     std::string form = "table";
     bool updates = false;
+    int busy_poll_us = 0;
 };
 
 /// What CLI11 cannot tell from one option alone.
 void check(CLI::App& command, arguments& given) {
     given.options.transport = carriers.at(given.transport);
     given.options.style = styles.at(given.style);
+    given.options.how.busy_poll = std::chrono::microseconds{given.busy_poll_us};
     const auto refuse = [&](const char* option, const std::string& why) {
         if (command.count(option) != 0) {
             throw usage_error(std::string{option} + " " + why);
@@ -92,7 +97,7 @@ void check(CLI::App& command, arguments& given) {
 
 void run(CLI::App& command, arguments& given) {
     check(command, given);
-    if (given.options.against.empty() && given.options.transport != carrier::inproc &&
+    if (given.options.against.empty() && given.options.transport != carrier::inproc && !given.options.one_core &&
         !cles::perf::place_ends().apart()) {
         note("there is one core only: both ends share it, and the figures say little");
     }
@@ -134,6 +139,12 @@ void add_bench(CLI::App& app, int& exit_code) {
     command->add_option("--style", given->style, "How results reach the caller's code: coroutine or callback")
         ->check(CLI::IsMember(keys_of(styles)).description(""))
         ->type_name("NAME");
+    command
+        ->add_option("--busy-poll", given->busy_poll_us,
+                     "Let both ends of CLES look for work so long before they sleep, in microseconds (0)")
+        ->check(CLI::Range(0, most_busy_poll_us).description(""))
+        ->type_name("US");
+    command->add_flag("--one-core", options.one_core, "Put both ends on one core");
     command->add_flag("--updates", given->updates, "Measure UPDATE to binders instead of PULL");
     command->add_option("--binders", options.binders, "Bindings, each on a link of its own (1)")
         ->check(CLI::Range(std::size_t{1}, most_binders).description(""))

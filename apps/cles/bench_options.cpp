@@ -5,6 +5,14 @@
 
 namespace tool {
 
+cles::perf::placement places_of(const bench_options& options) {
+    auto cores = cles::perf::place_ends();
+    if (options.one_core) {
+        cores.server = cores.client;
+    }
+    return cores;
+}
+
 const char* to_string(carrier c) {
     switch (c) {
     case carrier::tcp: return "tcp";

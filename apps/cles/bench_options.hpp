@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/run.hpp>
+
 #include "perf/handler_style.hpp"
+#include "perf/pinning.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -22,10 +25,15 @@ struct bench_options {
     std::string against{};                               ///< a node that runs already
 
     std::size_t in_flight = 1;
+    cles::run_options how{}; ///< of both ends
+    bool one_core = false;   ///< for both ends
 
     std::size_t binders = 1;
     std::uint32_t keep = 0;
 };
+
+/// The cores that the ends are to run on.
+cles::perf::placement places_of(const bench_options& options);
 
 /// As in a URL.
 const char* to_string(carrier c);

@@ -158,7 +158,7 @@ class baseline {
 pull_report bench_pulls(const bench_options& options) {
     const bool remote = !options.against.empty();
     const bool inproc = !remote && options.transport == carrier::inproc;
-    const auto cores = perf::place_ends();
+    const auto cores = places_of(options);
 
     // The children come first: before there is anything of ours that they would inherit.
     std::unique_ptr<baseline> by_hand;
@@ -171,7 +171,7 @@ pull_report bench_pulls(const bench_options& options) {
     if (!remote && !inproc) {
         server =
             std::make_unique<perf::child_process>(cores.server, [&](const perf::child_process::announce& announce) {
-                perf::serve_localization(url, announce);
+                perf::serve_localization(url, options.how, announce);
             });
         url = server->announced();
     }
@@ -186,7 +186,7 @@ pull_report bench_pulls(const bench_options& options) {
     const std::string node = remote ? name_of_node_at(url) : "car1";
     const std::string noun = node + ":localization";
     cles::service client{io, {.name = "bench", .peers = {{node, url}}}};
-    perf::pull_load load{io, client, noun, options.style, !remote};
+    perf::pull_load load{io, client, noun, options.style, !remote, options.how};
 
     const auto requests = requests_of(options);
     perf::latency_recorder record{requests};
@@ -204,6 +204,7 @@ pull_report bench_pulls(const bench_options& options) {
                        .style = to_string(options.style),
                        .in_flight = options.in_flight,
                        .rounds = options.rounds,
+                       .busy_poll_us = options.how.busy_poll.count(),
                        .client_core = cores.client};
     bench_progress progress{options.rounds * (by_hand ? 2 : 1)};
     for (std::size_t round = 0; round < options.rounds; ++round) {

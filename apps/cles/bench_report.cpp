@@ -113,9 +113,13 @@ std::string cores(int client, std::optional<int> server) {
         return "client on core " + std::to_string(client);
     }
     if (*server == client) {
-        return "both ends on core " + std::to_string(client) + ", the only one: they wait for each other's turn";
+        return "both ends on core " + std::to_string(client) + ": they wait for each other's turn";
     }
     return "client on core " + std::to_string(client) + ", server on core " + std::to_string(*server);
+}
+
+std::string polling(std::int64_t busy_poll_us) {
+    return busy_poll_us == 0 ? std::string{} : ", CLES polling up to " + std::to_string(busy_poll_us) + " us";
 }
 
 std::string where(const pull_report& report) {
@@ -176,7 +180,7 @@ std::string table_of(const pull_report& report) {
                  times(ratio.requests_per_s), times(ratio.cpu), times(ratio.bytes)});
     }
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds, " + std::to_string(report.in_flight) +
-           " in flight, " + report.style + "s; " + where(report) +
+           " in flight, " + report.style + "s" + polling(report.busy_poll_us) + "; " + where(report) +
            (report.against ? "; against " + *report.against : std::string{}) + "\n";
 }
 
@@ -186,8 +190,9 @@ std::string table_of(const update_report& report) {
     out.add(cells_of("typed (struct)", report.typed));
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds of " + std::to_string(report.updates) +
            " updates over " + report.transport + " to " + std::to_string(report.binders) + " binder" +
-           (report.binders == 1 ? "" : "s") + ", " + report.style + "s, " + fixed(report.update_bytes, 1) +
-           " bytes per update, CPU per delivery; " + cores(report.client_core, report.server_core) + "\n";
+           (report.binders == 1 ? "" : "s") + ", " + report.style + "s" + polling(report.busy_poll_us) + ", " +
+           fixed(report.update_bytes, 1) + " bytes per update, CPU per delivery; " +
+           cores(report.client_core, report.server_core) + "\n";
 }
 
 } // namespace tool

@@ -48,6 +48,7 @@ struct pull_report {
     std::size_t in_flight = 1;
     std::size_t rounds = 0;
     std::uint64_t requests = 0; ///< counted in all passes of CLES together
+    std::int64_t busy_poll_us = 0;
     int client_core = 0;
     std::optional<int> server_core{}; ///< nothing where both ends are one process, or the server is none of ours
     std::optional<std::string> against{};
@@ -56,8 +57,8 @@ struct pull_report {
     std::optional<exchange_ratio> ratio{};
 };
 BOOST_DESCRIBE_STRUCT(pull_report, (),
-                      (bench, transport, style, in_flight, rounds, requests, client_core, server_core, against, icd,
-                       cles, ratio))
+                      (bench, transport, style, in_flight, rounds, requests, busy_poll_us, client_core, server_core,
+                       against, icd, cles, ratio))
 
 struct update_figures {
     double deliveries_per_s = 0;
@@ -77,6 +78,7 @@ struct update_report {
     std::size_t binders = 1;
     std::size_t rounds = 0;
     std::uint64_t updates = 0; ///< published in each pass
+    std::int64_t busy_poll_us = 0;
     int client_core = 0;
     int server_core = 0;
     std::optional<double> update_bytes{};
@@ -84,8 +86,8 @@ struct update_report {
     update_figures typed{};
 };
 BOOST_DESCRIBE_STRUCT(update_report, (),
-                      (bench, transport, style, binders, rounds, updates, client_core, server_core, update_bytes, raw,
-                       typed))
+                      (bench, transport, style, binders, rounds, updates, busy_poll_us, client_core, server_core,
+                       update_bytes, raw, typed))
 
 /// To three decimals: no more than the measurement is good for.
 double rounded(double value);

@@ -64,9 +64,9 @@ update_figures take(boost::asio::io_context& io, cles::service& client, pid_t pu
 } // namespace
 
 update_report bench_updates(const bench_options& options) {
-    const auto cores = perf::place_ends();
+    const auto cores = places_of(options);
     perf::child_process publisher{cores.server, [&](const perf::child_process::announce& announce) {
-                                      perf::serve_updates(bench_url(options.transport), announce);
+                                      perf::serve_updates(bench_url(options.transport), options.how, announce);
                                   }};
     const auto url = publisher.announced();
     perf::pin_to(cores.client);
@@ -76,8 +76,11 @@ update_report bench_updates(const bench_options& options) {
 
     std::vector<update_figures> raw;
     std::vector<update_figures> typed;
-    perf::update_load load{
-        .binders = options.binders, .updates = updates_of(options), .style = options.style, .keep = options.keep};
+    perf::update_load load{.binders = options.binders,
+                           .updates = updates_of(options),
+                           .style = options.style,
+                           .how = options.how,
+                           .keep = options.keep};
     bench_progress progress{options.rounds * 2};
     for (std::size_t round = 0; round < options.rounds; ++round) {
         progress.step("updates as text");
@@ -93,6 +96,7 @@ update_report bench_updates(const bench_options& options) {
                          .binders = options.binders,
                          .rounds = options.rounds,
                          .updates = load.updates,
+                         .busy_poll_us = options.how.busy_poll.count(),
                          .client_core = cores.client,
                          .server_core = cores.server,
                          .update_bytes = count_bytes(url),

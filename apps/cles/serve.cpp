@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/run.hpp>
+
 #include "address.hpp"
 #include "commands.hpp"
 #include "context.hpp"
@@ -14,6 +16,7 @@
 #include <CLI/Option.hpp>
 #include <CLI/Validators.hpp>
 
+#include <chrono>
 #include <csignal>
 #include <memory>
 #include <string>
@@ -30,6 +33,7 @@ struct serve_command {
     std::vector<std::string> listen;
     bool insecure = false;
     double rate = 10;
+    int busy_poll_us = 0;
 };
 
 cles::service_options options_of(const serve_command& wanted, const cles::log_sink& log) {
@@ -59,7 +63,7 @@ int serve(const serve_command& wanted, int verbosity) {
     for (const auto& endpoint : node.service().endpoints()) {
         write_output(wanted.name + " listening on " + endpoint + "\n");
     }
-    io.run();
+    cles::run(io, {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us}});
     return exit_code::success;
 }
 
@@ -78,6 +82,11 @@ void add_serve(CLI::App& app, context& shared) {
     command->add_option("--rate", wanted->rate, "Localizations published a second; 0: only on PULL (default 10)")
         ->type_name("HZ")
         ->check(CLI::Range(0.0, 1e6).description(""));
+    command
+        ->add_option("--busy-poll", wanted->busy_poll_us,
+                     "Look for work so many microseconds before sleeping: quicker answers for processor time (0)")
+        ->type_name("US")
+        ->check(CLI::Range(0, 1'000'000).description(""));
     command->add_flag("--insecure", wanted->insecure,
                       "Allow listening beyond this host, where anybody may ask for anything");
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"

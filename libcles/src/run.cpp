@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/run.hpp>
+
+#include "core/spin_budget.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <sys/resource.h>
+
+namespace cles {
+namespace {
+
+// How often the kernel took the core from this thread for another one.
+long times_preempted() noexcept {
+    rusage usage{};
+    ::getrusage(RUSAGE_THREAD, &usage);
+    return usage.ru_nivcsw;
+}
+
+// Looks for work until there is some or the time is over.
+std::size_t spin(boost::asio::io_context& io, std::chrono::nanoseconds limit, core::spin_budget& budget) {
+    using clock = std::chrono::steady_clock;
+    if (const auto ran = io.poll(); ran != 0 || io.stopped()) {
+        return ran; // it was there already
+    }
+    const auto preempted = times_preempted();
+    const auto end = clock::now() + limit;
+    do {
+        if (const auto ran = io.poll(); ran != 0 || io.stopped()) {
+            times_preempted() == preempted ? budget.found() : budget.missed();
+            return ran;
+        }
+    } while (clock::now() < end);
+    budget.missed();
+    return 0;
+}
+
+} // namespace
+
+std::size_t run(boost::asio::io_context& io, const run_options& options) {
+    if (options.busy_poll.count() <= 0) {
+        return io.run();
+    }
+    core::spin_budget budget{options.busy_poll};
+    std::size_t total = 0;
+    while (!io.stopped()) {
+        const auto limit = budget.next();
+        const auto found = limit.count() != 0 ? spin(io, limit, budget) : 0;
+        total += found != 0 || io.stopped() ? found : io.run_one();
+    }
+    return total;
+}
+
+} // namespace cles

@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""`cles bench`: what it measures and how it tells it, on runs too short to say how fast anything is."""
+
+import json
+import unittest
+
+from support import NodeTest, cles, environment, on_terminal
+
+SHORT = ("--requests", "200", "--rounds", "2")
+
+
+def measure(*arguments):
+    code, out, err = cles("bench", *SHORT, *arguments, "-o", "json")
+    if code != 0:
+        raise AssertionError(f"exit code {code}: {err}")
+    return json.loads(out)
+
+
+class Pulls(unittest.TestCase):
+    def test_both_exchanges_are_measured_in_one_run(self):
+        report = measure()
+        self.assertEqual((report["bench"], report["transport"], report["rounds"]), ("pull", "tcp", 2))
+        self.assertEqual(report["requests"], 400)
+        for figures in (report["icd"], report["cles"]):
+            self.assertTrue(0 < figures["p50_us"] <= figures["p99_us"] <= figures["p999_us"] <= figures["max_us"])
+            self.assertGreater(figures["requests_per_s"], 0)
+            self.assertGreaterEqual(figures["cpu_us"], 0)
+        self.assertAlmostEqual(report["ratio"]["p50"], report["cles"]["p50_us"] / report["icd"]["p50_us"], places=2)
+
+    def test_bytes_are_those_on_the_wire(self):
+        report = measure()
+        self.assertEqual((report["icd"]["request_bytes"], report["icd"]["reply_bytes"]), (4, 44))
+        self.assertTrue(25 < report["cles"]["request_bytes"] < 50, report["cles"])
+        self.assertTrue(80 < report["cles"]["reply_bytes"] <= 132, report["cles"])
+
+    def test_other_carriers_and_ways_to_ask(self):
+        self.assertEqual(measure("--transport", "unix")["transport"], "unix")
+        self.assertEqual(measure("--transport", "inproc")["transport"], "inproc")
+        many = measure("--in-flight", "8", "--style", "callback")
+        self.assertEqual((many["in_flight"], many["style"]), (8, "callback"))
+
+    def test_busy_polling_and_one_core(self):
+        report = measure("--busy-poll", "50", "--one-core")
+        self.assertEqual(report["busy_poll_us"], 50)
+        self.assertEqual(report["client_core"], report["server_core"])
+
+    def test_the_table_names_the_terms(self):
+        code, out, err = cles("bench", *SHORT, "--busy-poll", "20")
+        self.assertEqual((code, err), (0, ""))
+        lines = out.splitlines()
+        self.assertEqual([line.split()[0] for line in lines], ["PULL", "hand-written", "CLES", "ratio", "medians"])
+        self.assertIn("medians of 2 rounds, 1 in flight, coroutines, CLES polling up to 20 us;", lines[-1])
+
+
+class Updates(unittest.TestCase):
+    def test_all_are_delivered(self):
+        report = measure("--updates", "--binders", "3")
+        self.assertEqual((report["bench"], report["binders"]), ("updates", 3))
+        for figures in (report["raw"], report["typed"]):
+            self.assertEqual(figures["missed"], 0)
+            self.assertGreater(figures["deliveries_per_s"], 0)
+
+
+class Against(NodeTest):
+    def test_a_node_that_runs_already(self):
+        report = measure("--against", self.node.url)
+        self.assertEqual(report["against"], self.node.url)
+        self.assertNotIn("icd", report)
+        self.assertGreater(report["cles"]["p50_us"], 0)
+
+
+class Usage(unittest.TestCase):
+    def test_what_does_not_go_together_is_refused(self):
+        for arguments, says in (
+            (("--transport", "pigeon"), "--transport"),
+            (("--in-flight", "0"), "--in-flight"),
+            (("--busy-poll", "-1"), "--busy-poll"),
+            (("--requests", "5", "--duration", "1s"), "--duration"),
+            (("--binders", "2"), "--binders is for --updates"),
+            (("--updates", "--in-flight", "2"), "--in-flight is not for --updates"),
+            (("--updates", "--transport", "inproc"), "--transport"),
+            (("--against", "tcp://127.0.0.1:1", "--transport", "tcp"), "--transport"),
+        ):
+            code, out, err = cles("bench", *arguments)
+            self.assertEqual((code, out), (2, ""), arguments)
+            self.assertIn(says, err)
+
+    def test_nobody_there(self):
+        code, out, err = cles("bench", "--against", "unix:///nowhere/at/all.sock")
+        self.assertEqual((code, out), (1, ""))
+        self.assertIn("unix:///nowhere/at/all.sock", err)
+
+
+class Terminal(unittest.TestCase):
+    def test_progress_is_one_line_that_goes(self):
+        code, shown = on_terminal("bench", *SHORT, env=environment(NO_COLOR="1"))
+        self.assertEqual(code, 0)
+        self.assertIn("[..............................] 1/4 hand-written exchange", shown)
+        self.assertIn("\r\x1b[K[######################........] 4/4 CLES", shown)
+        self.assertIn("\r\x1b[KPULL localization", shown)
+
+
+if __name__ == "__main__":
+    unittest.main()
