@@ -9,34 +9,38 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <utility>
+#include <vector>
 
 namespace cles::transport {
 
-/// Makes one connection, within the time that the limits give.
+/// Makes one connection, to the first of some endpoints that takes it, within the time that the limits give in all.
 template <class Protocol>
 class stream_dialler : public std::enable_shared_from_this<stream_dialler<Protocol>> {
   public:
     using socket_type = typename Protocol::socket;
     using endpoint_type = typename Protocol::endpoint;
-    using prepare_function = std::function<void(socket_type&)>;
+    /// Prepares a connected socket and tells who is at its other end.
+    using identify_function = std::function<identity(socket_type&)>;
 
-    stream_dialler(const boost::asio::any_io_executor& executor, const limits& bounds, identity peer,
-                   prepare_function connected, dial_callback done)
-        : socket_(executor), patience_(executor), bounds_(bounds), peer_(std::move(peer)),
-          connected_(std::move(connected)), done_(std::move(done)) {}
+    stream_dialler(const boost::asio::any_io_executor& executor, const limits& bounds, identify_function identify,
+                   dial_callback done)
+        : socket_(executor), patience_(executor), bounds_(bounds), identify_(std::move(identify)),
+          done_(std::move(done)) {}
 
-    void start(const endpoint_type& where) {
+    /// \pre there is one at least
+    void start(std::vector<endpoint_type> where) {
+        where_ = std::move(where);
         patience_.expires_after(bounds_.connect);
         patience_.async_wait([self = this->shared_from_this()](boost::system::error_code code) {
             if (!code) {
                 self->end(boost::asio::error::timed_out);
             }
         });
-        socket_.async_connect(where,
-                              [self = this->shared_from_this()](boost::system::error_code code) { self->end(code); });
+        connect();
     }
 
     void give_up() {
@@ -47,15 +51,34 @@ class stream_dialler : public std::enable_shared_from_this<stream_dialler<Protoc
     }
 
   private:
-    void end(boost::system::error_code code) {
-        auto done = std::exchange(done_, nullptr);
-        patience_.cancel();
-        if (!done) {
+    void connect() {
+        socket_.async_connect(where_[tried_++], [self = this->shared_from_this()](boost::system::error_code code) {
+            self->on_connected(code);
+        });
+    }
+
+    void on_connected(boost::system::error_code code) {
+        if (!done_) {
             return;
         }
         if (!code) {
             socket_.remote_endpoint(code); // Asio takes a Unix socket for connected whose listener's queue was full
             code = code == boost::asio::error::not_connected ? boost::asio::error::try_again : code;
+        }
+        if (code && tried_ < where_.size()) {
+            boost::system::error_code ignored;
+            socket_.close(ignored);
+            connect();
+        } else {
+            end(code);
+        }
+    }
+
+    void end(boost::system::error_code code) {
+        auto done = std::exchange(done_, nullptr);
+        patience_.cancel();
+        if (!done) {
+            return;
         }
         if (code) {
             boost::system::error_code ignored;
@@ -63,16 +86,17 @@ class stream_dialler : public std::enable_shared_from_this<stream_dialler<Protoc
             done(code, nullptr);
             return;
         }
-        connected_(socket_);
-        done({}, std::make_shared<stream_link>(std::move(socket_), std::move(peer_), bounds_));
+        auto peer = identify_(socket_);
+        done({}, std::make_shared<stream_link>(std::move(socket_), std::move(peer), bounds_));
     }
 
     socket_type socket_;
     boost::asio::steady_timer patience_;
     limits bounds_;
-    identity peer_;
-    prepare_function connected_;
+    identify_function identify_;
     dial_callback done_;
+    std::vector<endpoint_type> where_;
+    std::size_t tried_ = 0;
 };
 
 } // namespace cles::transport

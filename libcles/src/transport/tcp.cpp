@@ -12,6 +12,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 namespace cles::transport {
 namespace asio = boost::asio;
@@ -20,16 +21,24 @@ using boost::system::error_code;
 
 namespace {
 
-tcp::endpoint resolve(const url& where, error_code& code) {
+// All addresses of the host, in the order in which the system prefers them; none only with an error.
+std::vector<tcp::endpoint> resolve(const url& where, error_code& code) {
     const auto host = where.host == "localhost" ? std::string{"127.0.0.1"} : where.host;
     const auto address = asio::ip::make_address(host, code);
     if (!code) {
-        return {address, where.port};
+        return {{address, where.port}};
     }
     asio::io_context lookup;
     tcp::resolver resolver{lookup};
     const auto found = resolver.resolve(host, std::to_string(where.port), code);
-    return code || found.empty() ? tcp::endpoint{} : found.begin()->endpoint();
+    std::vector<tcp::endpoint> endpoints;
+    for (const auto& each : found) {
+        endpoints.push_back(each.endpoint());
+    }
+    if (!code && endpoints.empty()) {
+        code = asio::error::host_not_found;
+    }
+    return endpoints;
 }
 
 url url_of(const tcp::endpoint& endpoint) {
@@ -75,17 +84,18 @@ class tcp_transport final : public link_transport {
   public:
     [[nodiscard]] bool is_exposed(const url& where) const override {
         error_code code;
-        const auto endpoint = resolve(where, code);
-        return !code && !endpoint.address().is_loopback(); // without an address, listening fails anyway
+        const auto endpoints = resolve(where, code);
+        return !code && !endpoints.front().address().is_loopback(); // without an address, listening fails anyway
     }
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
         error_code code;
-        const auto endpoint = resolve(where, code);
+        const auto endpoints = resolve(where, code);
         if (code) {
             throw boost::system::system_error{code};
         }
+        const auto& endpoint = endpoints.front();
         tcp::acceptor socket{executor};
         socket.open(endpoint.protocol());
         socket.set_option(asio::socket_base::reuse_address{true});
@@ -100,18 +110,13 @@ class tcp_transport final : public link_transport {
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
         error_code code;
-        const auto endpoint = resolve(where, code);
+        auto endpoints = resolve(where, code);
         if (code) {
             asio::post(executor, [done = std::move(done), code] { done(code, nullptr); });
             return [] {};
         }
-        identity peer{.transport = "tcp",
-                      .address = to_string(url_of(endpoint)),
-                      .name = {},
-                      .uid = {},
-                      .local = endpoint.address().is_loopback()};
-        auto dialler = std::make_shared<stream_dialler<tcp>>(executor, bounds, std::move(peer), tune, std::move(done));
-        dialler->start(endpoint);
+        auto dialler = std::make_shared<stream_dialler<tcp>>(executor, bounds, identify, std::move(done));
+        dialler->start(std::move(endpoints));
         return [weak = std::weak_ptr{dialler}] {
             if (const auto alive = weak.lock()) {
                 alive->give_up();

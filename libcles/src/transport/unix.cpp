@@ -118,9 +118,11 @@ class unix_transport final : public link_transport {
                                dial_callback done) override {
         auto dialler = std::make_shared<stream_dialler<local_protocol>>(
             executor, bounds,
-            identity{.transport = "unix", .address = to_string(where), .name = {}, .uid = {}, .local = true},
-            [](local_protocol::socket&) {}, std::move(done));
-        dialler->start(endpoint_of(where));
+            [address = to_string(where)](local_protocol::socket&) {
+                return identity{.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
+            },
+            std::move(done));
+        dialler->start({endpoint_of(where)});
         return [weak = std::weak_ptr{dialler}] {
             if (const auto alive = weak.lock()) {
                 alive->give_up();

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSL-1.0
+// A host of several addresses: each is tried, in their order.
+
+#include "support/run_until.hpp"
+#include "transport/stream_dialler.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace {
+
+using boost::asio::ip::tcp;
+using cles::test::run_until;
+using dialler = cles::transport::stream_dialler<tcp>;
+
+const auto loopback = boost::asio::ip::address_v4::loopback();
+
+struct fixture {
+    // Dials, and tells how that ended: "link to 4711", or the failure's words.
+    std::string dial(std::vector<tcp::endpoint> where) {
+        std::string ended;
+        const auto identify = [](tcp::socket& s) {
+            return cles::identity{.transport = "tcp", .address = std::to_string(s.remote_endpoint().port())};
+        };
+        const auto d = std::make_shared<dialler>(io.get_executor(), cles::limits{}, identify,
+                                                 [&](boost::system::error_code code, const cles::link_ptr& made) {
+                                                     ended = code ? code.message() : "link to " + made->peer().address;
+                                                 });
+        d->start(std::move(where));
+        run_until(io, [&] { return !ended.empty(); });
+        return ended;
+    }
+    tcp::endpoint nobody() {
+        tcp::acceptor gone{io, {loopback, 0}};
+        return gone.local_endpoint();
+    }
+
+    boost::asio::io_context io;
+    tcp::acceptor listener{io, {loopback, 0}};
+    std::string success = "link to " + std::to_string(listener.local_endpoint().port());
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(stream_dialler, fixture)
+
+BOOST_AUTO_TEST_CASE(takes_the_first_that_answers) {
+    tcp::acceptor other{io, {loopback, 0}};
+    BOOST_TEST(dial({listener.local_endpoint(), other.local_endpoint()}) == success);
+}
+
+BOOST_AUTO_TEST_CASE(goes_on_past_those_where_nobody_listens) {
+    BOOST_TEST(dial({nobody(), nobody(), listener.local_endpoint()}) == success);
+}
+
+BOOST_AUTO_TEST_CASE(fails_with_the_last_failure_where_nobody_answers) {
+    BOOST_TEST(dial({nobody(), nobody()}) == "Connection refused");
+}
+
+BOOST_AUTO_TEST_CASE(nothing_comes_after_it_was_given_up) {
+    bool called = false;
+    const auto d = std::make_shared<dialler>(
+        io.get_executor(), cles::limits{}, [](tcp::socket&) { return cles::identity{}; },
+        [&](boost::system::error_code, const cles::link_ptr&) { called = true; });
+    d->start({nobody(), listener.local_endpoint()});
+    d->give_up();
+    cles::test::run_ready(io);
+    BOOST_TEST(!called);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
