@@ -26,13 +26,14 @@ namespace {
 constexpr const char* description =
     "Measure PULL of a localization packet against a hand-written exchange of packed structs over\n"
     "blocking TCP sockets, both in one run, in turn, each server in a process of its own on another\n"
-    "core. With --updates, measure BIND and UPDATE instead.";
+    "core. With --updates, measure BIND and UPDATE instead; with --stress, the steadiness of PULL.";
 
 constexpr const char* examples = "Examples:\n"
                                  "  cles bench\n"
                                  "  cles bench --transport unix\n"
                                  "  cles bench --in-flight 64 --style callback -o json\n"
                                  "  cles bench --busy-poll 50\n"
+                                 "  cles bench --stress\n"
                                  "  cles bench --against tcp://10.0.0.2\n"
                                  "  cles bench --updates --binders 8\n";
 
@@ -62,6 +63,7 @@ struct arguments {
     std::string duration{};
     std::string form = "table";
     bool updates = false;
+    bool stress = false;
     int busy_poll_us = 0;
 };
 
@@ -75,7 +77,14 @@ void check(CLI::App& command, arguments& given) {
             throw usage_error(std::string{option} + " " + why);
         }
     };
-    if (given.updates) {
+    if (given.stress) {
+        for (const char* option : {"--updates", "--against", "--binders", "--keep"}) {
+            refuse(option, "is not for --stress");
+        }
+        if (given.options.transport == carrier::inproc) {
+            throw usage_error("--stress goes from one process to another: --transport tcp or unix");
+        }
+    } else if (given.updates) {
         for (const char* option : {"--in-flight", "--against", "--duration"}) {
             refuse(option, "is not for --updates");
         }
@@ -102,7 +111,10 @@ void run(CLI::App& command, arguments& given) {
         note("there is one core only: both ends share it, and the figures say little");
     }
     const bool json = given.form == "json";
-    if (given.updates) {
+    if (given.stress) {
+        const auto report = bench_stress(given.options);
+        write_output(json ? cles::to_json(report) + "\n" : table_of(report));
+    } else if (given.updates) {
         const auto report = bench_updates(given.options);
         write_output(json ? cles::to_json(report) + "\n" : table_of(report));
     } else {
@@ -145,6 +157,9 @@ void add_bench(CLI::App& app, int& exit_code) {
         ->check(CLI::Range(0, most_busy_poll_us).description(""))
         ->type_name("US");
     command->add_flag("--one-core", options.one_core, "Put both ends on one core");
+    command->add_flag("--stress", given->stress,
+                      "Measure the tail of PULL's latency while other processes want all cores, with and without "
+                      "real-time scheduling");
     command->add_flag("--updates", given->updates, "Measure UPDATE to binders instead of PULL");
     command->add_option("--binders", options.binders, "Bindings, each on a link of its own (1)")
         ->check(CLI::Range(std::size_t{1}, most_binders).description(""))

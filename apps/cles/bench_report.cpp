@@ -158,6 +158,15 @@ update_figures median_of(const std::vector<update_figures>& passes) {
     return result;
 }
 
+latency_figures median_of(const std::vector<latency_figures>& passes) {
+    using figures = latency_figures;
+    const medians of{passes};
+    return {.p50_us = of(&figures::p50_us),
+            .p99_us = of(&figures::p99_us),
+            .p999_us = of(&figures::p999_us),
+            .max_us = of(&figures::max_us)};
+}
+
 exchange_ratio ratio_of(const exchange_figures& cles, const exchange_figures& icd) {
     return {.p50 = over(cles.p50_us, icd.p50_us),
             .p99 = over(cles.p99_us, icd.p99_us),
@@ -193,6 +202,30 @@ std::string table_of(const update_report& report) {
            (report.binders == 1 ? "" : "s") + ", " + report.style + "s" + polling(report.busy_poll_us) + ", " +
            fixed(report.update_bytes, 1) + " bytes per update, CPU per delivery; " +
            cores(report.client_core, report.server_core) + "\n";
+}
+
+std::string table_of(const stress_report& report) {
+    rows out{{"PULL localization", "p50 us", "p99 us", "p99.9 us", "max us"}};
+    const auto add = [&](const char* name, const latency_figures& figures) {
+        out.add({name, fixed(figures.p50_us, 1), fixed(figures.p99_us, 1), fixed(figures.p999_us, 1),
+                 fixed(figures.max_us, 1)});
+    };
+    add("idle cores", report.idle);
+    if (report.idle_fifo) {
+        add("idle cores, SCHED_FIFO", *report.idle_fifo);
+    }
+    add("loaded cores", report.loaded);
+    if (report.idle_fifo && report.loaded_fifo) {
+        add("loaded cores, SCHED_FIFO", *report.loaded_fifo);
+        const auto& idle = *report.idle_fifo;
+        const auto& loaded = *report.loaded_fifo;
+        out.add({"loaded / idle, SCHED_FIFO", times(over(loaded.p50_us, idle.p50_us)),
+                 times(over(loaded.p99_us, idle.p99_us)), times(over(loaded.p999_us, idle.p999_us)),
+                 times(over(loaded.max_us, idle.max_us))});
+    }
+    return out.text() + "medians of " + std::to_string(report.rounds) + " rounds over " + report.transport + ", " +
+           report.style + "s" + polling(report.busy_poll_us) + "; load: " + std::to_string(report.processes) +
+           " processes that never sleep; " + cores(report.client_core, report.server_core) + "\n";
 }
 
 } // namespace tool

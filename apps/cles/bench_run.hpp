@@ -12,4 +12,7 @@ pull_report bench_pulls(const bench_options& options);
 /// UPDATE as fast as all binders take it, as text and as C++ values in turn.
 update_report bench_updates(const bench_options& options);
 
+/// The tail of PULL's latency while other processes want the same cores, with and without real-time scheduling.
+stress_report bench_stress(const bench_options& options);
+
 } // namespace tool

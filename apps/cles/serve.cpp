@@ -34,6 +34,7 @@ struct serve_command {
     bool insecure = false;
     double rate = 10;
     int busy_poll_us = 0;
+    int real_time = 0;
 };
 
 cles::service_options options_of(const serve_command& wanted, const cles::log_sink& log) {
@@ -63,7 +64,9 @@ int serve(const serve_command& wanted, int verbosity) {
     for (const auto& endpoint : node.service().endpoints()) {
         write_output(wanted.name + " listening on " + endpoint + "\n");
     }
-    cles::run(io, {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us}});
+    cles::run(io, {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us},
+                   .fifo_priority = wanted.real_time,
+                   .lock_memory = wanted.real_time != 0});
     return exit_code::success;
 }
 
@@ -87,6 +90,11 @@ void add_serve(CLI::App& app, context& shared) {
                      "Look for work so many microseconds before sleeping: quicker answers for processor time (0)")
         ->type_name("US")
         ->check(CLI::Range(0, 1'000'000).description(""));
+    command
+        ->add_option("--real-time", wanted->real_time,
+                     "Run under SCHED_FIFO with this priority, 1 to 99, and with all memory locked")
+        ->type_name("PRIO")
+        ->check(CLI::Range(1, 99).description(""));
     command->add_flag("--insecure", wanted->insecure,
                       "Allow listening beyond this host, where anybody may ask for anything");
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"

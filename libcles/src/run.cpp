@@ -2,8 +2,11 @@
 #include <cles/run.hpp>
 
 #include "core/spin_budget.hpp"
+#include "shell/real_time.hpp"
 
 #include <boost/asio/io_context.hpp>
+
+#include <optional>
 
 #include <sys/resource.h>
 
@@ -38,6 +41,13 @@ std::size_t spin(boost::asio::io_context& io, std::chrono::nanoseconds limit, co
 } // namespace
 
 std::size_t run(boost::asio::io_context& io, const run_options& options) {
+    if (options.lock_memory) {
+        shell::lock_memory();
+    }
+    std::optional<shell::fifo_scheduling> scheduling;
+    if (options.fifo_priority != 0) {
+        scheduling.emplace(options.fifo_priority);
+    }
     if (options.busy_poll.count() <= 0) {
         return io.run();
     }

@@ -62,6 +62,20 @@ class Updates(unittest.TestCase):
             self.assertGreater(figures["deliveries_per_s"], 0)
 
 
+class Stress(unittest.TestCase):
+    def test_loaded_cores_are_measured_beside_idle_ones(self):
+        report = measure("--stress")
+        self.assertEqual((report["bench"], report["requests"]), ("stress", 200))
+        self.assertGreaterEqual(report["processes"], 2)
+        for name in ("idle", "idle_fifo", "loaded", "loaded_fifo"):
+            figures = report.get(name)
+            if figures is None:  # the system gives no real-time priority
+                self.assertTrue(name.endswith("_fifo"), report)
+                continue
+            self.assertTrue(0 < figures["p50_us"] <= figures["p99_us"] <= figures["p999_us"] <= figures["max_us"])
+        self.assertEqual("idle_fifo" in report, "loaded_fifo" in report)
+
+
 class Against(NodeTest):
     def test_a_node_that_runs_already(self):
         report = measure("--against", self.node.url)
@@ -80,6 +94,8 @@ class Usage(unittest.TestCase):
             (("--binders", "2"), "--binders is for --updates"),
             (("--updates", "--in-flight", "2"), "--in-flight is not for --updates"),
             (("--updates", "--transport", "inproc"), "--transport"),
+            (("--stress", "--updates"), "--updates is not for --stress"),
+            (("--stress", "--transport", "inproc"), "--transport"),
             (("--against", "tcp://127.0.0.1:1", "--transport", "tcp"), "--transport"),
         ):
             code, out, err = cles("bench", *arguments)

@@ -18,6 +18,10 @@
 #include <chrono>
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <system_error>
+
+#include <sched.h>
 
 BOOST_AUTO_TEST_SUITE(run)
 
@@ -53,6 +57,29 @@ BOOST_DATA_TEST_CASE(lets_out_what_a_handler_throws_and_goes_on_when_called_agai
     BOOST_CHECK_THROW(cles::run(io, {.busy_poll = bound}), std::runtime_error);
     cles::run(io, {.busy_poll = bound});
     BOOST_TEST(ran == 1);
+}
+
+BOOST_AUTO_TEST_CASE(takes_the_priority_it_is_told_and_gives_it_back) {
+    asio::io_context io;
+    int policy = -1;
+    asio::post(io, [&] { policy = ::sched_getscheduler(0); });
+    try {
+        cles::run(io, {.fifo_priority = 1});
+        BOOST_TEST(policy == SCHED_FIFO);
+    } catch (const std::system_error& refused) {
+        BOOST_TEST(policy == -1); // nothing ran
+        BOOST_TEST((refused.code() == std::errc::operation_not_permitted));
+        BOOST_TEST(std::string{refused.what()}.find("CAP_SYS_NICE") != std::string::npos);
+    }
+    BOOST_TEST(::sched_getscheduler(0) == SCHED_OTHER);
+}
+
+BOOST_AUTO_TEST_CASE(a_priority_that_does_not_exist_is_refused_before_anything_runs) {
+    asio::io_context io;
+    bool ran = false;
+    asio::post(io, [&] { ran = true; });
+    BOOST_CHECK_THROW(cles::run(io, {.fifo_priority = 1000}), std::system_error);
+    BOOST_TEST(!ran);
 }
 
 BOOST_DATA_TEST_CASE(serves_a_peer, bounds, bound) {

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/service.hpp>
+
+#include "bench_progress.hpp"
+#include "bench_run.hpp"
+#include "diagnostics.hpp"
+#include "perf/child_process.hpp"
+#include "perf/core_load.hpp"
+#include "perf/latency_recorder.hpp"
+#include "perf/pinning.hpp"
+#include "perf/pull_exchange.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <memory>
+#include <string>
+#include <system_error>
+#include <vector>
+
+namespace tool {
+
+namespace perf = cles::perf;
+
+namespace {
+
+constexpr std::uint64_t requests_unless_told = 20'000;
+constexpr int hogs_per_core = 2;
+constexpr int priority = 50; // in the middle: above what is normal, below what the kernel itself needs
+
+/// A node, its client, and how both are scheduled.
+class pair_of_ends {
+  public:
+    pair_of_ends(const perf::placement& cores, const bench_options& options, const cles::run_options& how)
+        : options_(options), how_(how), server_(cores.server, [&](const perf::child_process::announce& announce) {
+              perf::serve_localization(bench_url(options.transport), how, announce);
+          }) {}
+
+    /// After all processes have been forked.
+    void connect(boost::asio::io_context& io) {
+        client_ = std::make_unique<cles::service>(
+            io, cles::service_options{.name = "bench", .peers = {{"car1", server_.announced()}}});
+        load_ = std::make_unique<perf::pull_load>(io, *client_, "car1:localization", options_.style, true, how_);
+    }
+
+    latency_figures pass(perf::latency_recorder& record) {
+        const auto limit =
+            options_.duration ? std::chrono::nanoseconds{*options_.duration} : std::chrono::nanoseconds::max();
+        load_->run(options_.in_flight, limit, record);
+        const auto found = record.quantiles();
+        return {.p50_us = found.p50, .p99_us = found.p99, .p999_us = found.p999, .max_us = found.max};
+    }
+
+  private:
+    const bench_options& options_;
+    cles::run_options how_;
+    perf::child_process server_;
+    std::unique_ptr<cles::service> client_;
+    std::unique_ptr<perf::pull_load> load_;
+};
+
+bool may_be_real_time(const cles::run_options& how) {
+    try {
+        boost::asio::io_context nothing_to_do;
+        cles::run(nothing_to_do, how);
+        return true;
+    } catch (const std::system_error& refused) {
+        note(std::string{"without real-time scheduling: "} + refused.what());
+        return false;
+    }
+}
+
+} // namespace
+
+stress_report bench_stress(const bench_options& options) {
+    const auto all_cores = perf::usable_cores(); // as long as this thread is not bound to one
+    const auto cores = places_of(options);
+    auto urgent = options.how;
+    urgent.fifo_priority = priority;
+
+    // The children come first: before there is anything of ours that they would inherit.
+    pair_of_ends normal{cores, options, options.how};
+    std::unique_ptr<pair_of_ends> real_time;
+    if (may_be_real_time(urgent)) {
+        urgent.lock_memory = true;
+        real_time = std::make_unique<pair_of_ends>(cores, options, urgent);
+    }
+    perf::pin_to(cores.client);
+    boost::asio::io_context io{1};
+    normal.connect(io);
+    if (real_time) {
+        real_time->connect(io);
+    }
+
+    const auto requests = options.requests != 0 ? options.requests : requests_unless_told;
+    perf::latency_recorder record{requests};
+    std::vector<latency_figures> idle;
+    std::vector<latency_figures> idle_fifo;
+    std::vector<latency_figures> loaded;
+    std::vector<latency_figures> loaded_fifo;
+    bench_progress progress{options.rounds * 2};
+    const auto measure = [&](auto& normally, auto& first) {
+        normal.pass(record); // warms up
+        normally.push_back(normal.pass(record));
+        if (real_time) {
+            real_time->pass(record);
+            first.push_back(real_time->pass(record));
+        }
+    };
+    for (std::size_t round = 0; round < options.rounds; ++round) {
+        progress.step("on idle cores");
+        measure(idle, idle_fifo);
+        progress.step("on cores that others want");
+        const perf::core_load others{all_cores, hogs_per_core};
+        measure(loaded, loaded_fifo);
+    }
+
+    stress_report report{.transport = to_string(options.transport),
+                         .style = to_string(options.style),
+                         .rounds = options.rounds,
+                         .requests = requests,
+                         .busy_poll_us = options.how.busy_poll.count(),
+                         .processes = hogs_per_core * all_cores.size(),
+                         .client_core = cores.client,
+                         .server_core = cores.server,
+                         .idle = median_of(idle),
+                         .loaded = median_of(loaded)};
+    if (real_time) {
+        report.idle_fifo = median_of(idle_fifo);
+        report.loaded_fifo = median_of(loaded_fifo);
+    }
+    return report;
+}
+
+} // namespace tool
