@@ -29,7 +29,8 @@ bool pass(int from, int to, std::atomic<std::uint64_t>& count, buffer& space) {
 
 } // namespace
 
-byte_tap::byte_tap(const cles::url& target) : listener_(listen_on_loopback()), server_(connect_to(target)) {
+byte_tap::byte_tap(const cles::url& target)
+    : listener_(listen_on({.scheme = "tcp", .host = "127.0.0.1", .port = 0, .path = {}})), server_(connect_to(target)) {
     std::array<int, 2> ends{};
     checked(::pipe2(ends.data(), O_CLOEXEC), "pipe");
     stop_here_ = descriptor{ends[0]};
@@ -42,7 +43,7 @@ byte_tap::~byte_tap() {
     relay_.join();
 }
 
-std::string byte_tap::url() const { return "tcp://127.0.0.1:" + std::to_string(listener_.port); }
+std::string byte_tap::url() const { return to_string(listener_.where); }
 
 void byte_tap::run() {
     buffer space;
@@ -53,7 +54,7 @@ void byte_tap::run() {
     try {
         while (::poll(watched.data(), watched.size(), -1) > 0 && watched[0].revents == 0) {
             if (client.get() < 0) {
-                client = accept_from(listener_.socket);
+                client = accept_from(listener_);
                 watched[1].fd = server_.get();
                 watched[2].fd = client.get();
                 continue;

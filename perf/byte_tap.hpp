@@ -31,7 +31,7 @@ class byte_tap {
   private:
     void run();
 
-    loopback_listener listener_;
+    listener listener_;
     descriptor server_;
     descriptor stop_here_;
     descriptor stop_;

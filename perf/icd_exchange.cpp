@@ -10,7 +10,7 @@ namespace cles::perf::icd {
 
 void server::run() {
     for (;;) {
-        const auto client = accept_from(listener_.socket);
+        const auto client = accept_from(listener_);
         try {
             serve(client.get());
         } catch (const std::exception&) {

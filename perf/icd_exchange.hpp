@@ -6,26 +6,26 @@
 
 #include <cstdint>
 
-/// The baseline: a packed struct over TCP with blocking sockets, as a careful engineer writes it by hand for one task.
+/// The baseline: a packed struct over a stream, with blocking sockets, as a careful engineer writes it by hand for one task.
 namespace cles::perf::icd {
 
 class server {
   public:
-    server() : listener_(listen_on_loopback()) {}
-    [[nodiscard]] std::uint16_t port() const noexcept { return listener_.port; }
+    explicit server(const url& where) : listener_(listen_on(where)) {}
+    [[nodiscard]] const url& where() const noexcept { return listener_.where; }
     /// Serves one client after the other, for ever.
     [[noreturn]] void run();
 
   private:
     void serve(int client);
 
-    loopback_listener listener_;
+    listener listener_;
     std::uint64_t served_ = 0;
 };
 
 class client {
   public:
-    explicit client(std::uint16_t port) : socket_(connect_to_loopback(port)) {}
+    explicit client(const url& where) : socket_(connect_to(where)) {}
     /// Sends the request and waits for the reply.
     /// \throws std::system_error, or std::runtime_error where the reply is none
     localization pull();

@@ -48,49 +48,70 @@ descriptor connect_tcp(const url& where) {
     return socket;
 }
 
+struct unix_address {
+    explicit unix_address(const url& where) {
+        name.sun_family = AF_UNIX;
+        if (where.path.size() >= sizeof name.sun_path) {
+            throw std::runtime_error(to_string(where) + ": the path is too long for a socket");
+        }
+        std::memcpy(name.sun_path, where.path.data(), where.path.size());
+        length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + where.path.size() + 1);
+        if (where.path.starts_with('@')) { // abstract: a zero in front, none behind
+            name.sun_path[0] = '\0';
+            --length;
+        }
+    }
+    [[nodiscard]] const sockaddr* get() const noexcept { return reinterpret_cast<const sockaddr*>(&name); }
+
+    sockaddr_un name{};
+    socklen_t length = 0;
+};
+
 descriptor connect_unix(const url& where) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    if (where.path.size() >= sizeof address.sun_path) {
-        throw std::runtime_error(to_string(where) + ": the path is too long for a socket");
-    }
-    std::memcpy(address.sun_path, where.path.data(), where.path.size());
-    auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + where.path.size() + 1);
-    if (where.path.starts_with('@')) { // abstract: a zero in front, none behind
-        address.sun_path[0] = '\0';
-        --length;
-    }
+    const unix_address address{where};
     descriptor socket{checked(::socket(AF_UNIX, stream, 0), "socket")};
-    checked(::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), length), "connect");
+    checked(::connect(socket.get(), address.get(), address.length), "connect");
     return socket;
 }
 
-} // namespace
-
-loopback_listener listen_on_loopback() {
-    loopback_listener made{descriptor{checked(::socket(AF_INET, stream, 0), "socket")}};
-    auto address = loopback(0);
+listener listen_tcp(const url& where) {
+    listener made{descriptor{checked(::socket(AF_INET, stream, 0), "socket")}, where};
+    auto address = loopback(where.port);
     socklen_t length = sizeof address;
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     checked(::bind(made.socket.get(), generic, length), "bind");
     checked(::listen(made.socket.get(), 8), "listen");
     checked(::getsockname(made.socket.get(), generic, &length), "getsockname");
-    made.port = ntohs(address.sin_port);
+    made.where.port = ntohs(address.sin_port);
     return made;
 }
 
-descriptor accept_from(const descriptor& listener) {
-    descriptor accepted{checked(::accept4(listener.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept")};
-    tune(accepted);
-    return accepted;
+listener listen_unix(const url& where) {
+    const unix_address address{where};
+    listener made{descriptor{checked(::socket(AF_UNIX, stream, 0), "socket")}, where};
+    checked(::bind(made.socket.get(), address.get(), address.length), "bind");
+    checked(::listen(made.socket.get(), 8), "listen");
+    return made;
 }
 
-descriptor connect_to_loopback(std::uint16_t port) {
-    const auto address = loopback(port);
-    descriptor socket{checked(::socket(AF_INET, stream, 0), "socket")};
-    tune(socket);
-    checked(::connect(socket.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address), "connect");
-    return socket;
+} // namespace
+
+listener listen_on(const url& where) {
+    if (where.scheme == "tcp") {
+        return listen_tcp(where);
+    }
+    if (where.scheme == "unix") {
+        return listen_unix(where);
+    }
+    throw std::runtime_error(to_string(where) + ": neither tcp nor unix");
+}
+
+descriptor accept_from(const listener& at) {
+    descriptor accepted{checked(::accept4(at.socket.get(), nullptr, nullptr, SOCK_CLOEXEC), "accept")};
+    if (at.where.scheme == "tcp") {
+        tune(accepted);
+    }
+    return accepted;
 }
 
 descriptor connect_to(const url& where) {

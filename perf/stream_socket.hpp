@@ -12,17 +12,17 @@
 /// Blocking stream sockets, bare: for what must not go through the library that it measures.
 namespace cles::perf {
 
-struct loopback_listener {
+struct listener {
     descriptor socket;
-    std::uint16_t port = 0;
+    url where; ///< with the port that the system chose
 };
 
-/// Listens on the loopback, at a port of the system's choice.
-loopback_listener listen_on_loopback();
-/// Takes the next connection. This and `connect_to_loopback` set the flags that the library sets on its own sockets.
-descriptor accept_from(const descriptor& listener);
+/// Listens at a `tcp` URL on the loopback, or at a `unix` one.
+/// \throws std::system_error, or std::runtime_error where the scheme is another
+listener listen_on(const url& where);
+/// Takes the next connection. This and `connect_to` set the flags that the library sets on its own sockets.
+descriptor accept_from(const listener& at);
 
-descriptor connect_to_loopback(std::uint16_t port);
 /// Connects to a `tcp` or `unix` URL.
 /// \throws std::system_error, or std::runtime_error where the host has no address or the scheme is another
 descriptor connect_to(const url& where);

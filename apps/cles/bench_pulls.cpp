@@ -131,14 +131,14 @@ std::string name_of_node_at(const std::string& url) {
 /// The hand-written exchange, both ends.
 class baseline {
   public:
-    explicit baseline(int core)
+    baseline(int core, const std::string& url)
         : server_(core,
-                  [](const perf::child_process::announce& announce) {
-                      perf::icd::server server;
-                      announce(std::to_string(server.port()));
+                  [&](const perf::child_process::announce& announce) {
+                      perf::icd::server server{cles::parse_url(url)};
+                      announce(to_string(server.where()));
                       server.run();
                   }),
-          client_(static_cast<std::uint16_t>(std::stoul(server_.announced()))) {}
+          client_(cles::parse_url(server_.announced())) {}
 
     exchange_figures pass(std::chrono::nanoseconds at_most, perf::latency_recorder& record) {
         auto figures = pass_meter{server_.id()}.measure(record, [&] { return pull_by_hand(client_, at_most, record); });
@@ -162,11 +162,15 @@ pull_report bench_pulls(const bench_options& options) {
 
     // The children come first: before there is anything of ours that they would inherit.
     std::unique_ptr<baseline> by_hand;
+    std::unique_ptr<baseline> by_hand_unix; // what the sockets themselves make of it
     std::unique_ptr<perf::child_process> server;
     std::string url = options.against;
     if (!remote) {
-        by_hand = std::make_unique<baseline>(cores.server);
+        by_hand = std::make_unique<baseline>(cores.server, bench_url(carrier::tcp));
         url = bench_url(options.transport);
+    }
+    if (!remote && options.transport == carrier::unix_socket) {
+        by_hand_unix = std::make_unique<baseline>(cores.server, url + "-by-hand");
     }
     if (!remote && !inproc) {
         server =
@@ -199,6 +203,7 @@ pull_report bench_pulls(const bench_options& options) {
     const pass_meter meter{server ? std::optional{server->id()} : std::nullopt};
 
     std::vector<exchange_figures> hand_written;
+    std::vector<exchange_figures> hand_written_unix;
     std::vector<exchange_figures> ours;
     pull_report report{.transport = remote ? cles::parse_url(url).scheme : to_string(options.transport),
                        .style = to_string(options.style),
@@ -206,12 +211,18 @@ pull_report bench_pulls(const bench_options& options) {
                        .rounds = options.rounds,
                        .busy_poll_us = options.how.busy_poll.count(),
                        .client_core = cores.client};
-    bench_progress progress{options.rounds * (by_hand ? 2 : 1)};
+    const std::size_t exchanges = 1U + (by_hand ? 1U : 0U) + (by_hand_unix ? 1U : 0U);
+    bench_progress progress{options.rounds * exchanges};
     for (std::size_t round = 0; round < options.rounds; ++round) {
         if (by_hand) {
             progress.step("hand-written exchange");
             by_hand->pass(limit, by_hand_warm_up);
             hand_written.push_back(by_hand->pass(limit, by_hand_record));
+        }
+        if (by_hand_unix) {
+            progress.step("hand-written exchange over a Unix socket");
+            by_hand_unix->pass(limit, by_hand_warm_up);
+            hand_written_unix.push_back(by_hand_unix->pass(limit, by_hand_record));
         }
         progress.step("CLES");
         load.run(options.in_flight, limit, warm_up);
@@ -234,6 +245,9 @@ pull_report bench_pulls(const bench_options& options) {
         report.server_core = inproc ? std::nullopt : std::optional{cores.server};
         report.icd = median_of(hand_written);
         report.ratio = ratio_of(report.cles, *report.icd);
+        if (by_hand_unix) {
+            report.icd_unix = median_of(hand_written_unix);
+        }
     }
     return report;
 }

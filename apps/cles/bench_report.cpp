@@ -182,6 +182,9 @@ std::string table_of(const pull_report& report) {
     if (report.icd) {
         out.add(cells_of("hand-written (tcp)", *report.icd));
     }
+    if (report.icd_unix) {
+        out.add(cells_of("hand-written (unix)", *report.icd_unix));
+    }
     out.add(cells_of("CLES (" + report.transport + ")", report.cles));
     if (report.ratio) {
         const auto& ratio = *report.ratio;

@@ -29,7 +29,7 @@ BOOST_DESCRIBE_STRUCT(exchange_figures, (),
                       (p50_us, p99_us, p999_us, max_us, requests_per_s, cpu_us, cpu_client_us, cpu_server_us,
                        request_bytes, reply_bytes))
 
-/// CLES divided by the hand-written exchange.
+/// CLES divided by the hand-written exchange over TCP.
 struct exchange_ratio {
     double p50 = 0;
     double p99 = 0;
@@ -52,13 +52,14 @@ struct pull_report {
     int client_core = 0;
     std::optional<int> server_core{}; ///< nothing where both ends are one process, or the server is none of ours
     std::optional<std::string> against{};
-    std::optional<exchange_figures> icd{};
+    std::optional<exchange_figures> icd{};      ///< over TCP
+    std::optional<exchange_figures> icd_unix{}; ///< beside CLES over a Unix socket
     exchange_figures cles{};
     std::optional<exchange_ratio> ratio{};
 };
 BOOST_DESCRIBE_STRUCT(pull_report, (),
                       (bench, transport, style, in_flight, rounds, requests, busy_poll_us, client_core, server_core,
-                       against, icd, cles, ratio))
+                       against, icd, icd_unix, cles, ratio))
 
 struct update_figures {
     double deliveries_per_s = 0;

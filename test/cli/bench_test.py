@@ -35,7 +35,9 @@ class Pulls(unittest.TestCase):
         self.assertTrue(80 < report["cles"]["reply_bytes"] <= 132, report["cles"])
 
     def test_other_carriers_and_ways_to_ask(self):
-        self.assertEqual(measure("--transport", "unix")["transport"], "unix")
+        report = measure("--transport", "unix")
+        self.assertEqual(report["transport"], "unix")
+        self.assertGreater(report["icd_unix"]["p50_us"], 0)
         self.assertEqual(measure("--transport", "inproc")["transport"], "inproc")
         many = measure("--in-flight", "8", "--style", "callback")
         self.assertEqual((many["in_flight"], many["style"]), (8, "callback"))
