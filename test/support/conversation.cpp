@@ -18,7 +18,7 @@
 namespace cles::test {
 namespace {
 
-constexpr std::uint64_t longest_text = 1'000'000;
+constexpr std::size_t longest_text = 1'000'000;
 constexpr std::uint64_t longest_pass = 100'000'000; // milliseconds
 
 /// Takes the first word off.
@@ -37,11 +37,14 @@ std::uint64_t number(std::string_view text, std::uint64_t most) {
     return *n;
 }
 
-std::string_view json(std::string_view text) {
+/// JSON as handlers and programs give it: valid, without white space. Nothing is nothing.
+std::string json(std::string_view text) {
+    std::string compact;
     if (!text.empty() && !is_valid_json(text)) {
         throw script_error{"'" + std::string{text} + "' is not JSON"};
     }
-    return text;
+    append_compact_json(text, compact);
+    return compact;
 }
 
 cles::verb verb_named(std::string_view name) {
@@ -133,8 +136,9 @@ void conversation::add_quick_tasks() {
         w.end_array();
         w.end_object();
     });
-    node.on(verb::pull, "text", [](const request& r, json_writer& w) {
-        w.value(std::string(std::min(r.parameter<std::uint64_t>(0), longest_text), 'x'));
+    // Long enough to be too long.
+    node.on(verb::pull, "text", [longest = std::min(bounds.line * 2, longest_text)](const request& r, json_writer& w) {
+        w.value(std::string(std::min(r.parameter<std::size_t>(0), longest), 'x'));
     });
     const auto give_back = [](const request& r, json_writer& w) {
         std::string body;
@@ -301,7 +305,11 @@ void conversation::ask(char name, std::string_view rest) {
                             std::to_string(static_cast<int>(fraction * 100)) + " " + std::string{body});
         };
     }
-    request.body = json(rest);
+    const auto body = json(rest);
+    request.body = body;
+    if (!body.empty() && (request.verb == verb::pull || request.verb == verb::bind)) {
+        throw script_error{"this verb takes no body"};
+    }
     const auto known = asked_.find(id);
     if (id == 0 || (known != asked_.end() && known->second == told_reply::state::waiting)) {
         throw script_error{"the id is in flight"};
