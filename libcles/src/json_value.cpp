@@ -19,7 +19,8 @@ bool read_number(json_reader& r, json::value& value) {
         return false;
     }
     json_reader number{raw};
-    if (raw.find_first_of(".eE") == std::string_view::npos) {
+    // -0 is what is written for a double, and no integer has its sign.
+    if (raw.find_first_of(".eE") == std::string_view::npos && raw != "-0") {
         const auto end = raw.data() + raw.size();
         std::int64_t i = 0;
         if (const auto [ptr, code] = std::from_chars(raw.data(), end, i); code == std::errc{}) {

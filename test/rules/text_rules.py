@@ -19,6 +19,8 @@ HASH_SUFFIXES = {".py", ".sh", ".cmake", ".yaml", ".yml", ".toml", ".service"}
 HASH_NAMES = {"CMakeLists.txt", ".clang-format", ".clang-tidy"}
 # No comment can stand there, or the file is not ours to mark.
 UNMARKED = {"LICENSE", ".gitignore", ".gitattributes"}
+# Inputs of tests, which are as they are.
+DATA = "test/fuzz/corpus/"
 SKIPPED_FOLDERS = {".git", "build", ".cache", "__pycache__"}
 
 # Written apart, so that this file does not find itself.
@@ -97,9 +99,10 @@ class Texts:
         self.violations: list[str] = []
         self.texts: dict[str, str] = {}
         for path in files_of(root):
+            name = path.relative_to(root).as_posix()
             data = path.read_bytes()
-            if b"\0" not in data:
-                self.texts[path.relative_to(root).as_posix()] = data.decode("utf-8", errors="replace")
+            if b"\0" not in data and not name.startswith(DATA):
+                self.texts[name] = data.decode("utf-8", errors="replace")
 
     def complain(self, name: str, line: int, what: str) -> None:
         self.violations.append(f"{name}:{line}: {what}")
@@ -183,7 +186,7 @@ class Texts:
             self.check_words(name, lines)
             if name.endswith(".md"):
                 self.check_links(name, text)
-            if re.match(r"test/(unit|simulation|contract|integration)/\w+_test\.cpp$", name):
+            if re.match(r"test/(unit|golden|simulation|contract|integration)/\w+_test\.cpp$", name):
                 self.check_suite(name, text)
         return self.violations
 
@@ -199,6 +202,7 @@ GOOD = {
     "BOOST_AUTO_TEST_SUITE(inner)\nBOOST_AUTO_TEST_SUITE_END()\nBOOST_AUTO_TEST_SUITE_END()\n",
     "README.md": "# CLES\n\n## What `it` is, and why\n\n[a](docs/b.md) [b](docs/b.md#one-two) [c](#what-it-is-and-why)\n"
     "[web](https://example.org/x) `[code](nowhere.md)`\n\n```\n[code](nowhere.md)\n# no heading\n```\n\n[r]: a.cpp\n",
+    "test/fuzz/corpus/json/spaces": " {} ",
     "docs/b.md": "# B\n\n## One, two\n\n[up](../README.md)\n",
 }
 

@@ -59,6 +59,13 @@ BOOST_AUTO_TEST_CASE(doubles_come_back_the_same_to_the_bit) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(zero_keeps_its_sign) {
+    BOOST_TEST(std::signbit(cles::from_json<value>(cles::to_json(value(-0.0))).to_number<double>()));
+    BOOST_TEST(std::signbit(cles::from_json<value>("[-0]").at(0).to_number<double>()));
+    BOOST_TEST(cles::to_json(cles::from_json<value>("-0")) == "-0");
+    BOOST_TEST(cles::from_json<value>("0").is_int64());
+}
+
 BOOST_AUTO_TEST_CASE(keys_and_strings_are_unescaped_and_escaped) {
     const auto tree = cles::from_json<value>("{\"\\u00e4\":\"\\\"\",\"plain\":\"\\uD83D\\uDE97\"}");
     BOOST_TEST((tree.at("\xC3\xA4").as_string() == "\""));

@@ -6,6 +6,6 @@
 namespace cles {
 
 /// The library's version (semantic versioning); the protocol's own is 1.
-inline constexpr std::string_view version = "0.1.0";
+inline constexpr std::string_view version = "1.0.0";
 
 } // namespace cles

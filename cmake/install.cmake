@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: BSL-1.0
+
+# What `cmake --install` puts where. All of it may be moved afterwards: nothing names a path of this machine but where
+# Boost is, if that is none of the compiler's own places.
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+set(cles_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/cles")
+
+# --- Headers and the library -------------------------------------------------------------------------------------------
+
+install(DIRECTORY libcles/include/cles DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")
+install(TARGETS cles EXPORT cles-targets
+    ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
+    INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+
+# --- find_package(cles) ------------------------------------------------------------------------------------------------
+
+install(EXPORT cles-targets NAMESPACE cles:: DESTINATION "${cles_package_dir}")
+configure_package_config_file(cmake/cles-config.cmake.in "${PROJECT_BINARY_DIR}/package/cles-config.cmake"
+    INSTALL_DESTINATION "${cles_package_dir}"
+    NO_SET_AND_CHECK_MACRO)
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/package/cles-config-version.cmake"
+    COMPATIBILITY SameMajorVersion)
+install(FILES
+    "${PROJECT_BINARY_DIR}/package/cles-config.cmake"
+    "${PROJECT_BINARY_DIR}/package/cles-config-version.cmake"
+    DESTINATION "${cles_package_dir}")
+
+# --- pkg-config --------------------------------------------------------------------------------------------------------
+
+# cles_flags_of_boost(cflags libs): what g++ has to be told of the Boost that the library was built with, which brings no
+# pkg-config files of its own. The file's name says static or shared, as it was here.
+function(cles_flags_of_boost cflags_out libs_out)
+    set(cflags "")
+    get_target_property(includes Boost::headers INTERFACE_INCLUDE_DIRECTORIES)
+    foreach(folder IN LISTS includes)
+        if(NOT folder IN_LIST CMAKE_CXX_IMPLICIT_INCLUDE_DIRECTORIES)
+            string(APPEND cflags " -isystem ${folder}")
+        endif()
+    endforeach()
+
+    set(libs "")
+    get_target_property(file Boost::json IMPORTED_LOCATION_RELEASE)
+    if(NOT file)
+        get_target_property(file Boost::json LOCATION)
+    endif()
+    get_filename_component(folder "${file}" DIRECTORY)
+    get_filename_component(name "${file}" NAME)
+    if(NOT folder IN_LIST CMAKE_CXX_IMPLICIT_LINK_DIRECTORIES)
+        string(APPEND libs " -L${folder}")
+    endif()
+    string(APPEND libs " -l:${name}")
+
+    set(${cflags_out} "${cflags}" PARENT_SCOPE)
+    set(${libs_out} "${libs}" PARENT_SCOPE)
+endfunction()
+
+cles_flags_of_boost(cles_pc_cflags cles_pc_libs)
+# Whoever compiles against the library has to agree with it on these.
+get_target_property(cles_pc_definitions cles INTERFACE_COMPILE_DEFINITIONS)
+list(TRANSFORM cles_pc_definitions PREPEND " -D")
+string(CONCAT cles_pc_cflags ${cles_pc_definitions} "${cles_pc_cflags}")
+file(RELATIVE_PATH cles_pc_prefix "${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig" "${CMAKE_INSTALL_PREFIX}")
+string(REGEX REPLACE "/$" "" cles_pc_prefix "${cles_pc_prefix}")
+configure_file(cmake/cles.pc.in "${PROJECT_BINARY_DIR}/package/cles.pc" @ONLY)
+install(FILES "${PROJECT_BINARY_DIR}/package/cles.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+
+# --- The program -------------------------------------------------------------------------------------------------------
+
+if(TARGET cles_command)
+    install(TARGETS cles_command RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+endif()
+
+# --- The licence and the pages -----------------------------------------------------------------------------------------
+
+# As they lie in the tree, so that their links lead somewhere.
+install(FILES LICENSE README.md CONTRIBUTING.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY apps/examples DESTINATION "${CMAKE_INSTALL_DOCDIR}/apps"
+    FILES_MATCHING PATTERN "*.cpp" PATTERN "*.hpp")

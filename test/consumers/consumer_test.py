@@ -1,0 +1,165 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Uses the library as another project does, in one of three ways, and runs what comes out.
+
+    consumer_test.py WAY --cmake CMAKE --compiler CXX --source ROOT --build BUILD --scratch FOLDER --version VERSION
+
+WAY: install, find_package, pkg_config or add_subdirectory. FOLDER is emptied first.
+"""
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from urllib.parse import unquote
+
+HERE = Path(__file__).resolve().parent
+LINK = re.compile(r"\]\(([^)\s#]+)(?:#[^)\s]*)?\)")
+
+
+def expect(holds: bool, what: str) -> None:
+    if not holds:
+        raise AssertionError(what)
+
+
+class Consumer:
+    def __init__(self, options: argparse.Namespace):
+        self.options = options
+        self.scratch: Path = options.scratch
+        shutil.rmtree(self.scratch, ignore_errors=True)
+        self.scratch.mkdir(parents=True)
+        # Nothing of the caller's setup helps; and what ccache knows of an earlier run counts, precompiled headers too.
+        self.environment = {k: v for k, v in os.environ.items() if not k.startswith(("CMAKE_", "PKG_CONFIG"))}
+        self.environment |= {"CCACHE_SLOPPINESS": "pch_defines,time_macros", "CCACHE_BASEDIR": str(options.source),
+                             "CCACHE_NOHASHDIR": "1"}
+
+    def run(self, *command: object, environment: dict[str, str] | None = None) -> str:
+        words = [str(word) for word in command]
+        print("$", " ".join(words), flush=True)
+        done = subprocess.run(words, cwd=self.scratch, env=self.environment | (environment or {}),
+                              stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+        expect(done.returncode == 0, f"ended with {done.returncode}:\n{done.stdout}")
+        return done.stdout
+
+    def install(self) -> Path:
+        """Installs to a fresh prefix and moves that, for a package may be packed here and unpacked elsewhere."""
+        first, prefix = self.scratch / "first", self.scratch / "prefix"
+        self.run(self.options.cmake, "--install", self.options.build, "--prefix", first)
+        first.rename(prefix)
+        return prefix
+
+    def configure(self, folder: str, *settings: str) -> Path:
+        build = self.scratch / "build"
+        launcher = shutil.which("ccache")
+        if launcher:
+            settings += (f"-DCMAKE_CXX_COMPILER_LAUNCHER={launcher}",)
+        self.run(self.options.cmake, "-G", "Ninja", "-S", HERE / folder, "-B", build,
+                 f"-DCMAKE_CXX_COMPILER={self.options.compiler}", *settings)
+        return build
+
+    def check(self, program: Path) -> None:
+        printed = self.run(program)
+        wanted = f'{self.options.version} 48 {{"lat":48.137154,"lon":11.576124}}\n'
+        expect(printed == wanted, f"it printed {printed!r}, not {wanted!r}")
+        needed = self.run("ldd", program)
+        expect("boost" not in needed, f"it depends on Boost at run time:\n{needed}")
+
+
+def check_links(pages: Path) -> int:
+    """The links between installed pages lead somewhere."""
+    count = 0
+    for page in sorted(pages.rglob("*.md")):
+        for target in LINK.findall(page.read_text(encoding="utf-8")):
+            if not re.match(r"[a-z][a-z0-9+.-]*:", target):
+                count += 1
+                expect((page.parent / unquote(target)).exists(), f"{page.name}: the link to '{target}' leads nowhere")
+    return count
+
+
+def install(consumer: Consumer) -> None:
+    prefix = consumer.install()
+    source = consumer.options.source
+    for public in (source / "libcles" / "include").rglob("*.hpp"):
+        name = public.relative_to(source / "libcles")
+        expect((prefix / name).read_bytes() == public.read_bytes(), f"{name} is not installed as it is")
+    expect(consumer.run(prefix / "bin" / "cles", "--version") == f"cles {consumer.options.version}\n", "cles --version")
+
+    pages = prefix / "share" / "doc" / "cles"
+    expect("Boost Software License" in (pages / "LICENSE").read_text(), "the licence is not that of Boost")
+    expect((pages / "docs" / "protocol.md").is_file(), "the protocol's page is missing")
+    expect(check_links(pages) > 20, "the installed pages should link to each other")
+
+    # Nothing names a place of this machine, or what only tests need.
+    for file in (f for f in prefix.rglob("*") if f.is_file()):
+        data = file.read_bytes()
+        for place in (source, consumer.options.build, consumer.scratch):
+            expect(str(place).encode() not in data, f"{file.relative_to(prefix)} names {place}")
+    expect(not list(prefix.rglob("*test*")), "tests were installed")
+
+
+def find_package(consumer: Consumer) -> None:
+    prefix = consumer.install()
+    build = consumer.configure("find_package", f"-DCMAKE_PREFIX_PATH={prefix}",
+                               f"-DEXPECTED_VERSION={consumer.options.version}")
+    consumer.run(consumer.options.cmake, "--build", build)
+    consumer.check(build / "my_program")
+
+
+def pkg_config(consumer: Consumer) -> None:
+    prefix = consumer.install()
+    places = {"PKG_CONFIG_PATH": str(next(prefix.rglob("cles.pc")).parent)}
+    version = consumer.run("pkg-config", "--modversion", "cles", environment=places).strip()
+    expect(version == consumer.options.version, f"pkg-config says version {version}")
+    flags = consumer.run("pkg-config", "--cflags", "--libs", "cles", environment=places).split()
+    program = consumer.scratch / "my_program"
+    launcher = [found] if (found := shutil.which("ccache")) else []
+    compiled = [flag for flag in flags if flag.startswith(("-I", "-D", "-isystem", "-pthread"))]
+    linked = [flag for flag in flags if flag not in compiled or flag == "-pthread"]
+    # In two steps, which ccache remembers.
+    object_file = consumer.scratch / "consumer.o"
+    consumer.run(*launcher, consumer.options.compiler, "-std=c++20", "-c", HERE / "consumer.cpp", "-o", object_file,
+                 *compiled)
+    consumer.run(consumer.options.compiler, object_file, "-o", program, *linked)
+    consumer.check(program)
+
+
+def add_subdirectory(consumer: Consumer) -> None:
+    source = f"-DCLES_SOURCE_DIR={consumer.options.source}"
+    # Asked for, the programs come along; only configured here.
+    consumer.configure("add_subdirectory", source, "-DCLES_BUILD_APPS=ON", "-DCLES_BUILD_PERF=ON",
+                       "-DEXPECTED_TARGETS=cles;cles_command;cles_minimal")
+    shutil.rmtree(consumer.scratch / "build")
+
+    build = consumer.configure("add_subdirectory", source)
+    consumer.run(consumer.options.cmake, "--build", build)
+    consumer.check(build / "my_program")
+    # Another project's installation is its own.
+    consumer.run(consumer.options.cmake, "--install", build, "--prefix", consumer.scratch / "prefix")
+    expect(not (consumer.scratch / "prefix").exists(), "the library is part of another project's installation")
+
+
+WAYS = {way.__name__: way for way in (install, find_package, pkg_config, add_subdirectory)}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("way", choices=WAYS)
+    parser.add_argument("--cmake", required=True)
+    parser.add_argument("--compiler", required=True)
+    for name in ("source", "build", "scratch"):
+        parser.add_argument(f"--{name}", type=Path, required=True)
+    parser.add_argument("--version", required=True)
+    options = parser.parse_args()
+    try:
+        WAYS[options.way](Consumer(options))
+    except AssertionError as failure:
+        print(failure)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: BSL-1.0
+// Where libFuzzer hands over what it has thought of.
+#include "fuzz/fuzz.hpp"
+
+#include <cstddef>
+#include <cstdint>
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+    cles::fuzz::run({reinterpret_cast<const char*>(data), size});
+    return 0;
+}

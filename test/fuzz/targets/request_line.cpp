@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: BSL-1.0
+// A line of a request: what is read is what is written, whatever stands there.
+#include "fuzz/fuzz.hpp"
+#include "protocol/grammar.hpp"
+#include "protocol/line.hpp"
+#include "protocol/message.hpp"
+
+#include <string>
+
+namespace cles::fuzz {
+namespace {
+
+namespace p = protocol;
+
+void check_noun(const p::noun_view& noun) {
+    require(p::is_name(noun.target) && p::is_name(noun.task), "target and task are names", noun.path);
+    for (const auto parameter : noun.parameters) {
+        require(p::is_parameter(parameter), "a parameter that was read is one", parameter);
+        std::string decoded;
+        p::decode_parameter(parameter, decoded);
+        std::string encoded;
+        p::encode_parameter(decoded, encoded);
+        std::string again;
+        p::decode_parameter(encoded, again);
+        require(p::is_parameter(encoded) && again == decoded, "a parameter comes back decoded", parameter);
+    }
+    std::string scratch;
+    const std::string canonical{p::canonical_path(noun, scratch)};
+    p::noun_view same;
+    std::string why;
+    const auto whole = std::string{noun.target} + ":" + canonical;
+    require(p::parse_noun(whole, same, why), "a canonical path is a path", canonical);
+    std::string second;
+    require(p::canonical_path(same, second) == canonical, "a canonical path is canonical", canonical);
+    require(same.parameters.size() == noun.parameters.size(), "it has as many parameters", canonical);
+}
+
+std::string written(const p::request_line& r) {
+    std::string noun{r.noun.target};
+    noun.append(":").append(r.noun.path);
+    std::string adverbs = "hops=" + std::to_string(r.hops);
+    if (!r.via.empty()) {
+        adverbs.append(" via=").append(r.via);
+    }
+    if (r.is_update()) {
+        adverbs += " seq=" + std::to_string(*r.seq) + " epoch=" + p::epoch_text(*r.epoch);
+    }
+    std::string text;
+    p::append_request(text, {.verb = r.verb,
+                             .noun = noun,
+                             .id = r.id,
+                             .deadline_ms = r.deadline_ms,
+                             .wants_reply = r.wants_reply,
+                             .wants_progress = r.wants_progress,
+                             .lease_ms = r.lease_ms,
+                             .every_ms = r.every_ms,
+                             .keep = r.keep,
+                             .adverbs = adverbs,
+                             .body = r.body});
+    return text;
+}
+
+void check_same(const p::request_line& a, const p::request_line& b, std::string_view line) {
+    require(a.verb == b.verb && a.noun.target == b.noun.target && a.noun.path == b.noun.path, "verb and noun stay",
+            line);
+    require(a.id == b.id && a.deadline_ms == b.deadline_ms && a.hops == b.hops && a.via == b.via, "adverbs stay", line);
+    require(a.wants_reply == b.wants_reply && a.wants_progress == b.wants_progress, "wishes stay", line);
+    require(a.lease_ms == b.lease_ms && a.every_ms == b.every_ms && a.keep == b.keep, "terms of a BIND stay", line);
+    require(a.seq == b.seq && a.epoch == b.epoch && a.body == b.body, "an update stays", line);
+}
+
+void check_bounds(const p::request_line& r, std::string_view line) {
+    require(r.id <= p::max_id && r.hops <= p::max_hops, "id and hops are within their bounds", line);
+    require(r.deadline_ms >= 1 && r.deadline_ms <= p::max_deadline_ms, "the deadline is within its bounds", line);
+    require(r.every_ms <= p::max_deadline_ms, "every is within its bounds", line);
+    require(r.keep >= 1 && r.keep <= p::max_keep, "keep is within its bounds", line);
+    require(!r.lease_ms || *r.lease_ms <= p::max_lease_ms, "the lease is within its bounds", line);
+    require(r.body.empty() || r.body.front() == '{' || r.body.front() == '[', "a body begins with a bracket", line);
+}
+
+} // namespace
+
+void run(std::string_view input) {
+    const auto line = p::trim(input.substr(0, input.find('\n')));
+    p::is_http(line);
+    if (line.empty() || p::is_reply(line)) {
+        return;
+    }
+    p::request_line request;
+    p::malformed_request malformed;
+    const auto meant = p::salvage(line);
+    if (!p::parse_request(line, request, malformed)) {
+        require(!malformed.why.empty(), "a mistake has a name", line);
+        require(malformed.id == meant.id && malformed.wants_reply == meant.wants_reply, "what can be known is known",
+                line);
+        return;
+    }
+    require(meant.id == request.id, "a valid line's id is known from its beginning", line);
+    require(request.is_update() ? !meant.wants_reply : meant.wants_reply == request.wants_reply,
+            "whether an answer is wanted is known from a line's beginning", line);
+    check_noun(request.noun);
+    check_bounds(request, line);
+
+    const auto text = written(request);
+    const auto again = p::trim(std::string_view{text}.substr(0, text.size() - 1));
+    p::request_line second;
+    require(p::parse_request(again, second, malformed), "what is written can be read", text);
+    // What these verbs are not asked for is not read, so that it is not written for others.
+    check_same(request, second, line);
+}
+
+} // namespace cles::fuzz

@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/feed_event.hpp>
+#include <cles/json_reader.hpp>
+#include <cles/pending.hpp>
+
+#include "core/subscription.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace cles::test {
+
+/// Takes down, in words, what a node's own program is told.
+using teller = std::function<void(std::string)>;
+
+/// A request of the node's own whose end is told: "7 ok {...}", "7 failed busy".
+class told_reply final : public detail::pending {
+  public:
+    enum class state : std::uint8_t { waiting, ended };
+
+    told_reply(std::uint64_t id, state& at, teller tell) : id_(id), at_(at), tell_(std::move(tell)) {
+        at_ = state::waiting;
+    }
+
+    verdict offer(std::string_view json) override {
+        if (!is_valid_json(json)) {
+            return verdict::malformed;
+        }
+        end(" ok " + std::string{json});
+        return verdict::completed;
+    }
+    void fail(boost::system::error_code code, std::string_view) override {
+        end(" failed " + std::string{wire_name(static_cast<errc>(code.value()))});
+    }
+    void discard() noexcept override { delete this; }
+
+  private:
+    void end(const std::string& how) {
+        at_ = state::ended;
+        tell_(std::to_string(id_) + how);
+        delete this;
+    }
+
+    std::uint64_t id_;
+    state& at_;
+    teller tell_;
+};
+
+/// A feed of the node's own whose events are told: "update car2:fix 17 {...}", "gap car2:fix 3".
+class told_feed final : public core::subscription {
+  public:
+    told_feed(std::string target, std::string path, bool thinned, teller tell)
+        : subscription(std::move(target), std::move(path), thinned), tell_(std::move(tell)) {}
+
+  private:
+    void on_event(const detail::raw_event& event) override {
+        const auto noun = std::string{event.publisher} + ":" + path();
+        if (event.kind == feed_event::gap) {
+            tell_("gap " + noun + " " + std::to_string(event.missed));
+        } else {
+            tell_("update " + noun + " " + std::to_string(event.seq) + " " + std::string{event.body});
+        }
+    }
+
+    teller tell_;
+};
+
+} // namespace cles::test
