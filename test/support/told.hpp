@@ -58,13 +58,17 @@ class told_feed final : public core::subscription {
         : subscription(std::move(target), std::move(path), thinned), tell_(std::move(tell)) {}
 
   private:
-    void on_event(const detail::raw_event& event) override {
+    bool on_event(const detail::raw_event& event) override {
+        if (!event.checked && !is_valid_json(event.body, detail::answer_depth)) {
+            return false;
+        }
         const auto noun = std::string{event.publisher} + ":" + path();
         if (event.kind == feed_event::gap) {
             tell_("gap " + noun + " " + std::to_string(event.missed));
         } else {
             tell_("update " + noun + " " + std::to_string(event.seq) + " " + std::string{event.body});
         }
+        return true;
     }
 
     teller tell_;
