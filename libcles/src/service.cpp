@@ -3,6 +3,7 @@
 
 #include "protocol/grammar.hpp"
 #include "protocol/message.hpp"
+#include "protocol/parts.hpp"
 #include "shell/engine.hpp"
 #include "shell/feed_handle.hpp"
 
@@ -25,6 +26,19 @@ asio::any_io_executor one_at_a_time(asio::any_io_executor executor) {
         return asio::make_strand(executor);
     }
     return executor;
+}
+
+// What a command says beside its deadline would have to be ignored: the library writes the adverbs itself.
+std::string foreign_adverb(std::string_view command) {
+    protocol::part_reader parts{command};
+    parts.next(); // verb
+    parts.next(); // noun
+    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
+        if (!part.starts_with("deadline=")) {
+            return "of the adverbs only 'deadline' can be given here, not " + protocol::quoted(part);
+        }
+    }
+    return {};
 }
 
 } // namespace
@@ -82,6 +96,9 @@ std::uint64_t service::send_command(std::string_view command, const call_options
         why = "a binding is made by async_bind";
     } else if (!parsed.body.empty()) {
         is_valid_json(parsed.body, engine_->bounds().depth, &why);
+    }
+    if (why.empty()) {
+        why = foreign_adverb(command);
     }
     if (!why.empty()) {
         engine_->fail_later(std::move(operation), errc::bad_request, std::move(why));

@@ -196,6 +196,7 @@ BOOST_DATA_TEST_CASE(an_unfinished_line_at_the_end_is_no_line, every_socket, kin
     peer.shut();
     pair.until([&] { return pair.far.events->has('e'); });
     BOOST_TEST(pair.far.lines() == 1U);
+    BOOST_TEST(pair.far.events->rest == "part");
     BOOST_TEST(pair.far.events->in_order());
 }
 

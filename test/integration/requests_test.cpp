@@ -132,6 +132,13 @@ BOOST_DATA_TEST_CASE(a_command_is_a_sentence_of_the_language, carriers, kind) {
     two_nodes n{kind};
     answer<> pulled;
     answer<> pushed;
+    for (const std::string_view adverb : {"id=7", "reply=no", "progress=yes", "hops=3", "colour=red"}) {
+        answer<> refused;
+        n.tower.async_request("PUSH car1:echo " + std::string{adverb}, refused.options(), refused.take());
+        run_until(n.io, [&] { return refused.done(); });
+        BOOST_TEST(refused.code == errc::bad_request);
+        BOOST_TEST(refused.words.find(adverb) != std::string::npos, refused.words);
+    }
     n.tower.async_request("PULL car1:speed", pulled.take());
     n.tower.async_request(R"(push car1:echo {"x":"y"})", pushed.take());
     run_until(n.io, [&] { return pulled.done() && pushed.done(); });

@@ -19,6 +19,7 @@ class link_recorder final : public link_events {
     std::string calls{};
     std::vector<std::string> lines{};
     std::string head{};
+    std::string rest{}; ///< of a line that was cut off
     boost::system::error_code why{};
     /// Called at each call with its letter.
     std::function<void(char)> hook{};
@@ -48,6 +49,7 @@ class link_recorder final : public link_events {
         head = start;
         note('o');
     }
+    void on_cut(std::string_view what) override { rest = what; }
     void on_batch() override { note('b'); }
     void on_end() override { note('e'); }
     void on_lost(boost::system::error_code code) override {

@@ -16,6 +16,7 @@ class recording_outlet : public core::outlet {
 
     std::string& output() override { return text_; }
     void wake() override { ++wakes; }
+    [[nodiscard]] bool is_behind() const override { return behind; }
     void pause(bool stop) override {
         paused = stop;
         ++pauses;
@@ -46,6 +47,7 @@ class recording_outlet : public core::outlet {
     int finishes = 0;
     int closes = 0;
     bool paused = false;
+    bool behind = false;
 
   protected:
     ~recording_outlet() = default;

@@ -108,6 +108,10 @@ class test_link final : public recording_outlet, public core::binder {
     void overlong(std::string_view head) { session_.on_overlong(head, at_.clock.now()); }
     void half_close() { session_.on_end(at_.clock.now()); }
     void reset() { session_.on_lost("the link was lost"); }
+    /// The link has sent what there was.
+    void serve_more() { session_.serving().serve_more(at_.clock.now()); }
+    /// The peer has ended in the middle of a line.
+    void cut(std::string_view rest) { session_.on_cut(rest, at_.clock.now()); }
     /// The link has room again.
     void make_room() {
         takes = true;

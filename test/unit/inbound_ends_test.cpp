@@ -31,6 +31,18 @@ BOOST_FIXTURE_TEST_SUITE(inbound_ends, fixture)
 
 BOOST_AUTO_TEST_SUITE(half_close)
 
+BOOST_AUTO_TEST_CASE(a_last_line_without_its_lf_is_bad_request_and_does_not_run) {
+    link.cut("PULL car1:speed id=7");
+    BOOST_TEST(link.take() == R"(id=7 {"error":"bad_request","message":"car1: the last line is not ended by LF"})"
+                              "\n");
+    link.cut("PULL car1:speed");
+    BOOST_TEST(link.sent() == "bad_request");
+    link.cut("PUSH car1:log reply=no {\"a\"");
+    link.cut("{\"v\":3");
+    link.cut("  \r");
+    BOOST_TEST(link.take().empty());
+}
+
 BOOST_AUTO_TEST_CASE(the_node_closes_where_nothing_is_left) {
     link.ask("PULL car1:speed");
     link.half_close();

@@ -164,6 +164,51 @@ BOOST_AUTO_TEST_CASE(a_link_whose_waiting_requests_take_too_much_room_is_not_rea
     BOOST_TEST(to.pauses == 2);
 }
 
+BOOST_AUTO_TEST_CASE(a_flood_of_malformed_lines_behind_a_request_is_not_read_on) {
+    link.ask("DELEGATE car1:work");
+    int lines = 0;
+    while (!link.paused && lines < 100'000) {
+        link.ask("x");
+        ++lines;
+    }
+    BOOST_TEST(link.paused);
+    BOOST_TEST(lines < 20'000); // a megabyte of answers
+    node.started.at(0)->call->done("[1]");
+    std::size_t answers = 0;
+    for (auto sent = link.take_lines(); !sent.empty(); sent = link.take_lines()) {
+        answers += sent.size();
+        link.serve_more();
+    }
+    BOOST_TEST(answers == static_cast<std::size_t>(lines) + 1);
+    BOOST_TEST(!link.paused);
+}
+
+BOOST_AUTO_TEST_CASE(what_waited_for_its_turn_is_served_a_part_at_a_time) {
+    node.on(verb::pull, "big", "[\"" + std::string(1000, 'x') + "\"]");
+    link.ask("DELEGATE car1:work");
+    for (int i = 0; i < 4000; ++i) {
+        link.ask("PULL car1:big");
+    }
+    const auto wakes = link.wakes;
+    node.started.at(0)->call->done("[1]");
+    BOOST_TEST(link.wakes > wakes);
+    BOOST_TEST(link.session().serving().has_more());
+    BOOST_TEST(link.output().size() < 100'000U);
+    BOOST_TEST(link.kind("PULL car1:speed").ends_with("ok")); // waits behind the others
+    std::size_t answers = 0;
+    std::string last;
+    while (link.session().serving().has_more()) {
+        link.serve_more();
+        BOOST_TEST(link.output().size() < 100'000U);
+        for (auto& line : link.take_lines()) {
+            ++answers;
+            last = std::move(line);
+        }
+    }
+    BOOST_TEST(answers > 3900U);
+    BOOST_TEST(last == "{\"v\":3}");
+}
+
 BOOST_AUTO_TEST_CASE(every_failure_of_the_node_names_it) {
     fixture small{cles::limits{.line = 300, .in_flight = 2, .bindings = 1, .nouns = 1, .running = 1}};
     auto& node = small.node;

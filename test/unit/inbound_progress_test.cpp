@@ -85,6 +85,16 @@ BOOST_AUTO_TEST_CASE(details_that_are_no_object_are_wrapped_as_results_are) {
     BOOST_TEST(link.take() == "id=7 progress=0.1 {\"value\":5}\nid=7 progress=0.2 {}\nid=7 progress=0.3 [1]\n");
 }
 
+BOOST_AUTO_TEST_CASE(a_peer_that_does_not_take_what_it_is_sent_is_told_no_more) {
+    link.ask("DELEGATE car1:work id=7 progress=yes");
+    link.behind = true;
+    BOOST_TEST(node.started.at(0)->call->progress(0.2, "{}"));
+    BOOST_TEST(link.take().empty());
+    link.behind = false;
+    BOOST_TEST(node.started.at(0)->call->progress(0.3, "{}"));
+    BOOST_TEST(link.take() == "id=7 progress=0.3 {}\n");
+}
+
 BOOST_AUTO_TEST_CASE(details_that_exceed_a_line_are_left_out) {
     cles::test::test_node small{cles::limits{.line = 100}};
     small.on_later(verb::delegate, "work");

@@ -61,12 +61,12 @@ BOOST_AUTO_TEST_CASE(a_line_is_ended_by_lf) {
     std::string_view text;
     put(buffer, "PULL a:b");
     BOOST_CHECK(buffer.next(text) == status::need_more);
-    BOOST_TEST(buffer.unfinished() == 8U);
+    BOOST_TEST(buffer.unfinished().size() == 8U);
     put(buffer, "\nPULL");
     BOOST_CHECK(buffer.next(text) == status::line);
     BOOST_TEST(text == "PULL a:b");
     BOOST_CHECK(buffer.next(text) == status::need_more);
-    BOOST_TEST(buffer.unfinished() == 4U);
+    BOOST_TEST(buffer.unfinished().size() == 4U);
 }
 
 BOOST_AUTO_TEST_CASE(one_read_may_bring_many_lines) {
@@ -215,6 +215,24 @@ BOOST_AUTO_TEST_CASE(a_web_clients_lines_are_known) {
                                         "PULL a:b/HTTP/1.1", "", "PUSH a:b {\"x\":\" HTTP/1.1\"}"}) {
         BOOST_TEST(!is_http(ours), ours);
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_cr_before_the_lf_does_not_count) {
+    const auto feed = [](std::string_view text) {
+        cles::protocol::line_buffer buffer{10};
+        const auto space = buffer.prepare();
+        std::copy(text.begin(), text.end(), space.begin());
+        buffer.commit(text.size());
+        std::string_view line;
+        return buffer.next(line);
+    };
+    using status = cles::protocol::line_buffer::status;
+    BOOST_CHECK(feed("0123456789\n") == status::line);
+    BOOST_CHECK(feed("0123456789\r\n") == status::line);
+    BOOST_CHECK(feed("0123456789\r") == status::need_more);
+    BOOST_CHECK(feed("0123456789a\n") == status::overlong);
+    BOOST_CHECK(feed("0123456789a\r\n") == status::overlong);
+    BOOST_CHECK(feed("0123456789\r\r\n") == status::overlong);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/request_checks.hpp"
 
+#include "support/session_fixture.hpp"
+
 #include <boost/test/unit_test.hpp>
 
 #include <cstdint>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
@@ -39,11 +42,26 @@ BOOST_AUTO_TEST_CASE(parameters_are_decoded_and_all_of_them_stay) {
 BOOST_AUTO_TEST_CASE(a_body_whose_first_key_is_error_is_known_however_it_is_written) {
     for (const std::string_view bad :
          {"{\"error\":1}", "{ \"error\" : null }", "{\"\\u0065rror\":[]}", "{\"error\":\"busy\",\"a\":1}"}) {
-        BOOST_TEST(cles::core::begins_with_error(bad), bad);
+        BOOST_TEST(cles::protocol::begins_with_error(bad), bad);
     }
     for (const std::string_view good : {"", "{}", "[]", "[\"error\"]", "{\"errors\":1}", "{\"a\":1,\"error\":1}",
                                         "{\"Error\":1}", "{\"a\":{\"error\":1}}"}) {
-        BOOST_TEST(!cles::core::begins_with_error(good), good);
+        BOOST_TEST(!cles::protocol::begins_with_error(good), good);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(rules_that_throw_let_nobody_in) {
+    for (const bool known : {true, false}) {
+        cles::test::test_node node{{}, [known](const cles::access&) -> bool {
+                                       if (known) {
+                                           throw std::runtime_error{"the data base is gone"};
+                                       }
+                                       throw 7;
+                                   }};
+        node.on(cles::verb::pull, "speed", "{}");
+        cles::test::test_link link{node};
+        BOOST_TEST(link.kind("PULL car1:speed id=7") == "id=7 denied");
+        BOOST_TEST(link.kind("PULL car1:speed") == "denied");
     }
 }
 

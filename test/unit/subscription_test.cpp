@@ -81,6 +81,20 @@ BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_not_handed_on) {
     BOOST_TEST(s.events.size() == 1U);
 }
 
+BOOST_AUTO_TEST_CASE(self_may_be_the_same_node_as_a_name) {
+    cles::core::subscriptions all;
+    recorder by_name{"car1", "speed", false};
+    recorder other{"car2", "speed", false};
+    recorder by_self{"self", "speed", false};
+    recorder elsewhere{"self", "load", false};
+    BOOST_TEST(all.add(by_name));
+    BOOST_TEST(all.add(other));
+    BOOST_TEST(!all.add(by_self));
+    BOOST_TEST(all.add(elsewhere));
+    BOOST_TEST(all.has("self", "speed"));
+    BOOST_TEST(all.has("car3", "load"));
+}
+
 BOOST_AUTO_TEST_CASE(one_subscription_per_publisher_and_noun) {
     cles::core::subscriptions all;
     recorder first{"car1", "speed", false};

@@ -29,6 +29,8 @@ class link_events {
     virtual void on_overlong(std::string_view head) = 0;
     /// All lines of one read have been handed over: the time to answer them in one write.
     virtual void on_batch() = 0;
+    /// The peer has ended in the middle of this line; `on_end` follows.
+    virtual void on_cut(std::string_view) {}
     /// The peer sends no more, but may still read.
     virtual void on_end() = 0;
     /// The link is gone: reset, failed to write, or closed for good.

@@ -27,6 +27,11 @@
 #include <utility>
 #include <vector>
 
+#if !defined(BOOST_ASIO_SEPARATE_COMPILATION) || !defined(BOOST_ASIO_NO_DEPRECATED)
+#error "CLES is compiled with BOOST_ASIO_SEPARATE_COMPILATION and BOOST_ASIO_NO_DEPRECATED, and so must be whoever uses \
+it: the target cles::cles of CMake and the flags of pkg-config's cles set them"
+#endif
+
 namespace cles {
 
 /// How a service is set up. Everything but the name may be left out.

@@ -33,6 +33,9 @@ bool call::progress(double fraction, std::string_view json) {
     if (owner_ == nullptr || !terms_.wants_progress || terms_.id == 0) {
         return false;
     }
+    if (owner_->out_.is_behind()) {
+        return true; // the next one tells more
+    }
     reported_ = std::max(reported_, std::clamp(fraction, 0.0, 1.0));
     auto& out = owner_->out_.output();
     const auto line = out.size();

@@ -15,6 +15,21 @@ namespace cles::core {
 namespace {
 
 constexpr unsigned sample_every = 16;
+// What one turn may take of the requests that waited for each other, so that other links have theirs.
+constexpr int requests_per_turn = 256;
+constexpr std::size_t bytes_per_turn = 65536;
+
+/// Holds a flag while it lives, whatever is thrown.
+class raised {
+  public:
+    explicit raised(bool& flag) noexcept : flag_(flag) { flag_ = true; }
+    raised(const raised&) = delete;
+    raised& operator=(const raised&) = delete;
+    ~raised() { flag_ = false; }
+
+  private:
+    bool& flag_;
+};
 
 protocol::failure busy(std::string message) { return {.code = errc::busy, .message = std::move(message)}; }
 
@@ -166,8 +181,14 @@ void inbound::serve_waiting(time_point now) {
     if (serving_waiting_) {
         return;
     }
-    serving_waiting_ = true;
-    while (anonymous_ == nullptr && !waiting_.empty()) {
+    const raised serving{serving_waiting_};
+    const auto before = out_.output().size();
+    int turn = requests_per_turn;
+    while (has_more()) {
+        if (turn-- == 0 || out_.output().size() > before + bytes_per_turn) {
+            out_.wake(); // goes on after what there is has been sent
+            break;
+        }
         const auto next = waiting_.pop();
         if (!next.line.empty()) {
             protocol::request_line r;
@@ -180,7 +201,6 @@ void inbound::serve_waiting(time_point now) {
             node_->counts.errors += protocol::is_failure(next.answer) ? 1 : 0;
         }
     }
-    serving_waiting_ = false;
     follow_waiting();
     finish_if_done();
 }

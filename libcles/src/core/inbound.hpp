@@ -43,6 +43,10 @@ class inbound {
     /// The link is gone.
     void lose();
 
+    /// Whether requests wait whose turn has come, but which are too many for one turn.
+    [[nodiscard]] bool has_more() const noexcept { return anonymous_ == nullptr && !waiting_.empty(); }
+    /// Serves some of them.
+    void serve_more(time_point now) { serve_waiting(now); }
     /// Puts updates that wait to the link, which has room again.
     void drain(time_point now) { bound_.drain(now); }
     [[nodiscard]] std::size_t in_flight() const noexcept {

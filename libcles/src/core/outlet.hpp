@@ -17,6 +17,8 @@ class outlet {
     virtual std::string& output() = 0;
     /// Something was appended outside of a call that the link made: it is to be sent soon.
     virtual void wake() = 0;
+    /// The peer does not take what it is sent: what may be left out should be.
+    [[nodiscard]] virtual bool is_behind() const = 0;
     /// Stops handing over lines, or goes on.
     virtual void pause(bool stop) = 0;
     /// Sends what is there, then says goodbye and closes.

@@ -33,7 +33,7 @@ bool publications::knows(std::string_view task) const noexcept { return nouns_.c
 
 bool publications::can_open(std::string_view path) noexcept {
     const auto count = nouns_.find(task_of(path));
-    return count == nouns_.end() || count->second < bounds_.nouns || find(path) != nullptr;
+    return count == nouns_.end() || count->second.count < bounds_.nouns || find(path) != nullptr;
 }
 
 topic& publications::open(std::string_view path) {
@@ -41,7 +41,7 @@ topic& publications::open(std::string_view path) {
         return *existing;
     }
     const auto task = task_of(path);
-    auto& count = nouns_[std::string{task}];
+    auto& count = nouns_[std::string{task}].count;
     if (count >= bounds_.nouns) {
         throw error(errc::busy, "'" + std::string{task} + "' has " + std::to_string(count) + " nouns already");
     }
@@ -58,7 +58,7 @@ void publications::tidy(topic& t) {
     }
     const std::string path = t.path();
     const auto count = nouns_.find(task_of(path));
-    if (count != nouns_.end() && --count->second == 0) {
+    if (count != nouns_.end() && --count->second.count == 0) {
         nouns_.erase(count);
     }
     std::erase(dirty_, &t);
@@ -96,10 +96,13 @@ void publications::end(topic& t, std::size_t body_at) {
         throw error(errc::too_large, "an update of '" + t.path() + "' has " + std::to_string(line.size()) +
                                          " bytes, the limit is " + std::to_string(bounds_.line));
     }
-    if (protocol::looks_like_failure(line.substr(body_at))) {
+    if (protocol::begins_with_error(line.substr(body_at))) {
         throw error(errc::failed, "an update whose first key is 'error' would be taken for a failure");
     }
     t.commit(body_at);
+    if (t.seq() == 1) {
+        ++nouns_.find(task_of(t.path()))->second.published;
+    }
     recent_ = &t;
     mark(t);
 }
@@ -158,13 +161,12 @@ std::vector<detail::pending_ptr> publications::take_waiters() {
 
 std::vector<std::string> publications::tasks() const {
     std::vector<std::string> names;
-    for (const auto& [path, t] : topics_) {
-        if (t->seq() != 0) {
-            names.emplace_back(task_of(path));
+    for (const auto& [task, nouns] : nouns_) {
+        if (nouns.published != 0) {
+            names.push_back(task);
         }
     }
     std::sort(names.begin(), names.end());
-    names.erase(std::unique(names.begin(), names.end()), names.end());
     return names;
 }
 

@@ -74,7 +74,11 @@ class publications {
     std::string epoch_;
     std::function<void()> wake_;
     map<std::unique_ptr<topic>> topics_;
-    map<std::size_t> nouns_; // per task
+    struct task_nouns {
+        std::size_t count = 0;
+        std::size_t published = 0; // of them
+    };
+    map<task_nouns> nouns_; // per task
     std::vector<topic*> dirty_;
     topic* recent_ = nullptr; // most publish the same noun again
 };

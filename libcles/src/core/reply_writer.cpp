@@ -29,7 +29,7 @@ void reply_writer::done(std::uint64_t id, bool wanted, std::string_view body) {
 
 void reply_writer::send(std::uint64_t id, bool wanted, std::string& text, std::size_t body) {
     close_result(text, body);
-    if (protocol::looks_like_failure(std::string_view{text}.substr(body))) {
+    if (protocol::begins_with_error(std::string_view{text}.substr(body))) {
         fail(id, wanted, {.code = errc::failed, .message = node_.name + ": the result's first key is 'error'"});
     } else if (text.size() > node_.bounds.line) {
         fail(id, wanted,

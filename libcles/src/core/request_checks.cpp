@@ -5,6 +5,8 @@
 
 #include "protocol/parts.hpp"
 
+#include <exception>
+#include <string>
 #include <utility>
 
 namespace cles::core {
@@ -25,13 +27,6 @@ decoded_parameters decode(const protocol::noun_view& noun, std::string& storage)
     return result;
 }
 
-bool begins_with_error(std::string_view body) {
-    json_reader reader{body};
-    std::string_view key;
-    return reader.peek() == json_reader::kind::object && reader.begin_object() && reader.next_key(key) &&
-           key == "error";
-}
-
 bool passes(std::string_view via, std::string_view name) {
     while (!via.empty()) {
         const auto comma = via.find(',');
@@ -43,6 +38,22 @@ bool passes(std::string_view via, std::string_view name) {
     return false;
 }
 
+namespace {
+
+// What the rules throw is their own fault, and no reason to let anybody in.
+bool allows(const node& n, const access& asked) {
+    try {
+        return n.authorise(asked);
+    } catch (const std::exception& thrown) {
+        n.say(log_level::error, std::string{"denied, since the access rules threw: "} + thrown.what());
+    } catch (...) {
+        n.say(log_level::error, "denied, since the access rules threw");
+    }
+    return false;
+}
+
+} // namespace
+
 std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& r) {
     const auto object = [](errc code, std::string message) {
         return protocol::failure{.code = code, .message = std::move(message)};
@@ -50,7 +61,7 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
     if (n.authorise) {
         std::string scratch;
         const auto path = protocol::canonical_path(r.noun, scratch);
-        if (!n.authorise({peer, r.verb, r.noun.task, path})) {
+        if (!allows(n, {peer, r.verb, r.noun.task, path})) {
             return object(errc::denied, n.name + " does not allow " + std::string{to_string(r.verb)} + " '" +
                                             std::string{r.noun.task} + "'");
         }
@@ -62,7 +73,7 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
     if (!r.body.empty() && !is_valid_json(r.body, n.bounds.depth, &why)) {
         return object(errc::bad_request, n.name + ": the body is not valid JSON: " + why);
     }
-    if (r.verb == verb::update && begins_with_error(r.body)) {
+    if (r.verb == verb::update && protocol::begins_with_error(r.body)) {
         return object(errc::bad_request, n.name + ": an update's first key cannot be 'error'");
     }
     return std::nullopt;

@@ -22,9 +22,6 @@ using decoded_parameters = boost::container::static_vector<std::string_view, pro
 /// The parameters decoded: what holds escapes into `storage`, the others as views of the line.
 decoded_parameters decode(const protocol::noun_view& noun, std::string& storage);
 
-/// Whether a valid body is an object whose first key is "error".
-bool begins_with_error(std::string_view body);
-
 /// Whether `name` is in a comma-separated list.
 bool passes(std::string_view via, std::string_view name);
 

@@ -57,7 +57,7 @@ void session::on_reply(std::string_view line) {
 
 void session::on_update(const subscriptions::match& found) {
     const auto& update = *found.update;
-    if (found.whose == nullptr || protocol::looks_like_failure(update.body) || !found.whose->take(update)) {
+    if (found.whose == nullptr || protocol::begins_with_error(update.body) || !found.whose->take(update)) {
         ++node_->counts.updates_dropped;
     } else {
         ++node_->counts.updates_received;
@@ -78,6 +78,21 @@ void session::on_overlong(std::string_view head, time_point now) {
     ++node_->counts.replies_dropped;
     closed_ = true;
     out_.finish();
+}
+
+// It may have been meant to be longer, and so is not run.
+void session::on_cut(std::string_view rest, time_point now) {
+    rest = protocol::trim(rest);
+    if (rest.empty() || closed_) {
+        return;
+    }
+    if (protocol::is_reply(rest)) {
+        ++node_->counts.replies_dropped;
+        return;
+    }
+    auto what = protocol::salvage(rest);
+    what.why = "the last line is not ended by LF";
+    inbound_.on_malformed(rest, what, now);
 }
 
 void session::on_end(time_point now) {

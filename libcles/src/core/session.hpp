@@ -22,6 +22,8 @@ class session {
 
     void on_line(std::string_view line, time_point now);
     void on_overlong(std::string_view head, time_point now);
+    /// The peer has ended in the middle of a line.
+    void on_cut(std::string_view rest, time_point now);
     /// The peer sends no more.
     void on_end(time_point now);
     /// The link is gone, for this reason.

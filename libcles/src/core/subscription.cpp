@@ -8,6 +8,13 @@
 
 namespace cles::core {
 
+namespace {
+
+// At the other end of a link `self` is a node that has a name too, and it holds one binding of a noun for the link.
+bool overlap(std::string_view a, std::string_view b) noexcept { return a == b || a == "self" || b == "self"; }
+
+} // namespace
+
 bool subscription::take(const protocol::request_line& update) {
     const auto before = order_;
     const auto verdict = order_.take(*update.epoch, *update.seq);
@@ -36,7 +43,7 @@ bool subscription::take(const protocol::request_line& update) {
 bool subscriptions::has(std::string_view target, std::string_view path) const {
     const auto found = by_path_.find(path);
     return found != by_path_.end() && std::any_of(found->second.begin(), found->second.end(),
-                                                  [&](const auto* s) { return s->target() == target; });
+                                                  [&](const auto* s) { return overlap(s->target(), target); });
 }
 
 bool subscriptions::add(subscription& s) {

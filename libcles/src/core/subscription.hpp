@@ -50,7 +50,7 @@ class subscription {
 /// The subscriptions on one link, by what they are bound to: one for each publisher and noun.
 class subscriptions {
   public:
-    /// False where the noun is bound on this link already.
+    /// False where the noun is, or may be, bound on this link already.
     bool add(subscription& s);
     void remove(const subscription& s);
     [[nodiscard]] bool has(std::string_view target, std::string_view path) const;

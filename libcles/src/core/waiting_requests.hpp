@@ -26,19 +26,19 @@ class waiting_requests {
         bytes_ += line.size();
         entries_.push_back({.line = std::string{line}, .answer = {}, .arrived = arrived});
     }
-    /// Equal answers in a row take no more memory than one, so that a flood of refusals is bounded.
+    /// Equal answers in a row take no more memory than one, but count as what they are: they will be written.
     void push_answer(std::string answer, time_point arrived) {
+        bytes_ += answer.size();
         if (!entries_.empty() && entries_.back().line.empty() && entries_.back().answer == answer) {
             ++entries_.back().times;
             return;
         }
-        bytes_ += answer.size();
         entries_.push_back({.line = {}, .answer = std::move(answer), .arrived = arrived});
     }
     entry pop() {
         auto first = std::move(entries_.front());
         entries_.pop_front();
-        bytes_ -= first.line.size() + first.answer.size();
+        bytes_ -= first.line.size() + first.answer.size() * first.times;
         return first;
     }
     void clear() noexcept {

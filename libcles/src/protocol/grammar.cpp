@@ -64,6 +64,11 @@ bool is_name(std::string_view text) noexcept {
 
 bool is_reserved_target(std::string_view name) noexcept { return name == "self" || name == "any" || name == "all"; }
 
+bool is_number(std::string_view text) noexcept {
+    return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos &&
+           (text.size() == 1 || text.front() != '0');
+}
+
 std::optional<std::uint64_t> parse_number(std::string_view text) noexcept {
     std::uint64_t value = 0;
     const auto end = text.data() + text.size();

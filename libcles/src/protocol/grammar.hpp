@@ -25,6 +25,9 @@ bool is_name(std::string_view text) noexcept;
 /// `self`, `any`, `all`: targets that no node may be called.
 bool is_reserved_target(std::string_view name) noexcept;
 
+/// "0", or digits without a leading zero, however many.
+bool is_number(std::string_view text) noexcept;
+
 /// "0", or digits without a leading zero; nothing where it does not fit 64 bits.
 std::optional<std::uint64_t> parse_number(std::string_view text) noexcept;
 

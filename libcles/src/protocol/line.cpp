@@ -58,7 +58,7 @@ line_buffer::status line_buffer::next(std::string_view& line) noexcept {
                             : static_cast<const char*>(std::memchr(data_.get() + scanned_, '\n', end_ - scanned_));
     const auto line_end = found != nullptr ? static_cast<std::size_t>(found - data_.get()) : end_;
     line = {data_.get() + begin_, line_end - begin_};
-    if (line.size() > limit_) {
+    if (line.size() - (line.ends_with('\r') ? 1 : 0) > limit_) { // a CR before the LF is dropped
         line = line.substr(0, limit_);
         return status::overlong;
     }

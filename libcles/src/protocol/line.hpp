@@ -26,7 +26,7 @@ class line_buffer {
     /// more lines follow.
     status next(std::string_view& line) noexcept;
     /// What has come of a line whose end has not.
-    [[nodiscard]] std::size_t unfinished() const noexcept { return end_ - begin_; }
+    [[nodiscard]] std::string_view unfinished() const noexcept { return {data_.get() + begin_, end_ - begin_}; }
 
   private:
     void resize(std::size_t capacity);

@@ -12,6 +12,16 @@
 
 namespace cles::protocol {
 
+bool begins_with_error(std::string_view body) {
+    const auto second = body.size() > 3 && body[1] == '"' ? body[2] : '\\';
+    if (!body.starts_with('{') || (second != 'e' && second != '\\')) {
+        return false; // most bodies
+    }
+    json_reader reader{body};
+    std::string_view key;
+    return reader.begin_object() && reader.next_key(key) && key == "error";
+}
+
 bool parse_reply(std::string_view line, reply_line& out) noexcept {
     if (!line.starts_with("id=")) {
         out.body = line;

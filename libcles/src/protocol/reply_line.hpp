@@ -29,8 +29,8 @@ bool parse_reply(std::string_view line, reply_line& out) noexcept;
 /// Whether a body is a failure.
 constexpr bool is_failure(std::string_view body) noexcept { return body.starts_with(R"({"error":")"); }
 
-/// Whether a handler's result would be taken for a failure, or for one by a reader that is less exact.
-constexpr bool looks_like_failure(std::string_view body) noexcept { return body.starts_with(R"({"error":)"); }
+/// Whether the first key of a JSON text is `error`, however it is written: such a body might be taken for a failure.
+bool begins_with_error(std::string_view body);
 
 /// When to come again, in a `busy` whose writer has nothing better to say.
 inline constexpr std::uint64_t default_retry_ms = 100;

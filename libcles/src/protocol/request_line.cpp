@@ -108,7 +108,10 @@ bool apply(known k, std::string_view value, request_line& out) {
         return false;
     case known::progress: out.wants_progress = true; return value == "yes";
     case known::lease: {
-        const auto lease = parse_number(value);
+        auto lease = parse_number(value);
+        if (!lease && is_number(value)) {
+            lease = max_lease_ms; // too long for 64 bits, hence longer than that
+        }
         return lease && take(out.lease_ms, std::optional{std::min<std::uint64_t>(*lease, max_lease_ms)});
     }
     case known::every: return take(out.every_ms, number_between(value, 1, max_deadline_ms));

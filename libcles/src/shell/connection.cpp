@@ -37,6 +37,8 @@ void connection::on_line(std::string_view line) {
 
 void connection::on_overlong(std::string_view head) { session_.on_overlong(head, now()); }
 
+void connection::on_cut(std::string_view rest) { session_.on_cut(rest, now()); }
+
 void connection::on_batch() {
     const auto keep = shared_from_this();
     flush();
@@ -68,6 +70,8 @@ void connection::wake() {
     }
 }
 
+bool connection::is_behind() const { return link_->unsent() > engine_->bounds().unread; }
+
 void connection::pause(bool stop) {
     pause_for_queue_ = stop;
     link_->pause(pause_for_queue_ || pause_for_backlog_);
@@ -78,7 +82,12 @@ void connection::finish() {
     link_->finish();
 }
 
-void connection::close() { abandon("the link was closed"); }
+void connection::close() {
+    if (!gone_) {
+        link_->flush(); // what was asked before is answered
+    }
+    abandon("the link was closed");
+}
 
 bool connection::takes_updates() const {
     const bool takes = link_->unsent() < updates_wait_past;
@@ -97,12 +106,27 @@ void connection::flush() {
     if (gone_) {
         return;
     }
+    serve_more();
     link_->flush();
     follow_backlog();
+    if (may_serve_more()) {
+        engine_->flush_soon(*this);
+    }
     if (updates_wait_ && !engine_->stopped() && link_->unsent() < updates_wait_past) {
         // The link took all at once, and so will not say that it has room.
         updates_wait_ = false;
         session_.serving().drain(engine_->now());
+    }
+}
+
+bool connection::may_serve_more() {
+    return session_.serving().has_more() && !engine_->stopped() && link_->unsent() < engine_->bounds().unread;
+}
+
+void connection::serve_more() {
+    if (may_serve_more()) {
+        const auto keep = shared_from_this();
+        session_.serving().serve_more(engine_->now());
     }
 }
 

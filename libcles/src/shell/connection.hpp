@@ -51,6 +51,7 @@ class connection final : public link_events,
     // link_events
     void on_line(std::string_view line) override;
     void on_overlong(std::string_view head) override;
+    void on_cut(std::string_view rest) override;
     void on_batch() override;
     void on_end() override;
     void on_lost(boost::system::error_code why) override;
@@ -59,6 +60,7 @@ class connection final : public link_events,
     // outlet
     std::string& output() override { return link_->output(); }
     void wake() override;
+    [[nodiscard]] bool is_behind() const override;
     void pause(bool stop) override;
     void finish() override;
     void close() override;
@@ -79,6 +81,8 @@ class connection final : public link_events,
 
     time_point now();
     void on_stall(time_point now);
+    [[nodiscard]] bool may_serve_more();
+    void serve_more();
     void follow_backlog();
     void end(std::string_view why);
     void lose_feeds(std::string_view why);

@@ -19,6 +19,7 @@ namespace {
 
 // How many turns of the executor updates may wait for more to come, so that one write carries them all.
 constexpr int most_turns_put_off = 64;
+constexpr std::size_t routes_before_tidying = 64;
 
 core::node_setup setup_of(service_options& options) {
     std::random_device source;
@@ -222,6 +223,10 @@ shell::route* engine::find_route(std::string_view target, std::string_view at, b
         const auto where = parse_url(address);
         if (find_transport(where.scheme) == nullptr) {
             throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + address + "'");
+        }
+        if (routes_.size() >= routes_before_tidying) { // to many a node of the past
+            std::erase_if(routes_, [](const auto& entry) { return entry.second->idle(); });
+            recent_route_ = nullptr;
         }
         auto made = std::make_shared<shell::route>(shared_from_this(), where);
         return routes_.emplace(address, std::move(made)).first->second.get();

@@ -27,7 +27,7 @@ std::string listeners::listen(std::string_view where, bool insecure) {
     if (!insecure && carrier->is_exposed(address)) {
         throw error(errc::insecure_listen, "'" + std::string{where} +
                                                "' can be reached from other hosts, and nobody proves who they are; "
-                                               "set 'insecure' if that is meant");
+                                               "say 'insecure' if that is meant");
     }
     std::unique_ptr<acceptor> made;
     try {

@@ -49,6 +49,10 @@ class route : public std::enable_shared_from_this<route> {
     [[nodiscard]] std::vector<detail::pending_ptr> stop();
 
     [[nodiscard]] const std::string& address() const noexcept { return address_; }
+    /// Nothing is lost with it.
+    [[nodiscard]] bool idle() const noexcept {
+        return links_.empty() && requests_.empty() && binders_.empty() && !give_up_;
+    }
 
   private:
     struct waiting final : core::deadline {

@@ -115,7 +115,12 @@ bool stream_link::hand_over_batch() {
     }
     if (state_ == state::open && !more && ended_ && !told_end_ && !overlong_) {
         told_end_ = true;
-        owner->on_end();
+        if (const auto rest = input_.unfinished(); !rest.empty()) {
+            owner->on_cut(rest);
+        }
+        if (state_ == state::open) {
+            owner->on_end();
+        }
     }
     if (state_ != state::closed) {
         owner->on_batch();

@@ -72,7 +72,7 @@ outcome buffered(std::string_view stream, std::size_t limit, Cut next_cut) {
             result.lines.emplace_back(line);
         }
     }
-    result.unfinished = buffer.unfinished();
+    result.unfinished = buffer.unfinished().size();
     return result;
 }
 

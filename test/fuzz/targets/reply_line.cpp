@@ -22,7 +22,7 @@ void check_failure(std::string_view body) {
     }
     std::string text;
     p::append_failure(text, why);
-    require(p::is_failure(text) && p::looks_like_failure(text), "a failure looks like one", text);
+    require(p::is_failure(text) && p::begins_with_error(text), "a failure looks like one", text);
     require(is_valid_json(text), "a failure is JSON", text);
     p::failure again;
     require(p::parse_failure(text, again), "a failure that was written is read", text);
