@@ -5,6 +5,7 @@
 
 #include "core/handler_failure.hpp"
 #include "core/request_checks.hpp"
+#include "core/reserved_tasks.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -33,7 +34,7 @@ std::string failure_text(const protocol::failure& why) {
 } // namespace
 
 inbound::inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
-    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out), bound_(node_->published, updates) {}
+    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out), bound_(*node_, updates, peer, replies_) {}
 
 inbound::~inbound() { lose(); }
 
@@ -197,9 +198,10 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
         return;
     }
     if (r.noun.task == "cles") {
-        serve_reserved(r);
+        serve_reserved(*node_, replies_, r);
     } else if (r.verb == verb::bind) {
-        serve_bind(r);
+        bound_.serve(r);
+        finish_if_done();
     } else {
         serve_task(r, arrived, now);
     }
@@ -217,61 +219,6 @@ void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, ti
         replies_.fail(r, *why);
     } else {
         replies_.done(r.id, r.wants_reply, {});
-    }
-}
-
-void inbound::serve_reserved(const protocol::request_line& r) {
-    const auto& parameters = r.noun.parameters;
-    if (r.verb == verb::pull && parameters.empty()) {
-        replies_.write(r, [this](json_writer& w) { write_description(w, *node_); });
-    } else if (r.verb == verb::pull && parameters.size() == 1 && parameters[0] == "metrics") {
-        replies_.write(r, [this](json_writer& w) { write_metrics(w, *node_); });
-    } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
-        replies_.fail(r, errc::bad_request, node_->name + ": cancel needs an id from 1 to 2^63-1");
-    } else {
-        replies_.fail(r, errc::no_task,
-                      node_->name + " has no " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.path} +
-                          "'");
-    }
-}
-
-void inbound::serve_bind(const protocol::request_line& r) {
-    const std::string path{protocol::canonical_path(r.noun, path_)};
-    auto& published = node_->published;
-    if (r.unbinds()) {
-        bound_.unbind(path);
-        replies_.done(r.id, r.wants_reply, {});
-        finish_if_done();
-        return;
-    }
-    if (!node_->tasks.can_bind(r.noun.task) && !published.knows(r.noun.task)) {
-        replies_.fail(r, errc::no_task, node_->name + " has no BIND '" + std::string{r.noun.task} + "'");
-        return;
-    }
-    try {
-        if (const auto* h = node_->tasks.find(verb::bind, r.noun.task); h != nullptr && h->plain) {
-            auto storage = std::exchange(decoded_, {}); // the handler may have other requests served meanwhile
-            const auto parameters = decode(r.noun, storage);
-            const cles::detail::request_data data{.verb = r.verb,
-                                                  .node = node_->name,
-                                                  .task = r.noun.task,
-                                                  .parameters = {parameters.data(), parameters.size()},
-                                                  .peer = &peer_,
-                                                  .deadline = {}};
-            std::string unused;
-            json_writer w{unused};
-            h->plain(cles::request{data}, w);
-            decoded_ = std::move(storage);
-        }
-        if (!bound_.has(path) && bound_.size() >= node_->bounds.bindings) {
-            replies_.fail(r, busy(node_->name + ": too many bindings on this link"));
-            return;
-        }
-        auto& t = published.open(path);
-        replies_.done(r.id, r.wants_reply, t.last_body());
-        bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
-    } catch (...) {
-        replies_.fail(r, describe(std::current_exception()));
     }
 }
 

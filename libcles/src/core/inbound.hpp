@@ -3,8 +3,8 @@
 
 #include <cles/identity.hpp>
 
+#include "core/bind_requests.hpp"
 #include "core/call.hpp"
-#include "core/link_bindings.hpp"
 #include "core/node.hpp"
 #include "core/outlet.hpp"
 #include "core/reply_writer.hpp"
@@ -55,8 +55,6 @@ class inbound {
 
     void serve(const protocol::request_line& request, time_point arrived, time_point now);
     void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
-    void serve_reserved(const protocol::request_line& request);
-    void serve_bind(const protocol::request_line& request);
     void serve_task(const protocol::request_line& request, time_point arrived, time_point now);
     void run_plain(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
     void run_later(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
@@ -80,7 +78,7 @@ class inbound {
     std::shared_ptr<call> anonymous_;
     waiting_requests waiting_;
     reply_writer replies_;
-    link_bindings bound_;
+    bind_requests bound_;
     std::string path_;    // of the noun being served, where it had to be rebuilt
     std::string decoded_; // its parameters, where they held escapes
     bool serving_waiting_ = false;

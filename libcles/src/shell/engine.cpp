@@ -74,52 +74,11 @@ std::string engine::listen(std::string_view where) {
     return local;
 }
 
-void engine::on_accepted(link_ptr arrived, bool counted) {
-    if (stopped_) {
-        arrived->close();
-        return;
-    }
-    if (counted && accepted_ >= bounds().links) {
-        ++node_->counts.links_refused;
-        protocol::append_failure(
-            arrived->output(),
-            {.code = errc::busy, .message = node_->name + " has as many links as it may", .retry_ms = 1000});
-        arrived->output().push_back('\n');
-        arrived->flush();
-        arrived->close();
-        return;
-    }
-    if (counted) {
-        ++node_->counts.links_accepted;
-    }
-    adopt(std::move(arrived), counted ? shell::connection::origin::accepted : shell::connection::origin::local);
-}
-
-std::shared_ptr<shell::connection> engine::adopt(link_ptr made, shell::connection::origin from) {
-    auto c = std::make_shared<shell::connection>(shared_from_this(), std::move(made), from);
-    connections_.emplace(c.get(), c);
-    if (from == shell::connection::origin::accepted) {
-        ++accepted_;
-    }
-    ++node_->counts.links_open;
-    c->start();
-    return c;
-}
-
 void engine::forget(shell::connection& c, std::uint64_t received, std::uint64_t sent) {
-    if (connections_.erase(&c) == 0) {
-        return;
-    }
-    if (c.from() == shell::connection::origin::accepted) {
-        --accepted_;
-    }
-    auto& counts = node_->counts;
-    --counts.links_open;
-    ++counts.links_lost;
-    counts.bytes_received += received;
-    counts.bytes_sent += sent;
-    for (auto& [where, r] : routes_) {
-        r->drop(c);
+    if (connections_.forget(c, received, sent)) {
+        for (auto& [where, r] : routes_) {
+            r->drop(c);
+        }
     }
 }
 
@@ -286,12 +245,7 @@ void engine::cancel(std::uint64_t ticket) {
             return;
         }
     }
-    for (const auto& [key, c] : connections_) {
-        const auto held = c;
-        if (held->session().asking().cancel(ticket)) {
-            return;
-        }
-    }
+    connections_.cancel(ticket);
 }
 
 // -- serving and publishing ----------------------------------------------------------------------------------------
@@ -381,7 +335,7 @@ void engine::stop() {
     for (auto routes = std::exchange(routes_, {}); const auto& [where, r] : routes) {
         tell(r->stop());
     }
-    for (auto connections = connections_; const auto& [key, c] : connections) {
+    for (const auto& c : connections_.all()) {
         tell(c->session().asking().take_all());
         c->flush();
         c->abandon("the service has been stopped");

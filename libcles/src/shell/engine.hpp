@@ -10,6 +10,7 @@
 #include "core/node.hpp"
 #include "protocol/grammar.hpp"
 #include "shell/connection.hpp"
+#include "shell/connections.hpp"
 #include "shell/deadline_timer.hpp"
 #include "shell/feed_links.hpp"
 #include "shell/listeners.hpp"
@@ -48,9 +49,8 @@ class engine final : public std::enable_shared_from_this<engine> {
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
     [[nodiscard]] time_point now() const { return clock_.now(); }
     void say(log_level level, std::string_view text) const { node_->say(level, text); }
-    std::shared_ptr<shell::connection> adopt(link_ptr made, shell::connection::origin from);
-    /// A link that came in; those from other processes are counted against the limit.
-    void on_accepted(link_ptr arrived, bool counted);
+    [[nodiscard]] shell::connections& connections() noexcept { return connections_; }
+    /// A connection has ended.
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
     /// Has its output written when what runs now has ended.
     void flush_soon(shell::connection& c);
@@ -89,8 +89,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     bool insecure_;
     core::directory directory_;
     shell::listeners listeners_{*this};
-    std::map<shell::connection*, std::shared_ptr<shell::connection>> connections_;
-    std::size_t accepted_ = 0;
+    shell::connections connections_{*this};
     std::map<std::string, std::shared_ptr<shell::route>, std::less<>> routes_;
     std::string recent_target_; // most requests go where the one before went
     shell::route* recent_route_ = nullptr;

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/connections.hpp"
+
+#include "protocol/message.hpp"
+#include "shell/engine.hpp"
+
+#include <utility>
+
+namespace cles::shell {
+
+void connections::on_accepted(link_ptr arrived, bool counted) {
+    if (engine_.stopped()) {
+        arrived->close();
+        return;
+    }
+    if (counted && accepted_ >= engine_.bounds().links) {
+        turn_away(arrived);
+        return;
+    }
+    if (counted) {
+        ++engine_.node().counts.links_accepted;
+    }
+    adopt(std::move(arrived), counted ? connection::origin::accepted : connection::origin::local);
+}
+
+void connections::turn_away(const link_ptr& arrived) {
+    ++engine_.node().counts.links_refused;
+    protocol::append_failure(
+        arrived->output(),
+        {.code = errc::busy, .message = engine_.node().name + " has as many links as it may", .retry_ms = 1000});
+    arrived->output().push_back('\n');
+    arrived->flush();
+    arrived->close();
+}
+
+std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin from) {
+    auto c = std::make_shared<connection>(engine_.shared_from_this(), std::move(made), from);
+    open_.emplace(c.get(), c);
+    if (from == connection::origin::accepted) {
+        ++accepted_;
+    }
+    ++engine_.node().counts.links_open;
+    c->start();
+    return c;
+}
+
+bool connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
+    if (open_.erase(&c) == 0) {
+        return false;
+    }
+    if (c.from() == connection::origin::accepted) {
+        --accepted_;
+    }
+    auto& counts = engine_.node().counts;
+    --counts.links_open;
+    ++counts.links_lost;
+    counts.bytes_received += received;
+    counts.bytes_sent += sent;
+    return true;
+}
+
+bool connections::cancel(std::uint64_t id) {
+    for (const auto& [key, c] : open_) {
+        const auto held = c;
+        if (held->session().asking().cancel(id)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+std::vector<std::shared_ptr<connection>> connections::all() const {
+    std::vector<std::shared_ptr<connection>> result;
+    result.reserve(open_.size());
+    for (const auto& [key, c] : open_) {
+        result.push_back(c);
+    }
+    return result;
+}
+
+} // namespace cles::shell
