@@ -12,9 +12,10 @@ namespace cles::test {
 /// A link as a session sees it, which keeps what is sent and remembers what was asked of it.
 class recording_outlet : public core::outlet {
   public:
-    recording_outlet() = default;
+    explicit recording_outlet(std::size_t datagram = 0) : datagram_bytes(datagram) {}
 
     std::string& output() override { return text_; }
+    [[nodiscard]] std::size_t datagram() const noexcept override { return datagram_bytes; }
     void wake() override { ++wakes; }
     void pause(bool stop) override {
         paused = stop;
@@ -46,6 +47,7 @@ class recording_outlet : public core::outlet {
     int finishes = 0;
     int closes = 0;
     bool paused = false;
+    std::size_t datagram_bytes = 0; ///< 0: a stream
 
   protected:
     ~recording_outlet() = default;

@@ -11,7 +11,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct fixture : cles::core::renewal::host {
+struct fixture : cles::core::renewal::keeper {
     void renew(cles::time_point until) override {
         ++renewals;
         given = until;

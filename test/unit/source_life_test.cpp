@@ -10,7 +10,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct fixture : cles::core::source_life::host {
+struct fixture : cles::core::source_life::keeper {
     [[nodiscard]] bool at_rest() const override { return rests; }
     void on_quiet() override { ++ends; }
     void pass(std::chrono::milliseconds by) {

@@ -9,10 +9,31 @@
 
 namespace cles::core {
 
-void bind_requests::serve(const protocol::request_line& r) {
+bind_requests::bind_requests(node& host, const outlet& out, binder& updates, const identity& peer,
+                             reply_writer& replies)
+    : node_(host), peer_(peer), replies_(replies), bound_(host.published, updates) {
+    if (out.datagram() != 0) {
+        leases_.emplace(host.deadlines, [this](const std::string& path) {
+            ++node_.counts.leases_expired;
+            bound_.unbind(path);
+        });
+    }
+}
+
+void bind_requests::clear() {
+    if (leases_) {
+        leases_->clear();
+    }
+    bound_.clear();
+}
+
+void bind_requests::serve(const protocol::request_line& r, time_point now) {
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
     if (r.unbinds()) {
+        if (leases_) {
+            leases_->drop(path);
+        }
         bound_.unbind(path);
         replies_.done(r.id, r.wants_reply, {});
         return;
@@ -31,6 +52,9 @@ void bind_requests::serve(const protocol::request_line& r) {
         auto& t = published.open(path);
         replies_.done(r.id, r.wants_reply, t.last_body());
         bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
+        if (leases_) {
+            leases_->set(path, now + std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)});
+        }
     } catch (...) {
         replies_.fail(r, describe(std::current_exception()));
     }

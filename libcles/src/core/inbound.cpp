@@ -34,12 +34,20 @@ std::string failure_text(const protocol::failure& why) {
 } // namespace
 
 inbound::inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
-    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out), bound_(*node_, updates, peer, replies_) {}
+    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out),
+      bound_(*node_, out, updates, peer, replies_) {
+    if (out_.datagram() != 0) {
+        datagrams_.emplace(*node_, out_, replies_);
+    }
+}
 
 inbound::~inbound() { lose(); }
 
 void inbound::on_request(std::string_view line, const protocol::request_line& r, time_point now) {
     if (ending_) {
+        return;
+    }
+    if (datagrams_ && !datagrams_->admit(r)) {
         return;
     }
     ++node_->counts.requests[static_cast<std::size_t>(r.verb)];
@@ -77,7 +85,7 @@ void inbound::on_malformed(std::string_view, const protocol::malformed_request& 
         return;
     }
     const protocol::failure why{.code = errc::bad_request, .message = node_->name + ": " + what.why};
-    if (what.id != 0 && calls_.contains(what.id)) {
+    if (!datagrams_ && what.id != 0 && calls_.contains(what.id)) {
         replies_.fail(what.id, what.wants_reply, why);
         lose();
         ending_ = closing_ = true;
@@ -85,7 +93,7 @@ void inbound::on_malformed(std::string_view, const protocol::malformed_request& 
     } else if (what.id == 0 && what.wants_reply && must_wait()) {
         answer_in_turn(failure_text(why), now);
     } else {
-        replies_.fail(what.id, what.wants_reply, why);
+        replies_.fail_apart(what.id, what.wants_reply, why);
     }
 }
 
@@ -95,12 +103,17 @@ void inbound::on_overlong(std::string_view head, time_point now) {
     }
     const auto meant = protocol::salvage(head);
     const protocol::failure why{.code = errc::too_large,
-                                .message = node_->name + ": a line has at most " + std::to_string(node_->bounds.line) +
-                                           " bytes"};
+                                .message = node_->name +
+                                           (datagrams_ ? ": a datagram has at most " : ": a line has at most ") +
+                                           std::to_string(datagrams_ ? out_.datagram() : node_->bounds.line) +
+                                           (datagrams_ ? " bytes: use TCP" : " bytes")};
     if (meant.id == 0 && meant.wants_reply && must_wait()) {
         answer_in_turn(failure_text(why), now);
     } else {
-        replies_.fail(meant.id, meant.wants_reply, why);
+        replies_.fail_apart(meant.id, meant.wants_reply, why);
+    }
+    if (datagrams_) { // the next one has nothing to do with it
+        return;
     }
     closing_ = true;
     end(now);
@@ -200,7 +213,7 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
     if (r.noun.task == "cles") {
         serve_reserved(*node_, replies_, r);
     } else if (r.verb == verb::bind) {
-        bound_.serve(r);
+        bound_.serve(r, now);
         finish_if_done();
     } else {
         serve_task(r, arrived, now);
@@ -284,6 +297,9 @@ void inbound::run_later(const protocol::request_line& r, const handler& h, const
     }
     const auto c = std::make_shared<call>(node_, *this, std::move(wanted), now);
     if (r.id != 0) {
+        if (datagrams_ && r.verb == verb::pull) {
+            datagrams_->begin_repeatable(r);
+        }
         calls_.emplace(r.id, c);
     } else {
         anonymous_ = c;

@@ -5,6 +5,7 @@
 
 #include "core/bind_requests.hpp"
 #include "core/call.hpp"
+#include "core/datagram_requests.hpp"
 #include "core/node.hpp"
 #include "core/outlet.hpp"
 #include "core/reply_writer.hpp"
@@ -16,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -48,6 +50,10 @@ class inbound {
     [[nodiscard]] std::size_t in_flight() const noexcept {
         return calls_.size() + waiting_.size() + (anonymous_ ? 1 : 0);
     }
+    /// Nothing is kept for the peer: nothing runs or waits, nothing is bound, no reply is remembered.
+    [[nodiscard]] bool at_rest() const noexcept {
+        return in_flight() == 0 && bound_.empty() && (!datagrams_ || datagrams_->empty());
+    }
     [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
 
   private:
@@ -78,6 +84,7 @@ class inbound {
     std::shared_ptr<call> anonymous_;
     waiting_requests waiting_;
     reply_writer replies_;
+    std::optional<datagram_requests> datagrams_; // where it is no stream
     bind_requests bound_;
     std::string path_;    // of the noun being served, where it had to be rebuilt
     std::string decoded_; // its parameters, where they held escapes

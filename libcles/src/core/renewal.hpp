@@ -15,19 +15,19 @@ namespace cles::core {
 /// that many do not do it in step.
 class renewal final : private deadline {
   public:
-    class host {
+    class keeper {
       public:
-        host() = default;
-        host(const host&) = delete;
-        host& operator=(const host&) = delete;
+        keeper() = default;
+        keeper(const keeper&) = delete;
+        keeper& operator=(const keeper&) = delete;
         /// Asks for the binding again; whatever comes of it by `until`, `renewed` or `put_off` follows, or `stop`.
         virtual void renew(time_point until) = 0;
 
       protected:
-        ~host() = default;
+        ~keeper() = default;
     };
 
-    renewal(host& owner, deadline_queue& deadlines, std::uint32_t seed) noexcept
+    renewal(keeper& owner, deadline_queue& deadlines, std::uint32_t seed) noexcept
         : owner_(owner), deadlines_(deadlines), jitter_(seed) {}
 
     /// The binding that was asked for then has been made, for so long.
@@ -44,7 +44,7 @@ class renewal final : private deadline {
   private:
     void on_deadline(time_point now) override;
 
-    host& owner_;
+    keeper& owner_;
     deadline_queue& deadlines_;
     jitter jitter_;
     std::chrono::milliseconds lease_{0};

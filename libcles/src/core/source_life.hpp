@@ -15,20 +15,20 @@ class source_life final : private deadline {
   public:
     static constexpr std::chrono::seconds quiet{60};
 
-    class host {
+    class keeper {
       public:
-        host() = default;
-        host(const host&) = delete;
-        host& operator=(const host&) = delete;
+        keeper() = default;
+        keeper(const keeper&) = delete;
+        keeper& operator=(const keeper&) = delete;
         /// Nothing is kept for it.
         [[nodiscard]] virtual bool at_rest() const = 0;
         virtual void on_quiet() = 0;
 
       protected:
-        ~host() = default;
+        ~keeper() = default;
     };
 
-    source_life(host& owner, deadline_queue& deadlines) noexcept : owner_(owner), deadlines_(deadlines) {}
+    source_life(keeper& owner, deadline_queue& deadlines) noexcept : owner_(owner), deadlines_(deadlines) {}
 
     void heard(time_point now) {
         heard_ = now;
@@ -49,7 +49,7 @@ class source_life final : private deadline {
         }
     }
 
-    host& owner_;
+    keeper& owner_;
     deadline_queue& deadlines_;
     time_point heard_{};
 };

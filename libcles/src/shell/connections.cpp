@@ -13,8 +13,8 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
         arrived->close();
         return;
     }
-    if (counted && accepted_ >= engine_.bounds().links) {
-        turn_away(arrived);
+    if (counted && !has_room(arrived->datagram() != 0)) {
+        turn_away(std::move(arrived));
         return;
     }
     if (counted) {
@@ -23,8 +23,32 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
     adopt(std::move(arrived), counted ? connection::origin::accepted : connection::origin::local);
 }
 
-void connections::turn_away(const link_ptr& arrived) {
+bool connections::has_room(bool is_source) {
+    const auto most = engine_.bounds().links;
+    if (!is_source) {
+        return accepted_ < most;
+    }
+    if (sources_ >= most) {
+        drop_sources_at_rest();
+    }
+    return sources_ < most;
+}
+
+// All at once, so that many new sources do not cost a search each.
+void connections::drop_sources_at_rest() {
+    for (const auto& c : all()) {
+        if (c->is_source() && c->at_rest()) {
+            c->abandon("others needed the room");
+        }
+    }
+}
+
+void connections::turn_away(link_ptr arrived) {
     ++engine_.node().counts.links_refused;
+    if (arrived->datagram() != 0) { // what is refused comes next, and says to whom
+        adopt(std::move(arrived), connection::origin::refused);
+        return;
+    }
     protocol::append_failure(
         arrived->output(),
         {.code = errc::busy, .message = engine_.node().name + " has as many links as it may", .retry_ms = 1000});
@@ -37,7 +61,7 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
     auto c = std::make_shared<connection>(engine_.shared_from_this(), std::move(made), from);
     open_.emplace(c.get(), c);
     if (from == connection::origin::accepted) {
-        ++accepted_;
+        ++(c->is_source() ? sources_ : accepted_);
     }
     ++engine_.node().counts.links_open;
     c->start();
@@ -49,7 +73,7 @@ bool connections::forget(connection& c, std::uint64_t received, std::uint64_t se
         return false;
     }
     if (c.from() == connection::origin::accepted) {
-        --accepted_;
+        --(c.datagram() != 0 ? sources_ : accepted_);
     }
     auto& counts = engine_.node().counts;
     --counts.links_open;

@@ -18,6 +18,9 @@ class engine;
 namespace cles::shell {
 
 /// All connections of a service: lets them in as far as there is room, owns them, and lets them go.
+///
+/// Sources of datagrams are counted apart from links: they can be forged, and must not take the room of those that
+/// cannot.
 class connections {
   public:
     explicit connections(detail::engine& host) noexcept : engine_(host) {}
@@ -32,11 +35,14 @@ class connections {
     [[nodiscard]] std::vector<std::shared_ptr<connection>> all() const;
 
   private:
-    void turn_away(const link_ptr& arrived);
+    [[nodiscard]] bool has_room(bool is_source);
+    void turn_away(link_ptr arrived);
+    void drop_sources_at_rest();
 
     detail::engine& engine_;
     std::map<connection*, std::shared_ptr<connection>> open_;
     std::size_t accepted_ = 0;
+    std::size_t sources_ = 0;
 };
 
 } // namespace cles::shell

@@ -22,8 +22,12 @@ constexpr int most_turns_put_off = 64;
 
 core::node_setup setup_of(service_options& options) {
     std::random_device source;
+    // Room for as many ids as a run may draw, and short enough for clients that read numbers as doubles.
+    constexpr std::uint64_t apart = 1U << 20U;
+    const auto epoch = source();
     return {.name = std::move(options.name),
-            .epoch = source(),
+            .epoch = epoch,
+            .first_datagram_id = (source() & 0xFFFFFFFFU) * apart,
             .bounds = options.limits,
             .authorise = std::move(options.authorise),
             .log = std::move(options.log)};
@@ -42,7 +46,7 @@ void check_node_name(const std::string& name) {
 } // namespace
 
 engine::engine(asio::any_io_executor executor, service_options options)
-    : executor_(std::move(executor)), insecure_(options.insecure) {
+    : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks) {
     check_node_name(options.name);
     for (const auto& [name, where] : options.peers) {
         set_peer(name, where);
@@ -80,6 +84,11 @@ void engine::forget(shell::connection& c, std::uint64_t received, std::uint64_t 
             r->drop(c);
         }
     }
+}
+
+std::string engine::stranger(const identity& peer) const {
+    const auto host = parse_url(peer.address).host;
+    return peer.local || !peer.name.empty() || networks_.contain(host) ? std::string{} : host;
 }
 
 // -- turns ---------------------------------------------------------------------------------------------------------

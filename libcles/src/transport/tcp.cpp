@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include "transport/ip_host.hpp"
 #include "transport/stream_acceptor.hpp"
 #include "transport/stream_dialler.hpp"
 
@@ -10,7 +11,6 @@
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/post.hpp>
 
-#include <string>
 #include <utility>
 
 namespace cles::transport {
@@ -20,20 +20,9 @@ using boost::system::error_code;
 
 namespace {
 
-tcp::endpoint resolve(const url& where, error_code& code) {
-    const auto host = where.host == "localhost" ? std::string{"127.0.0.1"} : where.host;
-    const auto address = asio::ip::make_address(host, code);
-    if (!code) {
-        return {address, where.port};
-    }
-    asio::io_context lookup;
-    tcp::resolver resolver{lookup};
-    const auto found = resolver.resolve(host, std::to_string(where.port), code);
-    return code || found.empty() ? tcp::endpoint{} : found.begin()->endpoint();
-}
-
-url url_of(const tcp::endpoint& endpoint) {
-    return {.scheme = "tcp", .host = endpoint.address().to_string(), .port = endpoint.port(), .path = {}};
+tcp::endpoint endpoint_of(const url& where, error_code& code) {
+    const auto address = resolve(where, code);
+    return {address, where.port};
 }
 
 void tune(tcp::socket& socket) {
@@ -48,7 +37,7 @@ identity identify(tcp::socket& socket) {
     const auto peer = socket.remote_endpoint(gone);
     identity who{.transport = "tcp", .address = {}, .name = {}, .uid = {}};
     if (!gone) {
-        who.address = to_string(url_of(peer));
+        who.address = to_string(url_of("tcp", peer));
         who.local = peer.address().is_loopback();
     }
     return who;
@@ -62,7 +51,7 @@ class tcp_acceptor final : public acceptor {
 
     [[nodiscard]] url local() const override {
         error_code ignored;
-        return url_of(inside_->socket().local_endpoint(ignored));
+        return url_of("tcp", inside_->socket().local_endpoint(ignored));
     }
     void start(std::function<void(link_ptr)> on_link) override { inside_->start(std::move(on_link)); }
     void close() override { inside_->close(); }
@@ -75,14 +64,14 @@ class tcp_transport final : public link_transport {
   public:
     [[nodiscard]] bool is_exposed(const url& where) const override {
         error_code code;
-        const auto endpoint = resolve(where, code);
+        const auto endpoint = endpoint_of(where, code);
         return !code && !endpoint.address().is_loopback(); // without an address, listening fails anyway
     }
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
         error_code code;
-        const auto endpoint = resolve(where, code);
+        const auto endpoint = endpoint_of(where, code);
         if (code) {
             throw boost::system::system_error{code};
         }
@@ -100,13 +89,13 @@ class tcp_transport final : public link_transport {
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
         error_code code;
-        const auto endpoint = resolve(where, code);
+        const auto endpoint = endpoint_of(where, code);
         if (code) {
             asio::post(executor, [done = std::move(done), code] { done(code, nullptr); });
             return [] {};
         }
         identity peer{.transport = "tcp",
-                      .address = to_string(url_of(endpoint)),
+                      .address = to_string(url_of("tcp", endpoint)),
                       .name = {},
                       .uid = {},
                       .local = endpoint.address().is_loopback()};

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/url.hpp>
+
+#include <boost/asio/ip/address.hpp>
+#include <boost/system/error_code.hpp>
+
+#include <string>
+#include <string_view>
+
+namespace cles::transport {
+
+/// The address of a URL's host: as it stands, or looked up, which waits for the system's resolver.
+boost::asio::ip::address resolve(const url& where, boost::system::error_code& code);
+
+/// The URL of a socket's end.
+template <class Endpoint>
+url url_of(std::string_view scheme, const Endpoint& end) {
+    return {.scheme = std::string{scheme}, .host = end.address().to_string(), .port = end.port(), .path = {}};
+}
+
+} // namespace cles::transport
