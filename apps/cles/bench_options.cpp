@@ -8,6 +8,7 @@ namespace tool {
 const char* to_string(carrier c) {
     switch (c) {
     case carrier::tcp: return "tcp";
+    case carrier::udp: return "udp";
     case carrier::unix_socket: return "unix";
     case carrier::inproc: return "inproc";
     }
@@ -21,6 +22,7 @@ const char* to_string(cles::perf::handler_style s) {
 std::string bench_url(carrier c) {
     switch (c) {
     case carrier::tcp: return "tcp://127.0.0.1:0";
+    case carrier::udp: return "udp://127.0.0.1:0";
     case carrier::unix_socket: return "unix://@cles-bench-" + std::to_string(::getpid());
     case carrier::inproc: return "inproc://cles-bench";
     }
