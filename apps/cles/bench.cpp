@@ -42,7 +42,7 @@ constexpr std::size_t most_binders = 1024;
 constexpr int most_busy_poll_us = 1'000'000;
 
 const std::map<std::string, carrier> carriers{
-    {"tcp", carrier::tcp}, {"unix", carrier::unix_socket}, {"inproc", carrier::inproc}};
+    {"tcp", carrier::tcp}, {"udp", carrier::udp}, {"unix", carrier::unix_socket}, {"inproc", carrier::inproc}};
 const std::map<std::string, cles::perf::handler_style> styles{{"coroutine", cles::perf::handler_style::coroutine},
                                                               {"callback", cles::perf::handler_style::callback}};
 
@@ -91,6 +91,9 @@ void check(CLI::App& command, arguments& given) {
         if (given.options.transport == carrier::inproc) {
             throw usage_error("--updates goes from one process to another: --transport tcp or unix");
         }
+        if (given.options.transport == carrier::udp) {
+            throw usage_error("--updates counts every update, and UDP may lose some: --transport tcp or unix");
+        }
     } else {
         for (const char* option : {"--binders", "--keep"}) {
             refuse(option, "is for --updates");
@@ -130,7 +133,7 @@ void add_bench(CLI::App& app, int& exit_code) {
     auto& options = given->options;
     auto* command = app.add_subcommand("bench", description);
     command->footer(examples);
-    command->add_option("--transport", given->transport, "What carries the CLES exchange: tcp, unix or inproc")
+    command->add_option("--transport", given->transport, "What carries the CLES exchange: tcp, udp, unix or inproc")
         ->check(CLI::IsMember(keys_of(carriers)).description(""))
         ->type_name("NAME");
     command->add_option("--in-flight", options.in_flight, "PULLs in flight at once on one link (1)")

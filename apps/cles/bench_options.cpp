@@ -16,6 +16,7 @@ cles::perf::placement places_of(const bench_options& options) {
 const char* to_string(carrier c) {
     switch (c) {
     case carrier::tcp: return "tcp";
+    case carrier::udp: return "udp";
     case carrier::unix_socket: return "unix";
     case carrier::inproc: return "inproc";
     }
@@ -29,6 +30,7 @@ const char* to_string(cles::perf::handler_style s) {
 std::string bench_url(carrier c) {
     switch (c) {
     case carrier::tcp: return "tcp://127.0.0.1:0";
+    case carrier::udp: return "udp://127.0.0.1:0";
     case carrier::unix_socket: return "unix://@cles-bench-" + std::to_string(::getpid());
     case carrier::inproc: return "inproc://cles-bench";
     }

@@ -14,7 +14,7 @@
 
 namespace tool {
 
-enum class carrier : std::uint8_t { tcp, unix_socket, inproc };
+enum class carrier : std::uint8_t { tcp, udp, unix_socket, inproc };
 
 struct bench_options {
     carrier transport = carrier::tcp;

@@ -32,6 +32,7 @@ struct serve_command {
     std::string name = "car1";
     std::vector<std::string> listen;
     bool insecure = false;
+    std::vector<std::string> networks;
     double rate = 10;
     int busy_poll_us = 0;
     int real_time = 0;
@@ -45,6 +46,7 @@ cles::service_options options_of(const serve_command& wanted, const cles::log_si
         options.listen.emplace_back(default_url);
     }
     options.insecure = wanted.insecure;
+    options.networks = wanted.networks;
     options.log = log;
     return options;
 }
@@ -97,12 +99,19 @@ void add_serve(CLI::App& app, context& shared) {
         ->check(CLI::Range(1, 99).description(""));
     command->add_flag("--insecure", wanted->insecure,
                       "Allow listening beyond this host, where anybody may ask for anything");
+    command
+        ->add_option("--network", wanted->networks,
+                     "Hosts that may be sent as much by UDP as they ask for, as in 10.0.0.0/8; may be repeated")
+        ->type_name("NETWORK")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
                     "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop it.\n\n"
                     "Examples:\n"
                     "  cles serve\n"
                     "  cles serve --name car2 --listen tcp://127.0.0.1:0 --listen unix:///tmp/car2.sock --rate 50\n"
-                    "  cles serve --listen tcp://0.0.0.0 --insecure");
+                    "  cles serve --listen tcp://0.0.0.0 --insecure\n"
+                    "  cles serve --listen tcp://127.0.0.1 --listen udp://127.0.0.1");
     command->callback([wanted, &shared] { shared.exit_code = serve(*wanted, shared.verbosity); });
 }
 

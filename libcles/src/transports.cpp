@@ -3,6 +3,7 @@
 
 #include "transport/inproc.hpp"
 #include "transport/tcp.hpp"
+#include "transport/udp.hpp"
 #include "transport/unix.hpp"
 
 #include <functional>
@@ -19,6 +20,7 @@ table& transports() {
     static table instance = [] {
         table t;
         t.emplace("tcp", transport::make_tcp());
+        t.emplace("udp", transport::make_udp());
         t.emplace("unix", transport::make_unix());
         t.emplace("inproc", transport::make_inproc());
         return t;

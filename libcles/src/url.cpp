@@ -52,7 +52,7 @@ void parse_host_and_port(std::string_view whole, std::string_view rest, url& out
         refuse(whole, "the host is missing");
     }
     if (out.host.find_first_of("/?#@ ") != std::string::npos || after.find('/') != std::string_view::npos) {
-        refuse(whole, "a tcp URL ends behind its port");
+        refuse(whole, "a " + out.scheme + " URL ends behind its port");
     }
     if (!after.empty()) {
         out.port = parse_port(whole, after.substr(1));

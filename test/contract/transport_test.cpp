@@ -60,9 +60,9 @@ BOOST_AUTO_TEST_CASE(a_scheme_that_nobody_registered_has_no_transport) {
     BOOST_TEST(cles::find_transport("") == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, every_door, kind) {
     link_pair pair{kind};
-    if (pair.address().scheme == "tcp") {
+    if (pair.address().scheme == "tcp" || pair.address().scheme == "udp") {
         BOOST_TEST(pair.address().port != 0);
     }
     const auto again = cles::parse_url(to_string(pair.address()));
@@ -70,7 +70,7 @@ BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, every_carrier, kind) {
     pair.open();
 }
 
-BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, every_door, kind) {
     link_pair pair{kind};
     pair.connect();
     const auto far = pair.far.run([&] { return pair.far.link->peer(); });
@@ -130,7 +130,7 @@ BOOST_DATA_TEST_CASE(dialling_where_nobody_listens_is_refused_and_never_inside_t
     BOOST_TEST(fits, result.code.message());
 }
 
-BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, every_door, kind) {
     link_pair pair{kind};
     dial_result result;
     const auto give_up =
@@ -193,7 +193,7 @@ BOOST_AUTO_TEST_CASE(a_unix_socket_whose_queue_is_full_is_an_error_and_no_link) 
     BOOST_TEST(dials.back()->made == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, every_door, kind) {
     link_pair pair{kind};
     asio::io_context other;
     BOOST_TEST(listen_failure(other, pair.address()) == asio::error::address_in_use);
@@ -227,17 +227,21 @@ BOOST_DATA_TEST_CASE(nothing_comes_in_after_an_acceptor_was_closed, every_carrie
 
 BOOST_AUTO_TEST_CASE(an_address_that_is_not_of_this_machine_is_refused) {
     asio::io_context io;
-    BOOST_TEST(listen_failure(io, cles::parse_url("tcp://192.0.2.1:0")) == boost::system::errc::address_not_available);
+    for (const auto* where : {"tcp://192.0.2.1:0", "udp://192.0.2.1:0"}) {
+        BOOST_TEST(listen_failure(io, cles::parse_url(where)) == boost::system::errc::address_not_available);
+    }
 }
 
 BOOST_AUTO_TEST_CASE(a_host_name_that_nobody_knows_is_an_error) {
     asio::io_context io;
-    BOOST_TEST(listen_failure(io, cles::parse_url("tcp://no.such.host.invalid:0")).failed());
-    dial_result result;
-    cles::find_transport("tcp")->dial(io.get_executor(), cles::parse_url("tcp://no.such.host.invalid:1"), {},
-                                      result.callback());
-    run_until(io, [&] { return result.calls == 1; });
-    BOOST_TEST(result.code.failed());
+    for (const std::string scheme : {"tcp", "udp"}) {
+        BOOST_TEST(listen_failure(io, cles::parse_url(scheme + "://no.such.host.invalid:0")).failed());
+        dial_result result;
+        cles::find_transport(scheme)->dial(io.get_executor(), cles::parse_url(scheme + "://no.such.host.invalid:1"), {},
+                                           result.callback());
+        run_until(io, [&] { return result.calls == 1; });
+        BOOST_TEST(result.code.failed());
+    }
 }
 
 BOOST_AUTO_TEST_CASE(only_loopback_and_what_stays_on_this_host_is_not_exposed) {
@@ -251,6 +255,10 @@ BOOST_AUTO_TEST_CASE(only_loopback_and_what_stays_on_this_host_is_not_exposed) {
     BOOST_TEST(!exposed("tcp://localhost:0"));
     BOOST_TEST(!exposed("unix:///tmp/x"));
     BOOST_TEST(!exposed("inproc://x"));
+    BOOST_TEST(!exposed("udp://127.0.0.1:0"));
+    BOOST_TEST(!exposed("udp://[::1]:0"));
+    BOOST_TEST(exposed("udp://0.0.0.0:0"));
+    BOOST_TEST(exposed("udp://[::]:0"));
     BOOST_TEST(exposed("tcp://0.0.0.0:0"));
     BOOST_TEST(exposed("tcp://[::]:0"));
     BOOST_TEST(exposed("tcp://192.0.2.1:0"));

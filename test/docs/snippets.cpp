@@ -50,6 +50,7 @@ void a_service() {
 void an_open_service() {
     asio::io_context io;
     cles::service open{io, {.name = "car1", .listen = {"tcp://0.0.0.0:0"}, .insecure = true}};
+    cles::service fast{io, {.name = "car2", .listen = {"udp://127.0.0.1:0"}, .networks = {"10.0.0.0/8", "fd00::/8"}}};
 }
 
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres) {

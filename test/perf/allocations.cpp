@@ -72,9 +72,9 @@ constexpr std::uint64_t counted = 10'000;
 constexpr std::uint64_t sent = warm_up + counted + 64;
 
 /// How many allocations there were between the first counted request and the last.
-std::uint64_t allocations_of(const std::function<void(const std::string&)>& client) {
+std::uint64_t allocations_of(const char* listen, const std::function<void(const std::string&)>& client) {
     boost::asio::io_context io{1};
-    cles::service car{io, {.name = "car1", .listen = {"tcp://127.0.0.1:0"}}};
+    cles::service car{io, {.name = "car1", .listen = {listen}}};
     std::uint64_t pulls = 0;
     std::uint64_t before = 0;
     std::uint64_t after = 0;
@@ -123,7 +123,7 @@ void one_by_one(const std::string& url, const std::function<std::string(std::uin
         client.send(request(i));
         client.receive_line();
     }
-    client.send("PUSH self:done reply=no\n");
+    client.send("PUSH self:done id=1 reply=no\n");
     client.receive_line();
 }
 
@@ -139,12 +139,13 @@ void in_batches(const std::string& url, std::uint64_t size) {
             client.receive_line();
         }
     }
-    client.send("PUSH self:done reply=no\n");
+    client.send("PUSH self:done id=1 reply=no\n");
     client.receive_line();
 }
 
 struct scenario {
     const char* name;
+    const char* listen;
     std::function<void(const std::string&)> client;
 };
 
@@ -152,20 +153,26 @@ struct scenario {
 
 int main() {
     const std::vector<scenario> scenarios{
-        {"a person's request, without id",
+        {"a person's request, without id", "tcp://127.0.0.1:0",
          [](const std::string& url) { one_by_one(url, [](std::uint64_t) { return "PULL self:localization\n"; }); }},
-        {"a node's request, with id and deadline",
+        {"a node's request, with id and deadline", "tcp://127.0.0.1:0",
          [](const std::string& url) {
              one_by_one(url, [](std::uint64_t i) {
                  return "PULL car1:localization id=" + std::to_string(i) + " deadline=5000\n";
              });
          }},
-        {"64 in flight", [](const std::string& url) { in_batches(url, 64); }},
+        {"by datagram, with id and deadline", "udp://127.0.0.1:0",
+         [](const std::string& url) {
+             one_by_one(url, [](std::uint64_t i) {
+                 return "PULL car1:localization id=" + std::to_string(i) + " deadline=5000\n";
+             });
+         }},
+        {"64 in flight", "tcp://127.0.0.1:0", [](const std::string& url) { in_batches(url, 64); }},
     };
     bool good = true;
     for (const auto& each : scenarios) {
         try {
-            const auto found = allocations_of(each.client);
+            const auto found = allocations_of(each.listen, each.client);
             std::printf("%-40s %llu allocations in %llu PULLs\n", each.name, static_cast<unsigned long long>(found),
                         static_cast<unsigned long long>(counted));
             good = good && found == 0;

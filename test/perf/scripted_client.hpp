@@ -19,15 +19,19 @@
 /// which gives up after some seconds in which nothing comes.
 class scripted_client {
   public:
-    /// `url` is that of an endpoint, "tcp://127.0.0.1:PORT".
-    explicit scripted_client(const std::string& url) : socket_(check(::socket(AF_INET, SOCK_STREAM, 0), "socket")) {
+    /// `url` is that of an endpoint, "tcp://127.0.0.1:PORT" or "udp://127.0.0.1:PORT".
+    explicit scripted_client(const std::string& url)
+        : udp_(url.starts_with("udp")),
+          socket_(check(::socket(AF_INET, udp_ ? SOCK_DGRAM : SOCK_STREAM, 0), "socket")) {
         sockaddr_in address{};
         address.sin_family = AF_INET;
         address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
         address.sin_port = htons(static_cast<std::uint16_t>(std::atoi(url.c_str() + url.rfind(':') + 1)));
         const int on = 1;
         const timeval patience{.tv_sec = 10, .tv_usec = 0};
-        check(::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on), "TCP_NODELAY");
+        if (!udp_) {
+            check(::setsockopt(socket_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on), "TCP_NODELAY");
+        }
         check(::setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience), "SO_RCVTIMEO");
         check(::connect(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address), "connect");
     }
@@ -83,6 +87,7 @@ class scripted_client {
         return result;
     }
 
+    bool udp_;
     int socket_;
     std::string received_;
 };

@@ -15,6 +15,8 @@ std::ostream& operator<<(std::ostream& out, carrier kind) {
     case carrier::unix_abstract: return out << "unix, abstract";
     case carrier::inproc: return out << "inproc";
     case carrier::inproc_threads: return out << "inproc between threads";
+    case carrier::udp4: return out << "udp";
+    case carrier::udp6: return out << "udp over IPv6";
     }
     return out;
 }
@@ -25,6 +27,8 @@ std::string fresh_address(carrier kind) {
     switch (kind) {
     case carrier::tcp4: return "tcp://127.0.0.1:0";
     case carrier::tcp6: return "tcp://[::1]:0";
+    case carrier::udp4: return "udp://127.0.0.1:0";
+    case carrier::udp6: return "udp://[::1]:0";
     case carrier::unix_file: return "unix:///tmp/" + own;
     case carrier::unix_abstract: return "unix://@" + own;
     case carrier::inproc:
@@ -85,6 +89,9 @@ void link_pair::connect() {
     });
     until([&] { return near.link || code; });
     BOOST_REQUIRE_MESSAGE(!code, "dialling: " << code.message());
+    if (near.link->datagram() != 0) {
+        near.say("hello\n");
+    }
     accept();
 }
 

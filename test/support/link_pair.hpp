@@ -20,12 +20,20 @@
 
 namespace cles::test {
 
-/// All ways to make a link, each of which keeps the one contract.
-enum class carrier { tcp4, tcp6, unix_file, unix_abstract, inproc, inproc_threads };
+/// All ways to make a link.
+enum class carrier { tcp4, tcp6, unix_file, unix_abstract, inproc, inproc_threads, udp4, udp6 };
 
+/// The streams, each of which keeps the one contract.
 inline constexpr std::array every_carrier{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
                                           carrier::unix_abstract, carrier::inproc, carrier::inproc_threads};
 inline constexpr std::array every_socket{carrier::tcp4, carrier::tcp6, carrier::unix_file, carrier::unix_abstract};
+
+/// What carries each line as a datagram of its own.
+inline constexpr std::array every_datagram{carrier::udp4, carrier::udp6};
+/// What holds for listening and dialling, whatever is carried.
+inline constexpr std::array every_door{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
+                                       carrier::unix_abstract, carrier::inproc, carrier::inproc_threads,
+                                       carrier::udp4,          carrier::udp6};
 
 std::ostream& operator<<(std::ostream& out, carrier kind);
 
@@ -81,7 +89,7 @@ class link_pair {
     /// The other end's context.
     [[nodiscard]] boost::asio::io_context& far_io() { return thread_ ? thread_->io() : io; }
 
-    /// Makes the link; its ends are not started.
+    /// Makes the link; its ends are not started. By datagram the near end says "hello", without which nobody comes in.
     void connect();
     /// Makes the link and starts both ends.
     void open();

@@ -12,9 +12,10 @@ namespace cles::test {
 /// A link as a session sees it, which keeps what is sent and remembers what was asked of it.
 class recording_outlet : public core::outlet {
   public:
-    recording_outlet() = default;
+    explicit recording_outlet(std::size_t datagram = 0) : datagram_bytes(datagram) {}
 
     std::string& output() override { return text_; }
+    [[nodiscard]] std::size_t datagram() const noexcept override { return datagram_bytes; }
     void wake() override { ++wakes; }
     [[nodiscard]] bool is_behind() const override { return behind; }
     void pause(bool stop) override {
@@ -48,6 +49,7 @@ class recording_outlet : public core::outlet {
     int closes = 0;
     bool paused = false;
     bool behind = false;
+    std::size_t datagram_bytes = 0; ///< 0: a stream
 
   protected:
     ~recording_outlet() = default;

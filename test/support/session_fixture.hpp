@@ -26,9 +26,12 @@ namespace cles::test {
 class test_node {
   public:
     explicit test_node(limits bounds = {}, authoriser rules = {})
-        : host(std::make_shared<core::node>(
-              core::node_setup{.name = "car1", .epoch = 0x5f3a09c1, .bounds = bounds, .authorise = std::move(rules)},
-              clock, [this] { ++wakes; })) {}
+        : host(std::make_shared<core::node>(core::node_setup{.name = "car1",
+                                                             .epoch = 0x5f3a09c1,
+                                                             .first_datagram_id = first_datagram_id,
+                                                             .bounds = bounds,
+                                                             .authorise = std::move(rules)},
+                                            clock, [this] { ++wakes; })) {}
 
     /// Moves time and lets what is due happen.
     void pass(std::chrono::milliseconds by) {
@@ -79,6 +82,7 @@ class test_node {
     [[nodiscard]] core::counters& counts() const { return host->counts; }
 
     manual_clock clock;
+    static constexpr std::uint64_t first_datagram_id = 5'000'000'000;
     int wakes = 0;
     std::shared_ptr<core::node> host;
     std::vector<std::shared_ptr<running>> started;
@@ -87,7 +91,10 @@ class test_node {
 /// One link of a node, with the test at its other end.
 class test_link final : public recording_outlet, public core::binder {
   public:
-    explicit test_link(test_node& at) : at_(at), session_(at.host, *this, *this, peer_) {}
+    explicit test_link(test_node& at) : test_link(at, 0) {}
+    /// Over datagrams of so many bytes, where it is not 0.
+    test_link(test_node& at, std::size_t datagram)
+        : recording_outlet(datagram), at_(at), session_(at.host, *this, *this, peer_) {}
 
     /// Feeds a line and tells what was sent meanwhile.
     std::string ask(std::string_view line) {

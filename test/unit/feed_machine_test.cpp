@@ -22,6 +22,14 @@ class counting_host final : public cles::core::feed_host {
   public:
     void bind(cles::core::feed_machine&) override { ++binds; }
     void unbind(cles::core::feed_machine&) override { ++unbinds; }
+    void detach(cles::core::feed_machine&) override { ++detaches; }
+    void renew(cles::core::feed_machine&, cles::time_point until) override {
+        ++renewals;
+        renew_until = until;
+    }
+    int detaches = 0;
+    int renewals = 0;
+    cles::time_point renew_until{};
     int binds = 0;
     int unbinds = 0;
 };
@@ -289,6 +297,91 @@ BOOST_AUTO_TEST_CASE(a_caller_who_does_not_fetch_keeps_the_newest_and_learns_of_
     BOOST_TEST(small.next() == "gap 3");
     BOOST_TEST(small.next() == "update 4 {}");
     BOOST_TEST(small.next() == "update 5 {}");
+}
+
+// -- leases ----------------------------------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(a_binding_by_datagram_is_renewed_at_a_third_of_its_lease) {
+    bound();
+    const auto asked = clock.now();
+    feed.on_leased(asked, 9s);
+    pass(2s);
+    BOOST_TEST(host.renewals == 0);
+    pass(1s);
+    BOOST_TEST(host.renewals == 1);
+    BOOST_TEST((host.renew_until == asked + 9s));
+    feed.on_renewed(clock.now());
+    pass(3s);
+    BOOST_TEST(host.renewals == 2);
+    BOOST_TEST(next() == "(nothing)"); // a renewal is nothing to tell of
+}
+
+BOOST_AUTO_TEST_CASE(when_renewals_go_unanswered_the_feed_is_lost_and_binds_again) {
+    bound();
+    feed.on_leased(clock.now(), 9s);
+    pass(3s);
+    const auto asked = clock.now();
+    pass(6s);
+    feed.on_renewal_refused(asked, errc::deadline, "no answer came in time", clock.now());
+    BOOST_TEST(host.detaches == 1);
+    BOOST_TEST(next() == "lost the publisher did not renew the lease in time");
+    pass(100ms);
+    BOOST_TEST(host.binds == 2);
+    feed.on_bound("[1]");
+    feed.on_leased(clock.now(), 9s);
+    BOOST_TEST(next() == "rebound");
+    BOOST_TEST(next() == "current [1]");
+    pass(3s);
+    BOOST_TEST(host.renewals == 2);
+}
+
+BOOST_AUTO_TEST_CASE(a_renewal_that_is_refused_loses_the_feed_at_once) {
+    bound();
+    feed.on_leased(clock.now(), 9s);
+    pass(3s);
+    feed.on_renewal_refused(clock.now(), errc::no_task, "car1 has no BIND 'speed'", clock.now());
+    BOOST_TEST(next() == "lost car1 has no BIND 'speed'");
+}
+
+BOOST_AUTO_TEST_CASE(a_busy_publisher_is_asked_to_renew_again) {
+    bound();
+    feed.on_leased(clock.now(), 9s);
+    pass(3s);
+    feed.on_renewal_refused(clock.now(), errc::busy, "later", clock.now());
+    BOOST_TEST(next() == "(nothing)");
+    pass(2s);
+    BOOST_TEST(host.renewals == 2);
+}
+
+BOOST_AUTO_TEST_CASE(a_last_value_too_large_for_the_renewals_answer_is_no_loss) {
+    bound();
+    feed.on_leased(clock.now(), 9s);
+    pass(3s);
+    feed.on_renewal_refused(clock.now(), errc::too_large, "use TCP", clock.now());
+    BOOST_TEST(next() == "(nothing)");
+    pass(3s);
+    BOOST_TEST(host.renewals == 2);
+}
+
+BOOST_AUTO_TEST_CASE(an_answer_to_a_renewal_of_an_earlier_binding_says_nothing) {
+    bound();
+    const auto asked = clock.now();
+    feed.on_leased(asked, 9s);
+    pass(3s);
+    lose();
+    pass(100ms);
+    feed.on_bound("{}");
+    feed.on_leased(clock.now(), 9s);
+    feed.on_renewal_refused(asked, errc::deadline, "", clock.now());
+    BOOST_TEST(host.detaches == 0);
+}
+
+BOOST_AUTO_TEST_CASE(a_closed_feed_renews_no_more) {
+    bound();
+    feed.on_leased(clock.now(), 9s);
+    feed.close(errc::cancelled);
+    pass(1h);
+    BOOST_TEST(host.renewals == 0);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -190,6 +190,7 @@ BOOST_AUTO_TEST_CASE(a_stream_of_updates_is_judged_line_by_line) {
     for (int seq = 4; seq <= 7; ++seq) {
         link.ask("UPDATE car2:speed seq=" + std::to_string(seq) + " epoch=0000000b {}");
     }
+    link.session().bound().remove(again);
     listener closer{"car2", "speed", false};
     link.session().bound().add(closer);
     link.ask("UPDATE car2:speed seq=8 epoch=0000000b {}");

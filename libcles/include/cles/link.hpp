@@ -44,6 +44,10 @@ class link_events {
 ///
 /// Used on one executor. Output is appended to `output()` as whole lines, LF included, and leaves with the next
 /// `flush`.
+///
+/// Where `datagram()` is not 0, each line is a datagram of its own, which may be lost, come twice and overtake others.
+/// Then a line may hold further LFs (the sender's mistake, told by the session), nothing ends, and a line over the
+/// limit is told without an end to the others.
 class link {
   public:
     link() = default;
@@ -54,6 +58,8 @@ class link {
     /// Begins to read. The link keeps its owner alive until it is closed or lost.
     virtual void start(std::shared_ptr<link_events> owner) = 0;
     virtual std::string& output() = 0;
+    /// Bytes of a datagram at most, a line's LF among them; 0 where the link is a stream.
+    [[nodiscard]] virtual std::size_t datagram() const noexcept { return 0; }
     /// Tries to hand the output to the transport at once; what it does not take follows when it does.
     virtual void flush() = 0;
     /// Bytes that the transport has not taken yet.

@@ -40,6 +40,9 @@ struct service_options {
     std::vector<std::string> listen{};          ///< link URLs, see docs/links.md; none: it only asks
     std::map<std::string, std::string> peers{}; ///< where other nodes are: name to URL
     bool insecure = false;                      ///< allow listening beyond this host without credentials
+    /// Networks ("10.0.0.0/8", "fd00::/8") whose hosts are who they say, so that as much is sent to them by UDP as they
+    /// ask for. All others but loopback get less than 64 KiB a second, lest the node be used to flood a third party.
+    std::vector<std::string> networks{};
     cles::limits limits{};
     authoriser authorise{}; ///< nobody is refused where it is empty
     log_sink log{};
@@ -79,8 +82,8 @@ struct outgoing {
 class service : public registrar {
   public:
     /// Starts listening at once; accepting begins when the executor runs.
-    /// \throws cles::error: `invalid_name`, `invalid_url`, `unknown_scheme`, `insecure_listen`, or the system's code
-    /// where an address cannot be had (the message names it)
+    /// \throws cles::error: `invalid_name`, `invalid_url` (of a network too), `unknown_scheme`, `insecure_listen`, or
+    /// the system's code where an address cannot be had (the message names it)
     service(boost::asio::any_io_executor executor, service_options options);
     template <std::derived_from<boost::asio::execution_context> Context>
     service(Context& context, service_options options)

@@ -12,7 +12,7 @@ inline constexpr std::uint16_t default_port = 25370;
 /// Where a link leads, in parts.
 ///
 /// ```
-/// url      = "tcp://" host [ ":" port ] / "unix://" path / "inproc://" name
+/// url      = ( "tcp://" / "udp://" ) host [ ":" port ] / "unix://" path / "inproc://" name
 /// host     = IPv4 address / "[" IPv6 address [ "%25" zone ] "]" / host name
 /// path     = "/" ... (a socket file) / "@" ... (an abstract socket)
 /// ```
@@ -20,7 +20,7 @@ inline constexpr std::uint16_t default_port = 25370;
 /// The port is 25370 where none is given; 0 asks the system for a free one when listening.
 struct url {
     std::string scheme;
-    std::string host; ///< of `tcp`, without brackets; of `inproc`, the name
+    std::string host; ///< of `tcp` and `udp`, without brackets; of `inproc`, the name
     std::uint16_t port = 0;
     std::string path; ///< of `unix`
 };

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "core/jitter.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <cstdint>
@@ -15,13 +17,10 @@ class backoff {
 
     explicit backoff(std::uint32_t seed, milliseconds first = milliseconds{100},
                      milliseconds longest = milliseconds{5000}) noexcept
-        : first_(first), longest_(longest), next_(first), random_(seed | 1U) {}
+        : first_(first), longest_(longest), next_(first), jitter_(seed) {}
 
     milliseconds next() noexcept {
-        random_ ^= random_ << 13U; // xorshift32 (Marsaglia 2003)
-        random_ ^= random_ >> 17U;
-        random_ ^= random_ << 5U;
-        const auto pause = next_ - milliseconds{random_ % static_cast<std::uint32_t>(next_.count() / 4 + 1)};
+        const auto pause = next_ - jitter_.quarter_of(next_);
         next_ = std::min(next_ * 2, longest_);
         return pause;
     }
@@ -31,7 +30,7 @@ class backoff {
     milliseconds first_;
     milliseconds longest_;
     milliseconds next_;
-    std::uint32_t random_;
+    jitter jitter_;
 };
 
 } // namespace cles::core

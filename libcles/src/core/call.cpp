@@ -43,7 +43,7 @@ bool call::progress(double fraction, std::string_view json) {
     const auto body = out.size();
     out.append(json);
     close_result(out, body);
-    if (out.size() - line > node_->bounds.line) { // the peer would close the link over it
+    if (out.size() - line > owner_->replies_.longest()) { // the peer would close the link over it, or it does not fit
         out.replace(body, out.size() - body, "{}");
     }
     out.push_back('\n');

@@ -13,13 +13,18 @@ struct counters {
     std::array<std::uint64_t, verb_count> requests{}; ///< served, by verb
     std::uint64_t errors = 0;                         ///< answered with an error
     std::uint64_t errors_unsent = 0;                  ///< not answered with one because of reply=no
+    std::uint64_t requests_repeated = 0;              ///< by datagram, and so not run again
     std::uint64_t requests_sent = 0;
+    std::uint64_t requests_resent = 0; ///< copies, by datagram
     std::uint64_t replies_dropped = 0; ///< malformed, or answering nothing in flight
     std::uint64_t updates_published = 0;
     std::uint64_t updates_delivered = 0; ///< to binders on links
     std::uint64_t updates_shed = 0;      ///< dropped for binders that were slow
+    std::uint64_t updates_too_large = 0; ///< not sent by datagram
     std::uint64_t updates_received = 0;  ///< and handed to a feed
     std::uint64_t updates_dropped = 0;   ///< unwanted, repeated or malformed
+    std::uint64_t leases_expired = 0;
+    std::uint64_t datagrams_withheld = 0; ///< to strangers who would have got too much
     std::uint64_t links_accepted = 0;
     std::uint64_t links_refused = 0;
     std::uint64_t links_lost = 0;

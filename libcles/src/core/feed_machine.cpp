@@ -10,7 +10,7 @@ namespace cles::core {
 feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
                            std::string path, bool thinned, std::uint32_t seed)
     : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines),
-      queue_(bounds.feed, bounds.binding_bytes), backoff_(seed) {}
+      queue_(bounds.feed, bounds.binding_bytes), backoff_(seed), renewal_(*this, deadlines, ~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);
@@ -38,6 +38,33 @@ void feed_machine::on_bound(std::string_view last) {
     }
 }
 
+void feed_machine::on_leased(time_point asked, std::chrono::milliseconds lease) {
+    if (state_ == state::bound) {
+        bound_at_ = asked;
+        renewal_.begin(asked, lease);
+    }
+}
+
+void feed_machine::on_renewed(time_point asked) {
+    if (state_ == state::bound && asked >= bound_at_) {
+        renewal_.renewed(asked);
+    }
+}
+
+void feed_machine::on_renewal_refused(time_point asked, boost::system::error_code why, std::string_view message,
+                                      time_point now) {
+    if (state_ != state::bound || asked < bound_at_) { // of a binding that is no more
+        return;
+    }
+    if (why == errc::too_large) { // the publisher has renewed it; only its last value did not fit the answer
+        on_renewed(asked);
+    } else if (why != errc::busy || !renewal_.put_off(now)) {
+        const std::string text{why == errc::deadline ? "the publisher did not renew the lease in time" : message};
+        host_.detach(*this);
+        on_lost(text, now);
+    }
+}
+
 void feed_machine::on_refused(boost::system::error_code why, std::string_view message, time_point now) {
     if (state_ != state::binding) {
         return;
@@ -62,6 +89,7 @@ void feed_machine::on_lost(std::string_view why, time_point now) {
 
 void feed_machine::pause(time_point now) {
     state_ = state::pausing;
+    renewal_.stop();
     deadlines_.arm(*this, now + backoff_.next());
 }
 
@@ -115,6 +143,7 @@ feed_machine::waiting feed_machine::abandon() {
     if (state_ != state::closed) {
         state_ = state::closed;
         deadlines_.disarm(*this);
+        renewal_.stop();
         host_.unbind(*this);
     }
     return {.first = std::move(first_), .next = std::move(waiter_)};

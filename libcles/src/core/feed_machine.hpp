@@ -9,8 +9,10 @@
 #include "core/backoff.hpp"
 #include "core/deadlines.hpp"
 #include "core/feed_queue.hpp"
+#include "core/renewal.hpp"
 #include "core/subscription.hpp"
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -30,13 +32,18 @@ class feed_host {
     virtual void bind(feed_machine& feed) = 0;
     /// Takes it off its link and unbinds at the publisher.
     virtual void unbind(feed_machine& feed) = 0;
+    /// Takes it off its link without telling the publisher.
+    virtual void detach(feed_machine& feed) = 0;
+    /// Sends the BIND of a binding by datagram once more; `on_renewed` or `on_renewal_refused` follows, with
+    /// `deadline` where no answer has come by `until`.
+    virtual void renew(feed_machine& feed, time_point until) = 0;
 
   protected:
     ~feed_host() = default;
 };
 
 /// A feed's life: it binds, tells what comes, and when the publisher is lost binds again after a pause.
-class feed_machine final : public subscription, private deadline {
+class feed_machine final : public subscription, private deadline, private renewal::keeper {
   public:
     using event_ptr = std::unique_ptr<detail::pending_event, detail::discarding>;
 
@@ -47,6 +54,10 @@ class feed_machine final : public subscription, private deadline {
     /// Binds for the first time. The operation ends with the answer; where it fails, the feed is closed.
     void start(detail::pending_ptr bound);
     void on_bound(std::string_view last);
+    /// Bound by datagram: for a lease that counts from when the BIND was sent, and is renewed from now on.
+    void on_leased(time_point asked, std::chrono::milliseconds lease);
+    void on_renewed(time_point asked);
+    void on_renewal_refused(time_point asked, boost::system::error_code why, std::string_view message, time_point now);
     void on_refused(boost::system::error_code why, std::string_view message, time_point now);
     void on_lost(std::string_view why, time_point now);
 
@@ -73,12 +84,15 @@ class feed_machine final : public subscription, private deadline {
 
     bool on_event(const detail::raw_event& event) override;
     void on_deadline(time_point now) override;
+    void renew(time_point until) override { host_.renew(*this, until); }
     void pause(time_point now);
 
     feed_host& host_;
     deadline_queue& deadlines_;
     feed_queue queue_;
     backoff backoff_;
+    renewal renewal_;
+    time_point bound_at_{}; // when the BIND was sent that leases count from
     state state_ = state::fresh;
     bool was_bound_ = false;
     detail::pending_ptr first_;

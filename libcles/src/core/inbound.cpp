@@ -5,6 +5,7 @@
 
 #include "core/handler_failure.hpp"
 #include "core/request_checks.hpp"
+#include "core/reserved_tasks.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -48,12 +49,20 @@ std::string failure_text(const protocol::failure& why) {
 } // namespace
 
 inbound::inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
-    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out), bound_(node_->published, updates) {}
+    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out),
+      bound_(*node_, out, updates, peer, replies_) {
+    if (out_.datagram() != 0) {
+        datagrams_.emplace(*node_, out_, replies_);
+    }
+}
 
 inbound::~inbound() { lose(); }
 
 void inbound::on_request(std::string_view line, const protocol::request_line& r, time_point now) {
     if (ending_) {
+        return;
+    }
+    if (datagrams_ && !datagrams_->admit(r)) {
         return;
     }
     ++node_->counts.requests[static_cast<std::size_t>(r.verb)];
@@ -91,7 +100,7 @@ void inbound::on_malformed(std::string_view, const protocol::malformed_request& 
         return;
     }
     const protocol::failure why{.code = errc::bad_request, .message = node_->name + ": " + what.why};
-    if (what.id != 0 && calls_.contains(what.id)) {
+    if (!datagrams_ && what.id != 0 && calls_.contains(what.id)) {
         replies_.fail(what.id, what.wants_reply, why);
         lose();
         ending_ = closing_ = true;
@@ -99,7 +108,7 @@ void inbound::on_malformed(std::string_view, const protocol::malformed_request& 
     } else if (what.id == 0 && what.wants_reply && must_wait()) {
         answer_in_turn(failure_text(why), now);
     } else {
-        replies_.fail(what.id, what.wants_reply, why);
+        replies_.fail_apart(what.id, what.wants_reply, why);
     }
 }
 
@@ -109,12 +118,17 @@ void inbound::on_overlong(std::string_view head, time_point now) {
     }
     const auto meant = protocol::salvage(head);
     const protocol::failure why{.code = errc::too_large,
-                                .message = node_->name + ": a line has at most " + std::to_string(node_->bounds.line) +
-                                           " bytes"};
+                                .message = node_->name +
+                                           (datagrams_ ? ": a datagram has at most " : ": a line has at most ") +
+                                           std::to_string(datagrams_ ? out_.datagram() : node_->bounds.line) +
+                                           (datagrams_ ? " bytes: use TCP" : " bytes")};
     if (meant.id == 0 && meant.wants_reply && must_wait()) {
         answer_in_turn(failure_text(why), now);
     } else {
-        replies_.fail(meant.id, meant.wants_reply, why);
+        replies_.fail_apart(meant.id, meant.wants_reply, why);
+    }
+    if (datagrams_) { // the next one has nothing to do with it
+        return;
     }
     closing_ = true;
     end(now);
@@ -217,9 +231,10 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
         return;
     }
     if (r.noun.task == "cles") {
-        serve_reserved(r);
+        serve_reserved(*node_, replies_, r);
     } else if (r.verb == verb::bind) {
-        serve_bind(r);
+        bound_.serve(r, now);
+        finish_if_done();
     } else {
         serve_task(r, arrived, now);
     }
@@ -237,61 +252,6 @@ void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, ti
         replies_.fail(r, *why);
     } else {
         replies_.done(r.id, r.wants_reply, {});
-    }
-}
-
-void inbound::serve_reserved(const protocol::request_line& r) {
-    const auto& parameters = r.noun.parameters;
-    if (r.verb == verb::pull && parameters.empty()) {
-        replies_.write(r, [this](json_writer& w) { write_description(w, *node_); });
-    } else if (r.verb == verb::pull && parameters.size() == 1 && parameters[0] == "metrics") {
-        replies_.write(r, [this](json_writer& w) { write_metrics(w, *node_); });
-    } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
-        replies_.fail(r, errc::bad_request, node_->name + ": cancel needs an id from 1 to 2^63-1");
-    } else {
-        replies_.fail(r, errc::no_task,
-                      node_->name + " has no " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.path} +
-                          "'");
-    }
-}
-
-void inbound::serve_bind(const protocol::request_line& r) {
-    const std::string path{protocol::canonical_path(r.noun, path_)};
-    auto& published = node_->published;
-    if (r.unbinds()) {
-        bound_.unbind(path);
-        replies_.done(r.id, r.wants_reply, {});
-        finish_if_done();
-        return;
-    }
-    if (!node_->tasks.can_bind(r.noun.task) && !published.knows(r.noun.task)) {
-        replies_.fail(r, errc::no_task, node_->name + " has no BIND '" + std::string{r.noun.task} + "'");
-        return;
-    }
-    try {
-        if (const auto* h = node_->tasks.find(verb::bind, r.noun.task); h != nullptr && h->plain) {
-            auto storage = std::exchange(decoded_, {}); // the handler may have other requests served meanwhile
-            const auto parameters = decode(r.noun, storage);
-            const cles::detail::request_data data{.verb = r.verb,
-                                                  .node = node_->name,
-                                                  .task = r.noun.task,
-                                                  .parameters = {parameters.data(), parameters.size()},
-                                                  .peer = &peer_,
-                                                  .deadline = {}};
-            std::string unused;
-            json_writer w{unused};
-            h->plain(cles::request{data}, w);
-            decoded_ = std::move(storage);
-        }
-        if (!bound_.has(path) && bound_.size() >= node_->bounds.bindings) {
-            replies_.fail(r, busy(node_->name + ": too many bindings on this link"));
-            return;
-        }
-        auto& t = published.open(path);
-        replies_.done(r.id, r.wants_reply, t.last_body());
-        bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
-    } catch (...) {
-        replies_.fail(r, describe(std::current_exception()));
     }
 }
 
@@ -357,6 +317,9 @@ void inbound::run_later(const protocol::request_line& r, const handler& h, const
     }
     const auto c = std::make_shared<call>(node_, *this, std::move(wanted), now);
     if (r.id != 0) {
+        if (datagrams_ && r.verb == verb::pull) {
+            datagrams_->begin_repeatable(r);
+        }
         calls_.emplace(r.id, c);
     } else {
         anonymous_ = c;

@@ -3,8 +3,9 @@
 
 #include <cles/identity.hpp>
 
+#include "core/bind_requests.hpp"
 #include "core/call.hpp"
-#include "core/link_bindings.hpp"
+#include "core/datagram_requests.hpp"
 #include "core/node.hpp"
 #include "core/outlet.hpp"
 #include "core/reply_writer.hpp"
@@ -16,6 +17,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -52,6 +54,10 @@ class inbound {
     [[nodiscard]] std::size_t in_flight() const noexcept {
         return calls_.size() + waiting_.size() + (anonymous_ ? 1 : 0);
     }
+    /// Nothing is kept for the peer: nothing runs or waits, nothing is bound, no reply is remembered.
+    [[nodiscard]] bool at_rest() const noexcept {
+        return in_flight() == 0 && bound_.empty() && (!datagrams_ || datagrams_->empty());
+    }
     [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
 
   private:
@@ -59,8 +65,6 @@ class inbound {
 
     void serve(const protocol::request_line& request, time_point arrived, time_point now);
     void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
-    void serve_reserved(const protocol::request_line& request);
-    void serve_bind(const protocol::request_line& request);
     void serve_task(const protocol::request_line& request, time_point arrived, time_point now);
     void run_plain(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
     void run_later(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
@@ -84,7 +88,8 @@ class inbound {
     std::shared_ptr<call> anonymous_;
     waiting_requests waiting_;
     reply_writer replies_;
-    link_bindings bound_;
+    std::optional<datagram_requests> datagrams_; // where it is no stream
+    bind_requests bound_;
     std::string path_;    // of the noun being served, where it had to be rebuilt
     std::string decoded_; // its parameters, where they held escapes
     bool serving_waiting_ = false;

@@ -58,9 +58,10 @@ std::int64_t milliseconds_since(time_point then, time_point now) {
 } // namespace
 
 node::node(node_setup setup, const core::clock& source, std::function<void()> wake)
-    : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), bounds(setup.bounds),
-      authorise(std::move(setup.authorise)), log(std::move(setup.log)), time(source), started(source.now()),
-      published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)) {}
+    : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
+      bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)), time(source),
+      started(source.now()), published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)),
+      remembered{.limit = bounds.remembered} {}
 
 void write_description(json_writer& w, const node& n) {
     w.begin_object();
@@ -103,13 +104,18 @@ void write_metrics(json_writer& w, const node& n) {
     number("errors", c.errors);
     number("errors_unsent", c.errors_unsent);
     number("handlers_running", c.handlers_running);
+    number("requests_repeated", c.requests_repeated);
     number("requests_sent", c.requests_sent);
+    number("requests_resent", c.requests_resent);
     number("replies_dropped", c.replies_dropped);
     number("updates_published", c.updates_published);
     number("updates_delivered", c.updates_delivered);
     number("updates_shed", c.updates_shed);
+    number("updates_too_large", c.updates_too_large);
     number("updates_received", c.updates_received);
     number("updates_dropped", c.updates_dropped);
+    number("leases_expired", c.leases_expired);
+    number("datagrams_withheld", c.datagrams_withheld);
     number("links_open", c.links_open);
     number("links_accepted", c.links_accepted);
     number("links_refused", c.links_refused);

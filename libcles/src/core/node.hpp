@@ -9,8 +9,10 @@
 #include "core/clock.hpp"
 #include "core/counters.hpp"
 #include "core/deadlines.hpp"
+#include "core/dedup.hpp"
 #include "core/latency_histogram.hpp"
 #include "core/publications.hpp"
+#include "core/reflection_limit.hpp"
 #include "core/registry.hpp"
 
 #include <cstdint>
@@ -24,7 +26,8 @@ namespace cles::core {
 /// How a node begins.
 struct node_setup {
     std::string name;
-    std::uint32_t epoch = 0; ///< drawn at random for each run
+    std::uint32_t epoch = 0;             ///< drawn at random for each run
+    std::uint64_t first_datagram_id = 0; ///< likewise; what ids count from in requests by datagram
     cles::limits bounds{};
     authoriser authorise{};
     log_sink log{};
@@ -37,6 +40,7 @@ struct node {
 
     const std::string name;
     const std::string epoch;
+    const std::uint64_t first_datagram_id;
     const cles::limits bounds;
     const authoriser authorise;
     const log_sink log;
@@ -49,6 +53,9 @@ struct node {
     counters counts;
     latency_histogram handler_time; ///< of all handlers that answer later, and of a sample of the others
     publications published;
+    dedup_memory remembered;
+    reflection_limit reflection;
+    std::uint64_t next_id = 1; ///< of requests that this node sends
 
     void say(log_level level, std::string_view text) const {
         if (log) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/outbound.hpp"
 
+#include "core/ignored_reply.hpp"
+
 #include <algorithm>
 #include <string>
 #include <utility>
@@ -21,14 +23,48 @@ void outbound::send(protocol::request_text request, time_point deadline, time_po
         std::clamp<std::int64_t>(left, 1, static_cast<std::int64_t>(protocol::max_deadline_ms)));
     request.deadline_ms = told == protocol::default_deadline(request.verb) ? 0 : told;
     request.wants_progress = static_cast<bool>(progress);
-    protocol::append_request(out_.output(), request);
     e->id = request.id;
+    request.id += first_id_;
+    auto& out = out_.output();
+    const auto line = out.size();
+    protocol::append_request(out, request);
     e->operation = std::move(operation);
     e->progress = std::move(progress);
-    node_.deadlines.arm(*e, deadline);
-    waiting_.emplace(request.id, std::move(e));
+    if (is_datagram()) {
+        keep_copies(*e, line, deadline, now);
+    } else {
+        node_.deadlines.arm(*e, deadline);
+    }
+    waiting_.emplace(e->id, std::move(e));
     ++node_.counts.requests_sent;
     out_.wake();
+}
+
+// A request that is too large fails when the caller has gone on: no operation ends while it begins.
+void outbound::keep_copies(entry& e, std::size_t line, time_point deadline, time_point now) {
+    auto& out = out_.output();
+    if (out.size() - line > out_.datagram()) {
+        e.too_large = true;
+        out.resize(line);
+        node_.deadlines.arm(e, now);
+        return;
+    }
+    e.copies.emplace(out.substr(line), now, deadline, static_cast<std::uint32_t>((e.id + first_id_) * 2654435761U));
+    node_.deadlines.arm(e, e.copies->next());
+}
+
+void outbound::on_due(entry& e, time_point now) {
+    if (e.too_large) {
+        fail(e.id, errc::too_large,
+             "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP");
+    } else if (e.copies && !e.copies->over(now)) {
+        out_.output().append(e.copies->again(now));
+        ++node_.counts.requests_resent;
+        node_.deadlines.arm(e, e.copies->next());
+        out_.wake();
+    } else {
+        fail(e.id, errc::deadline, "no answer came in time");
+    }
 }
 
 std::unique_ptr<outbound::entry> outbound::take(std::uint64_t id) {
@@ -46,6 +82,9 @@ void outbound::recycle(std::unique_ptr<entry> e) {
     constexpr std::size_t enough = 256;
     if (spare_.size() < enough) {
         e->progress = nullptr;
+        e->reported = 0;
+        e->copies.reset();
+        e->too_large = false;
         spare_.push_back(std::move(e));
     }
 }
@@ -62,15 +101,35 @@ bool outbound::cancel(std::uint64_t id) {
     if (!waiting_.contains(id)) {
         return false;
     }
-    const auto noun = "self:cles/cancel/" + std::to_string(id);
-    protocol::append_request(out_.output(), {.verb = verb::push, .noun = noun, .wants_reply = false});
-    out_.wake();
+    const auto noun = "self:cles/cancel/" + std::to_string(id + first_id_);
+    if (is_datagram()) { // which may be lost
+        const auto now = node_.time.now();
+        send({.verb = verb::push, .noun = noun, .id = node_.next_id++},
+             now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
+             detail::pending_ptr{new ignored_reply});
+    } else {
+        protocol::append_request(out_.output(), {.verb = verb::push, .noun = noun, .wants_reply = false});
+        out_.wake();
+    }
     fail(id, errc::cancelled, "the request was withdrawn");
     return true;
 }
 
+void outbound::drop(std::uint64_t id) {
+    if (auto e = take(id)) {
+        e->operation.reset();
+        recycle(std::move(e));
+    }
+}
+
+void outbound::go_on(std::unique_ptr<entry> e, time_point due) {
+    const auto id = e->id;
+    node_.deadlines.arm(*e, due);
+    waiting_.emplace(id, std::move(e));
+}
+
 void outbound::on_reply(const protocol::reply_line& reply) {
-    auto e = take(reply.id);
+    auto e = take(reply.id - first_id_); // of a smaller one, nothing that is in flight
     if (!e) {
         ++node_.counts.replies_dropped;
         return;
@@ -81,10 +140,12 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         if (e->progress && is_valid_json(reply.body, detail::answer_depth)) {
             // Called from a copy: it may withdraw its own request.
             const auto report = e->progress;
-            const auto id = e->id;
-            node_.deadlines.arm(*e, due);
-            waiting_.emplace(id, std::move(e));
-            report(*reply.progress, reply.body);
+            const bool late = *reply.progress < e->reported; // datagrams may overtake each other
+            e->reported = std::max(e->reported, *reply.progress);
+            go_on(std::move(e), due);
+            if (!late) {
+                report(*reply.progress, reply.body);
+            }
             return;
         }
     } else if (protocol::is_failure(reply.body)) {
@@ -106,14 +167,13 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         recycle(std::move(e));
     } else {
         ++node_.counts.replies_dropped;
-        const auto id = e->id;
-        node_.deadlines.arm(*e, due);
-        waiting_.emplace(id, std::move(e));
+        go_on(std::move(e), due);
     }
 }
 
 void outbound::on_overlong(const protocol::reply_line& reply) {
-    fail(reply.id, errc::too_large, "the answer is longer than " + std::to_string(node_.bounds.line) + " bytes");
+    fail(reply.id - first_id_, errc::too_large,
+         "the answer is longer than " + std::to_string(node_.bounds.line) + " bytes");
 }
 
 void outbound::lose(errc why, std::string_view message) {
@@ -133,7 +193,5 @@ std::vector<detail::pending_ptr> outbound::take_all() {
     }
     return taken;
 }
-
-void outbound::entry::on_deadline(time_point) { owner.fail(id, errc::deadline, "no answer came in time"); }
 
 } // namespace cles::core

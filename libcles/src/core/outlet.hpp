@@ -15,6 +15,8 @@ class outlet {
 
     /// Lines to send are appended here, LF included.
     virtual std::string& output() = 0;
+    /// Bytes of a datagram at most, each of which carries one line with its LF; 0 where it is a stream.
+    [[nodiscard]] virtual std::size_t datagram() const noexcept { return 0; }
     /// Something was appended outside of a call that the link made: it is to be sent soon.
     virtual void wake() = 0;
     /// The peer does not take what it is sent: what may be left out should be.

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/reply_writer.hpp"
 
+#include "core/dedup.hpp"
+
+#include <algorithm>
+#include <utility>
+
 namespace cles::core {
 namespace {
 
@@ -19,6 +24,16 @@ void cut(std::string& text, std::size_t longest) {
 
 } // namespace
 
+reply_writer::reply_writer(node& host, outlet& out) noexcept
+    : node_(host), out_(out),
+      longest_(out.datagram() == 0 ? host.bounds.line : std::min(host.bounds.line, out.datagram() - 1)) {}
+
+void reply_writer::note(std::uint64_t id, std::string_view reply) {
+    if (seen_ != nullptr && id != 0 && !seen_->empty()) {
+        seen_->answered(id, reply, node_.time.now());
+    }
+}
+
 void reply_writer::done(std::uint64_t id, bool wanted, std::string_view body) {
     std::string text;
     protocol::append_reply_head(text, id);
@@ -31,21 +46,25 @@ void reply_writer::send(std::uint64_t id, bool wanted, std::string& text, std::s
     close_result(text, body);
     if (protocol::begins_with_error(std::string_view{text}.substr(body))) {
         fail(id, wanted, {.code = errc::failed, .message = node_.name + ": the result's first key is 'error'"});
-    } else if (text.size() > node_.bounds.line) {
+    } else if (text.size() > longest_) {
         fail(id, wanted,
              {.code = errc::too_large,
               .message = node_.name + ": the answer has " + std::to_string(text.size()) + " bytes, the limit is " +
-                         std::to_string(node_.bounds.line),
+                         std::to_string(longest_) + (out_.datagram() == 0 ? "" : " by datagram: use TCP"),
               .ran = true});
     } else if (wanted) {
         text.push_back('\n');
         out_.output().append(text);
+        note(id, text);
+    } else {
+        note(id, {});
     }
 }
 
 void reply_writer::fail(std::uint64_t id, bool wanted, const protocol::failure& why) {
     if (!wanted) {
         ++node_.counts.errors_unsent;
+        note(id, {});
         return;
     }
     ++node_.counts.errors;
@@ -58,14 +77,19 @@ void reply_writer::fail(std::uint64_t id, bool wanted, const protocol::failure& 
     protocol::append_reply_head(out, id);
     const auto body = out.size();
     protocol::append_failure(out, told);
-    if (out.size() - line >
-        node_.bounds.line) { // a handler may have many words; the peer would close the link over them
+    if (out.size() - line > longest_) { // a handler may have many words; the peer would close the link over them
         out.resize(body);
-        cut(told.message,
-            node_.bounds.line / longest_escape > head_room ? node_.bounds.line / longest_escape - head_room : 0);
+        cut(told.message, longest_ / longest_escape > head_room ? longest_ / longest_escape - head_room : 0);
         protocol::append_failure(out, told);
     }
     out.push_back('\n');
+    note(id, std::string_view{out}.substr(line));
+}
+
+void reply_writer::fail_apart(std::uint64_t id, bool wanted, const protocol::failure& why) {
+    auto* seen = std::exchange(seen_, nullptr);
+    fail(id, wanted, why);
+    seen_ = seen;
 }
 
 } // namespace cles::core

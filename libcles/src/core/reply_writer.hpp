@@ -18,7 +18,12 @@ namespace cles::core {
 /// Writes the replies of one link: a handler's result, or the error that it has to become.
 class reply_writer {
   public:
-    reply_writer(node& host, outlet& out) noexcept : node_(host), out_(out) {}
+    reply_writer(node& host, outlet& out) noexcept;
+
+    /// Has replies written down there too, for requests that may be repeated.
+    void remember(dedup& seen) noexcept { seen_ = &seen; }
+    /// What a line that is sent may have, without its LF.
+    [[nodiscard]] std::size_t longest() const noexcept { return longest_; }
 
     /// A reply whose body `write` writes. What it throws passes through, and nothing is sent.
     template <class F>
@@ -40,6 +45,8 @@ class reply_writer {
     /// A reply with this body; empty for {}.
     void done(std::uint64_t id, bool wanted, std::string_view body);
     void fail(std::uint64_t id, bool wanted, const protocol::failure& why);
+    /// The same, where it is not the reply to the request of that id which is in flight.
+    void fail_apart(std::uint64_t id, bool wanted, const protocol::failure& why);
     void fail(const protocol::request_line& r, const protocol::failure& why) { fail(r.id, r.wants_reply, why); }
     void fail(const protocol::request_line& r, errc code, std::string message) {
         fail(r.id, r.wants_reply, {.code = code, .message = std::move(message)});
@@ -47,9 +54,12 @@ class reply_writer {
 
   private:
     void send(std::uint64_t id, bool wanted, std::string& text, std::size_t body);
+    void note(std::uint64_t id, std::string_view reply);
 
     node& node_;
     outlet& out_;
+    std::size_t longest_;
+    dedup* seen_ = nullptr;
     std::string spare_;
 };
 

@@ -25,11 +25,18 @@ void session::on_line(std::string_view line, time_point now) {
     if (line.empty()) {
         return;
     }
+    if (is_datagram() && protocol::has_many_lines(line)) {
+        on_many_lines(line, now);
+        return;
+    }
     if (protocol::is_reply(line)) {
         on_reply(line);
         return;
     }
     if (protocol::is_http(line)) {
+        if (is_datagram()) { // no web page sends one
+            return;
+        }
         node_->say(log_level::warning, "a web client was turned away: " + peer_.address);
         on_lost("the peer speaks HTTP");
         out_.close();
@@ -64,10 +71,37 @@ void session::on_update(const subscriptions::match& found) {
     }
 }
 
+// Taken for its first line, as far as an answer has to know whom it is for.
+void session::on_many_lines(std::string_view text, time_point now) {
+    if (protocol::is_reply(text)) {
+        ++node_->counts.replies_dropped;
+        return;
+    }
+    auto meant = protocol::salvage(protocol::trim(text.substr(0, text.find('\n'))));
+    meant.why = "a datagram holds one line";
+    inbound_.on_malformed(text, meant, now);
+}
+
+void session::turn_away(std::string_view line) {
+    line = protocol::trim(line);
+    const auto meant = protocol::salvage(line);
+    if (!line.empty() && !protocol::is_reply(line) && meant.wants_reply) {
+        auto& out = out_.output();
+        protocol::append_reply_head(out, meant.id);
+        protocol::append_failure(
+            out, {.code = errc::busy, .message = node_->name + " has as many links as it may", .retry_ms = 1000});
+        out.push_back('\n');
+    }
+}
+
 void session::on_overlong(std::string_view head, time_point now) {
     head = protocol::trim(head);
     if (!protocol::is_reply(head)) {
         inbound_.on_overlong(head, now);
+        return;
+    }
+    if (is_datagram()) {
+        ++node_->counts.replies_dropped;
         return;
     }
     protocol::reply_line reply;

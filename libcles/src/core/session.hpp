@@ -29,11 +29,19 @@ class session {
     /// The link is gone, for this reason.
     void on_lost(std::string_view why);
 
+    /// Nothing is kept for the peer, and nothing is expected of it.
+    [[nodiscard]] bool at_rest() const noexcept {
+        return inbound_.at_rest() && outbound_.in_flight() == 0 && subscriptions_.empty();
+    }
+    /// Answers a line with `busy` and nothing else.
+    void turn_away(std::string_view line);
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
     [[nodiscard]] outbound& asking() noexcept { return outbound_; }
     [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }
 
   private:
+    [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
+    void on_many_lines(std::string_view text, time_point now);
     void on_reply(std::string_view line);
     void on_update(const subscriptions::match& found);
 

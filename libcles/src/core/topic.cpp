@@ -94,7 +94,7 @@ binding& topic::bind(binder& target, binding::terms wanted) {
     if (existing == nullptr) {
         existing = bindings_.emplace_back(std::make_unique<binding>(*this, target, wanted)).get();
         existing->seen_ = log_.last();
-    } else {
+    } else if (existing->terms_ != wanted) { // else it is renewed, and goes on as it is
         if (existing->terms_.every.count() != 0) {
             existing->seen_ = log_.last(); // what was thinned out so far stays out
         }

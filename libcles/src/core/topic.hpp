@@ -39,6 +39,8 @@ class binding final : public deadline {
     struct terms {
         std::chrono::milliseconds every{0};
         std::uint32_t keep = 64;
+
+        bool operator==(const terms&) const = default;
     };
 
     binding(topic& source, binder& target, terms wanted) : source_(source), target_(target), terms_(wanted) {}

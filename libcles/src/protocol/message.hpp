@@ -2,5 +2,6 @@
 #pragma once
 
 /// All that crosses a link.
+#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"

@@ -160,6 +160,7 @@ bool parse_adverbs(part_reader& parts, request_line& out, std::string& why) {
 }
 
 bool parse_parts(std::string_view line, request_line& out, std::string& why) {
+    out.text = line;
     part_reader parts{line};
     const auto verb_part = parts.next();
     const auto v = verb_from(verb_part);

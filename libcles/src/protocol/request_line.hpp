@@ -21,6 +21,7 @@ inline constexpr std::uint32_t default_delegate_deadline_ms = 30'000;
 inline constexpr std::uint32_t default_keep = 64;
 inline constexpr std::uint64_t max_keep = 65'536;
 inline constexpr std::uint64_t max_hops = 16;
+inline constexpr std::uint32_t default_lease_ms = 10'000;
 inline constexpr std::uint32_t max_lease_ms = 60'000;
 
 constexpr std::uint32_t default_deadline(verb v) noexcept {
@@ -43,6 +44,7 @@ struct request_line {
     std::optional<std::uint32_t> epoch;
     std::string_view via;
     std::string_view body; ///< empty: none was given
+    std::string_view text; ///< the line that all this was read from
 
     /// An update, as opposed to a request to publish.
     [[nodiscard]] bool is_update() const noexcept { return seq && epoch; }

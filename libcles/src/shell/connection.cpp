@@ -10,13 +10,26 @@ namespace cles::shell {
 namespace {
 
 constexpr unsigned lines_per_write = 32;
+constexpr std::size_t udp_over_v4 = 28; // bytes of headers
+constexpr std::size_t udp_over_v6 = 48;
 constexpr std::size_t updates_wait_past = 65536; // unsent bytes past which updates stay in their topics
 
 } // namespace
 
 connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from)
     : engine_(std::move(host)), link_(std::move(carrier)), from_(from),
-      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this) {}
+      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this) {
+    if (link_->datagram() == 0) {
+        return;
+    }
+    const bool came_in = from_ == origin::accepted || from_ == origin::refused;
+    const auto stranger = came_in ? engine_->stranger(link_->peer()) : std::string{};
+    const bool is_v6 = stranger.find(':') != std::string::npos;
+    datagrams_.emplace(engine_->node(), link_->datagram(), stranger, is_v6 ? udp_over_v6 : udp_over_v4);
+    if (from_ == origin::accepted) {
+        life_.emplace(static_cast<core::source_life::keeper&>(*this), engine_->deadlines());
+    }
+}
 
 connection::~connection() = default;
 
@@ -27,6 +40,13 @@ time_point connection::now() { return now_ ? *now_ : *(now_ = engine_->now()); }
 // -- from the link -------------------------------------------------------------------------------------------------
 
 void connection::on_line(std::string_view line) {
+    if (from_ == origin::refused) {
+        session_.turn_away(line);
+        return;
+    }
+    if (life_) {
+        life_->heard(now());
+    }
     session_.on_line(line, now());
     // In a long batch the peer gets to work on the first replies while the rest is still being answered: with many
     // requests in flight, neither end then waits for the other.
@@ -35,7 +55,13 @@ void connection::on_line(std::string_view line) {
     }
 }
 
-void connection::on_overlong(std::string_view head) { session_.on_overlong(head, now()); }
+void connection::on_overlong(std::string_view head) {
+    if (from_ == origin::refused) {
+        session_.turn_away(head);
+        return;
+    }
+    session_.on_overlong(head, now());
+}
 
 void connection::on_cut(std::string_view rest) { session_.on_cut(rest, now()); }
 
@@ -45,6 +71,9 @@ void connection::on_batch() {
     lines_ = 0;
     now_.reset();
     engine_->settle();
+    if (from_ == origin::refused) {
+        abandon("there are as many links as there may be");
+    }
 }
 
 void connection::on_end() {
@@ -96,7 +125,11 @@ bool connection::takes_updates() const {
 }
 
 void connection::put_updates(std::string_view lines) {
-    link_->output().append(lines);
+    if (datagrams_) {
+        datagrams_->append_updates(link_->output(), lines);
+    } else {
+        link_->output().append(lines);
+    }
     engine_->flush_soon(*this);
 }
 
@@ -107,6 +140,9 @@ void connection::flush() {
         return;
     }
     serve_more();
+    if (datagrams_) {
+        datagrams_->limit(link_->output(), now_ ? *now_ : engine_->now());
+    }
     link_->flush();
     follow_backlog();
     if (may_serve_more()) {
@@ -158,6 +194,9 @@ void connection::on_stall(time_point now) {
     abandon("the peer took nothing for too long");
 }
 
+// A source of datagrams that has nothing more to say.
+void connection::on_quiet() { abandon("nothing came for a while"); }
+
 // -- feeds ---------------------------------------------------------------------------------------------------------
 
 void connection::bind(core::feed_machine& feed, protocol::request_text request, time_point deadline,
@@ -200,6 +239,7 @@ void connection::end(std::string_view why) {
     gone_ = true;
     usable_ = false;
     engine_->deadlines().disarm(stall_);
+    life_.reset();
     engine_->forget(*this, link_->received(), link_->sent());
     lose_feeds(why);
     session_.on_lost(why);

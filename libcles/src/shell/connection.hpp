@@ -3,8 +3,10 @@
 
 #include <cles/link.hpp>
 
+#include "core/datagram_output.hpp"
 #include "core/outlet.hpp"
 #include "core/session.hpp"
+#include "core/source_life.hpp"
 #include "core/topic.hpp"
 
 #include <cstdint>
@@ -27,9 +29,11 @@ namespace cles::shell {
 class connection final : public link_events,
                          public core::outlet,
                          public core::binder,
+                         private core::source_life::keeper,
                          public std::enable_shared_from_this<connection> {
   public:
-    enum class origin : std::uint8_t { accepted, local, dialled };
+    /// `refused`: it came in past the limit, and is told so.
+    enum class origin : std::uint8_t { accepted, local, dialled, refused };
 
     connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from);
     ~connection() override;
@@ -37,6 +41,10 @@ class connection final : public link_events,
     void start();
     [[nodiscard]] core::session& session() noexcept { return session_; }
     [[nodiscard]] origin from() const noexcept { return from_; }
+    /// It came in as a source of datagrams.
+    [[nodiscard]] bool is_source() const noexcept { return life_.has_value(); }
+    /// Nothing would be lost with it.
+    [[nodiscard]] bool at_rest() const override { return session_.at_rest() && link_->unsent() == 0; }
     /// Whether requests can still be sent.
     [[nodiscard]] bool usable() const noexcept { return usable_; }
     /// Writes what is there.
@@ -59,6 +67,7 @@ class connection final : public link_events,
 
     // outlet
     std::string& output() override { return link_->output(); }
+    [[nodiscard]] std::size_t datagram() const noexcept override { return link_->datagram(); }
     void wake() override;
     [[nodiscard]] bool is_behind() const override;
     void pause(bool stop) override;
@@ -80,6 +89,7 @@ class connection final : public link_events,
     };
 
     time_point now();
+    void on_quiet() override;
     void on_stall(time_point now);
     [[nodiscard]] bool may_serve_more();
     void serve_more();
@@ -92,6 +102,8 @@ class connection final : public link_events,
     origin from_;
     core::session session_;
     stall_watch stall_;
+    std::optional<core::datagram_output> datagrams_;
+    std::optional<core::source_life> life_;
     std::vector<core::feed_machine*> feeds_;
     std::optional<time_point> now_; // while a batch is handed over
     unsigned lines_ = 0;            // of this batch

@@ -23,8 +23,12 @@ constexpr std::size_t routes_before_tidying = 64;
 
 core::node_setup setup_of(service_options& options) {
     std::random_device source;
+    // Room for as many ids as a run may draw, and short enough for clients that read numbers as doubles.
+    constexpr std::uint64_t apart = 1U << 20U;
+    const auto epoch = source();
     return {.name = std::move(options.name),
-            .epoch = source(),
+            .epoch = epoch,
+            .first_datagram_id = (source() & 0xFFFFFFFFU) * apart,
             .bounds = options.limits,
             .authorise = std::move(options.authorise),
             .log = std::move(options.log)};
@@ -43,7 +47,7 @@ void check_node_name(const std::string& name) {
 } // namespace
 
 engine::engine(asio::any_io_executor executor, service_options options)
-    : executor_(std::move(executor)), insecure_(options.insecure) {
+    : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks) {
     check_node_name(options.name);
     for (const auto& [name, where] : options.peers) {
         set_peer(name, where);
@@ -75,53 +79,17 @@ std::string engine::listen(std::string_view where) {
     return local;
 }
 
-void engine::on_accepted(link_ptr arrived, bool counted) {
-    if (stopped_) {
-        arrived->close();
-        return;
-    }
-    if (counted && accepted_ >= bounds().links) {
-        ++node_->counts.links_refused;
-        protocol::append_failure(
-            arrived->output(),
-            {.code = errc::busy, .message = node_->name + " has as many links as it may", .retry_ms = 1000});
-        arrived->output().push_back('\n');
-        arrived->flush();
-        arrived->close();
-        return;
-    }
-    if (counted) {
-        ++node_->counts.links_accepted;
-    }
-    adopt(std::move(arrived), counted ? shell::connection::origin::accepted : shell::connection::origin::local);
-}
-
-std::shared_ptr<shell::connection> engine::adopt(link_ptr made, shell::connection::origin from) {
-    auto c = std::make_shared<shell::connection>(shared_from_this(), std::move(made), from);
-    connections_.emplace(c.get(), c);
-    if (from == shell::connection::origin::accepted) {
-        ++accepted_;
-    }
-    ++node_->counts.links_open;
-    c->start();
-    return c;
-}
-
 void engine::forget(shell::connection& c, std::uint64_t received, std::uint64_t sent) {
-    if (connections_.erase(&c) == 0) {
-        return;
+    if (connections_.forget(c, received, sent)) {
+        for (auto& [where, r] : routes_) {
+            r->drop(c);
+        }
     }
-    if (c.from() == shell::connection::origin::accepted) {
-        --accepted_;
-    }
-    auto& counts = node_->counts;
-    --counts.links_open;
-    ++counts.links_lost;
-    counts.bytes_received += received;
-    counts.bytes_sent += sent;
-    for (auto& [where, r] : routes_) {
-        r->drop(c);
-    }
+}
+
+std::string engine::stranger(const identity& peer) const {
+    const auto host = parse_url(peer.address).host;
+    return peer.local || !peer.name.empty() || networks_.contain(host) ? std::string{} : host;
 }
 
 // -- turns ---------------------------------------------------------------------------------------------------------
@@ -291,12 +259,7 @@ void engine::cancel(std::uint64_t ticket) {
             return;
         }
     }
-    for (const auto& [key, c] : connections_) {
-        const auto held = c;
-        if (held->session().asking().cancel(ticket)) {
-            return;
-        }
-    }
+    connections_.cancel(ticket);
 }
 
 // -- serving and publishing ----------------------------------------------------------------------------------------
@@ -386,7 +349,7 @@ void engine::stop() {
     for (auto routes = std::exchange(routes_, {}); const auto& [where, r] : routes) {
         tell(r->stop());
     }
-    for (auto connections = connections_; const auto& [key, c] : connections) {
+    for (const auto& c : connections_.all()) {
         tell(c->session().asking().take_all());
         c->flush();
         c->abandon("the service has been stopped");

@@ -10,9 +10,11 @@
 #include "core/node.hpp"
 #include "protocol/grammar.hpp"
 #include "shell/connection.hpp"
+#include "shell/connections.hpp"
 #include "shell/deadline_timer.hpp"
 #include "shell/feed_links.hpp"
 #include "shell/listeners.hpp"
+#include "shell/networks.hpp"
 #include "shell/route.hpp"
 #include "shell/steady_clock.hpp"
 
@@ -47,10 +49,12 @@ class engine final : public std::enable_shared_from_this<engine> {
     [[nodiscard]] core::deadline_queue& deadlines() noexcept { return node_->deadlines; }
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
     [[nodiscard]] time_point now() const { return clock_.now(); }
+    /// The address of a peer that might be another than it says, for which there is a limit on what is sent there;
+    /// empty for others.
+    [[nodiscard]] std::string stranger(const identity& peer) const;
     void say(log_level level, std::string_view text) const { node_->say(level, text); }
-    std::shared_ptr<shell::connection> adopt(link_ptr made, shell::connection::origin from);
-    /// A link that came in; those from other processes are counted against the limit.
-    void on_accepted(link_ptr arrived, bool counted);
+    [[nodiscard]] shell::connections& connections() noexcept { return connections_; }
+    /// A connection has ended.
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
     /// Has its output written when what runs now has ended.
     void flush_soon(shell::connection& c);
@@ -71,7 +75,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     /// The route for a target, or null with the reason in `code` and `why`.
     shell::route* route_to(std::string_view target, std::string_view at, boost::system::error_code& code,
                            std::string& why);
-    [[nodiscard]] std::uint64_t draw_id() noexcept { return next_id_++; }
+    [[nodiscard]] std::uint64_t draw_id() noexcept { return node_->next_id++; }
     /// A feed no longer waits for a link.
     void forget_waiting(const core::feed_machine& feed);
 
@@ -87,17 +91,16 @@ class engine final : public std::enable_shared_from_this<engine> {
     std::shared_ptr<core::node> node_;
     std::shared_ptr<shell::deadline_timer> timer_;
     bool insecure_;
+    shell::networks networks_;
     core::directory directory_;
     shell::listeners listeners_{*this};
-    std::map<shell::connection*, std::shared_ptr<shell::connection>> connections_;
-    std::size_t accepted_ = 0;
+    shell::connections connections_{*this};
     std::map<std::string, std::shared_ptr<shell::route>, std::less<>> routes_;
     std::string recent_target_; // most requests go where the one before went
     shell::route* recent_route_ = nullptr;
     shell::feed_links feeds_{*this};
     std::vector<std::shared_ptr<shell::connection>> to_flush_;
     std::vector<std::shared_ptr<shell::connection>> flushing_;
-    std::uint64_t next_id_ = 1;
     std::uint64_t published_at_last_turn_ = 0;
     int turns_put_off_ = 0;
     bool turn_asked_ = false;

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/feed_links.hpp"
 
+#include "core/ignored_reply.hpp"
 #include "protocol/message.hpp"
 #include "shell/engine.hpp"
 #include "shell/route.hpp"
 
 #include <boost/asio/post.hpp>
 
+#include <optional>
 #include <utility>
 
 namespace cles::shell {
@@ -15,16 +17,23 @@ namespace {
 /// The answer to a feed's BIND. The feed lives as long as its handle.
 class bind_reply final : public detail::pending {
   public:
-    bind_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle, core::feed_machine& feed)
-        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed) {}
+    /// `asked`: when the BIND was sent by datagram; nothing for a stream.
+    bind_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle, core::feed_machine& feed,
+               std::optional<time_point> asked)
+        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked) {}
 
     verdict offer(std::string_view json) override {
         if (!is_valid_json(json, detail::answer_depth)) {
             return verdict::malformed;
         }
         const std::unique_ptr<bind_reply> self{this};
-        if (const auto alive = handle_.lock()) {
+        const auto host = host_.lock();
+        const auto alive = handle_.lock();
+        if (host && alive) {
             feed_.on_bound(json);
+            if (asked_) {
+                feed_.on_leased(*asked_, host->bounds().lease);
+            }
         }
         return verdict::completed;
     }
@@ -49,23 +58,48 @@ class bind_reply final : public detail::pending {
     std::weak_ptr<detail::engine> host_;
     std::weak_ptr<detail::feed_control> handle_;
     core::feed_machine& feed_;
+    std::optional<time_point> asked_;
 };
 
-/// The answer to an unbind, which nobody waits for.
-class ignored_reply final : public detail::pending {
+/// The answer to a feed's BIND that renews its lease.
+class renewal_reply final : public detail::pending {
   public:
-    verdict offer(std::string_view) override {
-        delete this;
+    renewal_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle,
+                  core::feed_machine& feed, time_point asked)
+        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked) {}
+
+    verdict offer(std::string_view json) override {
+        if (!is_valid_json(json)) {
+            return verdict::malformed;
+        }
+        const std::unique_ptr<renewal_reply> self{this};
+        if (const auto alive = handle_.lock()) {
+            feed_.on_renewed(asked_);
+        }
         return verdict::completed;
     }
-    void fail(boost::system::error_code, std::string_view) override { delete this; }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::unique_ptr<renewal_reply> self{this};
+        const auto host = host_.lock();
+        const auto alive = handle_.lock();
+        if (host && alive) {
+            const std::string text{message};
+            feed_.on_renewal_refused(asked_, code, text, host->now());
+        }
+    }
     void discard() noexcept override { delete this; }
+
+  private:
+    std::weak_ptr<detail::engine> host_;
+    std::weak_ptr<detail::feed_control> handle_;
+    core::feed_machine& feed_;
+    time_point asked_;
 };
 
 } // namespace
 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
-    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}});
+    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, 0});
 }
 
 void feed_links::leave(core::feed_machine& feed) { feeds_.erase(&feed); }
@@ -115,13 +149,38 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     if (limit.count() <= 0) {
         limit = std::chrono::milliseconds{protocol::default_deadline_ms};
     }
-    c->bind(feed,
-            {.verb = verb::bind,
-             .noun = e.terms.noun,
-             .id = engine_.draw_id(),
-             .every_ms = e.terms.every_ms,
-             .keep = e.terms.keep},
-            engine_.now() + limit, detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed)});
+    const auto now = engine_.now();
+    const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
+    c->bind(feed, bind_text(e, *c), now + limit,
+            detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked)});
+}
+
+protocol::request_text feed_links::bind_text(entry& e, const connection& c) {
+    protocol::request_text request{.verb = verb::bind,
+                                   .noun = e.terms.noun,
+                                   .id = engine_.draw_id(),
+                                   .every_ms = e.terms.every_ms,
+                                   .keep = e.terms.keep};
+    if (c.datagram() != 0) {
+        request.lease_ms = static_cast<std::uint32_t>(engine_.bounds().lease.count());
+        e.asking = request.id;
+    }
+    return request;
+}
+
+void feed_links::renew(core::feed_machine& feed, time_point until) {
+    const auto found = feeds_.find(&feed);
+    if (found == feeds_.end()) {
+        return;
+    }
+    if (const auto c = found->second.on.lock()) { // else its loss has been told
+        const auto now = engine_.now();
+        const auto request = bind_text(found->second, *c);
+        c->session().asking().send(
+            request, until, now,
+            detail::pending_ptr{new renewal_reply(engine_.weak_from_this(), found->second.handle, feed, now)});
+        engine_.settle();
+    }
 }
 
 void feed_links::detach(core::feed_machine& feed) {
@@ -129,6 +188,9 @@ void feed_links::detach(core::feed_machine& feed) {
     if (found != feeds_.end()) {
         if (const auto c = found->second.on.lock()) {
             c->unbind(feed);
+            if (const auto asking = std::exchange(found->second.asking, 0)) {
+                c->session().asking().drop(asking); // a copy of it would bind again
+            }
         }
         found->second.on.reset();
     }
@@ -147,7 +209,7 @@ void feed_links::unbind(core::feed_machine& feed) {
         c->session().asking().send(
             {.verb = verb::bind, .noun = found->second.terms.noun, .id = engine_.draw_id(), .lease_ms = 0},
             now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
-            detail::pending_ptr{new ignored_reply});
+            detail::pending_ptr{new core::ignored_reply});
     }
 }
 

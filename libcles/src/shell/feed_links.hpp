@@ -36,8 +36,8 @@ class feed_links final : public core::feed_host {
     void leave(core::feed_machine& feed);
     void bind(core::feed_machine& feed) override;
     void unbind(core::feed_machine& feed) override;
-    /// Takes a feed off its link without telling the publisher.
-    void detach(core::feed_machine& feed);
+    void detach(core::feed_machine& feed) override;
+    void renew(core::feed_machine& feed, time_point until) override;
     /// Closes all.
     void stop();
 
@@ -46,9 +46,11 @@ class feed_links final : public core::feed_host {
         std::weak_ptr<detail::feed_control> handle;
         feed_terms terms;
         std::weak_ptr<connection> on;
+        std::uint64_t asking = 0; // the id of its last BIND by datagram
     };
 
     void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
+    [[nodiscard]] protocol::request_text bind_text(entry& e, const connection& c);
     void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
 
     detail::engine& engine_;

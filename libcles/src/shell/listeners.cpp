@@ -11,7 +11,7 @@ namespace cles::shell {
 void listeners::start(acceptor& made, bool counted) {
     made.start([weak = engine_.weak_from_this(), counted](link_ptr arrived) {
         if (const auto host = weak.lock()) {
-            host->on_accepted(std::move(arrived), counted);
+            host->connections().on_accepted(std::move(arrived), counted);
         } else {
             arrived->close();
         }

@@ -108,7 +108,7 @@ void route::on_dialled(boost::system::error_code code, link_ptr made) {
     if (code) {
         fail_waiting(code);
     } else {
-        const auto c = engine_->adopt(std::move(made), connection::origin::dialled);
+        const auto c = engine_->connections().adopt(std::move(made), connection::origin::dialled);
         links_.push_back(c);
         serve_waiting(c);
     }

@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include "transport/ip_host.hpp"
 #include "transport/stream_acceptor.hpp"
 #include "transport/stream_dialler.hpp"
 
@@ -10,7 +11,6 @@
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/post.hpp>
 
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -21,28 +21,12 @@ using boost::system::error_code;
 
 namespace {
 
-// All addresses of the host, in the order in which the system prefers them; none only with an error.
-std::vector<tcp::endpoint> resolve(const url& where, error_code& code) {
-    const auto host = where.host == "localhost" ? std::string{"127.0.0.1"} : where.host;
-    const auto address = asio::ip::make_address(host, code);
-    if (!code) {
-        return {{address, where.port}};
-    }
-    asio::io_context lookup;
-    tcp::resolver resolver{lookup};
-    const auto found = resolver.resolve(host, std::to_string(where.port), code);
+std::vector<tcp::endpoint> endpoints_of(const url& where, error_code& code) {
     std::vector<tcp::endpoint> endpoints;
-    for (const auto& each : found) {
-        endpoints.push_back(each.endpoint());
-    }
-    if (!code && endpoints.empty()) {
-        code = asio::error::host_not_found;
+    for (const auto& address : resolve_all(where, code)) {
+        endpoints.emplace_back(address, where.port);
     }
     return endpoints;
-}
-
-url url_of(const tcp::endpoint& endpoint) {
-    return {.scheme = "tcp", .host = endpoint.address().to_string(), .port = endpoint.port(), .path = {}};
 }
 
 void tune(tcp::socket& socket) {
@@ -57,7 +41,7 @@ identity identify(tcp::socket& socket) {
     const auto peer = socket.remote_endpoint(gone);
     identity who{.transport = "tcp", .address = {}, .name = {}, .uid = {}};
     if (!gone) {
-        who.address = to_string(url_of(peer));
+        who.address = to_string(url_of("tcp", peer));
         who.local = peer.address().is_loopback();
     }
     return who;
@@ -71,7 +55,7 @@ class tcp_acceptor final : public acceptor {
 
     [[nodiscard]] url local() const override {
         error_code ignored;
-        return url_of(inside_->socket().local_endpoint(ignored));
+        return url_of("tcp", inside_->socket().local_endpoint(ignored));
     }
     void start(std::function<void(link_ptr)> on_link) override { inside_->start(std::move(on_link)); }
     void close() override { inside_->close(); }
@@ -84,18 +68,17 @@ class tcp_transport final : public link_transport {
   public:
     [[nodiscard]] bool is_exposed(const url& where) const override {
         error_code code;
-        const auto endpoints = resolve(where, code);
-        return !code && !endpoints.front().address().is_loopback(); // without an address, listening fails anyway
+        const auto address = resolve(where, code);
+        return !code && !address.is_loopback(); // without an address, listening fails anyway
     }
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
         error_code code;
-        const auto endpoints = resolve(where, code);
+        const tcp::endpoint endpoint{resolve(where, code), where.port};
         if (code) {
             throw boost::system::system_error{code};
         }
-        const auto& endpoint = endpoints.front();
         tcp::acceptor socket{executor};
         socket.open(endpoint.protocol());
         socket.set_option(asio::socket_base::reuse_address{true});
@@ -110,7 +93,7 @@ class tcp_transport final : public link_transport {
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
         error_code code;
-        auto endpoints = resolve(where, code);
+        auto endpoints = endpoints_of(where, code);
         if (code) {
             asio::post(executor, [done = std::move(done), code] { done(code, nullptr); });
             return [] {};

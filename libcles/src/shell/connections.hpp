@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "shell/connection.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <vector>
+
+namespace cles::detail {
+class engine;
+} // namespace cles::detail
+
+namespace cles::shell {
+
+/// All connections of a service: lets them in as far as there is room, owns them, and lets them go.
+///
+/// Sources of datagrams are counted apart from links: they can be forged, and must not take the room of those that
+/// cannot.
+class connections {
+  public:
+    explicit connections(detail::engine& host) noexcept : engine_(host) {}
+
+    /// A link that came in; those from other processes are counted against the limit.
+    void on_accepted(link_ptr arrived, bool counted);
+    std::shared_ptr<connection> adopt(link_ptr made, connection::origin from);
+    /// False where it was none of them (any more).
+    bool forget(connection& c, std::uint64_t received, std::uint64_t sent);
+    /// Withdraws a request that waits for its reply. False where there is none of that id.
+    bool cancel(std::uint64_t id);
+    [[nodiscard]] std::vector<std::shared_ptr<connection>> all() const;
+
+  private:
+    [[nodiscard]] bool has_room(bool is_source);
+    void turn_away(link_ptr arrived);
+    void drop_sources_at_rest();
+
+    detail::engine& engine_;
+    std::map<connection*, std::shared_ptr<connection>> open_;
+    std::size_t accepted_ = 0;
+    std::size_t sources_ = 0;
+};
+
+} // namespace cles::shell

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "transport/udp.hpp"
+
+#include "transport/ip_host.hpp"
+#include "transport/udp_port.hpp"
+
+#include <boost/asio/ip/udp.hpp>
+#include <boost/asio/ip/v6_only.hpp>
+#include <boost/asio/post.hpp>
+
+#include <utility>
+
+namespace cles::transport {
+namespace asio = boost::asio;
+using asio::ip::udp;
+using boost::system::error_code;
+
+namespace {
+
+class udp_acceptor final : public acceptor {
+  public:
+    explicit udp_acceptor(std::shared_ptr<udp_port> inside) : inside_(std::move(inside)) {}
+    ~udp_acceptor() override { inside_->close(); }
+
+    [[nodiscard]] url local() const override { return url_of("udp", inside_->local()); }
+    void start(std::function<void(link_ptr)> on_link) override { inside_->accept(std::move(on_link)); }
+    void close() override { inside_->close(); }
+
+  private:
+    std::shared_ptr<udp_port> inside_;
+};
+
+class udp_transport final : public link_transport {
+  public:
+    [[nodiscard]] bool is_exposed(const url& where) const override {
+        error_code code;
+        const auto address = resolve(where, code);
+        return !code && !address.is_loopback(); // without an address, listening fails anyway
+    }
+
+    std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where, const limits&) override {
+        error_code code;
+        const udp::endpoint endpoint{resolve(where, code), where.port};
+        if (code) {
+            throw boost::system::system_error{code};
+        }
+        udp::socket socket{executor};
+        socket.open(endpoint.protocol());
+        if (endpoint.address().is_v6()) {
+            socket.set_option(asio::ip::v6_only{true});
+        }
+        socket.bind(endpoint);
+        return std::make_unique<udp_acceptor>(std::make_shared<udp_port>(std::move(socket)));
+    }
+
+    // Nothing is sent: whether somebody is there shows when requests are answered.
+    std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits&,
+                               dial_callback done) override {
+        error_code code;
+        const udp::endpoint endpoint{resolve(where, code), where.port};
+        udp::socket socket{executor};
+        if (!code) {
+            socket.open(endpoint.protocol(), code);
+        }
+        if (!code) {
+            socket.connect(endpoint, code);
+        }
+        link_ptr made;
+        if (!code) {
+            made = std::make_shared<udp_port>(std::move(socket))
+                       ->connect_link(endpoint, {.transport = "udp",
+                                                 .address = to_string(url_of("udp", endpoint)),
+                                                 .name = {},
+                                                 .uid = {},
+                                                 .local = endpoint.address().is_loopback()});
+        }
+        auto given_up = std::make_shared<bool>(false);
+        asio::post(executor, [done = std::move(done), code, made = std::move(made), given_up] {
+            if (!*given_up) {
+                done(code, made);
+            } else if (made) {
+                made->close();
+            }
+        });
+        return [given_up] { *given_up = true; };
+    }
+};
+
+} // namespace
+
+std::unique_ptr<link_transport> make_udp() { return std::make_unique<udp_transport>(); }
+
+} // namespace cles::transport

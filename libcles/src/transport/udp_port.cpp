@@ -1,0 +1,179 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "transport/udp_port.hpp"
+
+#include "transport/ip_host.hpp"
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/error.hpp>
+#include <boost/container_hash/hash.hpp>
+
+#include <utility>
+
+namespace cles::transport {
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+namespace {
+
+constexpr int datagrams_per_turn = 256;
+
+bool is_empty(std::string_view datagram) { return datagram.empty() || datagram == "\n" || datagram == "\r\n"; }
+
+} // namespace
+
+std::size_t udp_port::endpoint_hash::operator()(const udp::endpoint& e) const noexcept {
+    std::size_t seed = e.port();
+    if (e.address().is_v4()) {
+        boost::hash_combine(seed, e.address().to_v4().to_uint());
+    } else {
+        const auto bytes = e.address().to_v6().to_bytes();
+        boost::hash_combine(seed, std::string_view{reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    }
+    return seed;
+}
+
+udp_port::udp_port(udp::socket socket) : socket_(std::move(socket)) {
+    error_code ignored;
+    socket_.non_blocking(true, ignored);
+    constexpr int room = 1 << 20; // a burst waits here while others have their turn
+    socket_.set_option(asio::socket_base::receive_buffer_size{room}, ignored);
+}
+
+udp_port::udp::endpoint udp_port::local() const {
+    error_code ignored;
+    return socket_.local_endpoint(ignored);
+}
+
+void udp_port::accept(std::function<void(link_ptr)> on_link) {
+    on_link_ = std::move(on_link);
+    receive();
+}
+
+link_ptr udp_port::connect_link(const udp::endpoint& peer, identity who) {
+    connected_ = true;
+    auto made = std::make_shared<udp_link>(shared_from_this(), peer, std::move(who));
+    links_.emplace(peer, made);
+    return made;
+}
+
+void udp_port::close() {
+    on_link_ = nullptr;
+    close_if_done();
+}
+
+void udp_port::close_if_done() {
+    if (links_.empty() && !on_link_) {
+        error_code ignored;
+        socket_.close(ignored);
+    }
+}
+
+void udp_port::forget(const udp_link& link) {
+    const auto found = links_.find(link.endpoint());
+    if (found != links_.end() && found->second.get() == &link) {
+        if (recent_.get() == &link) {
+            recent_.reset();
+        }
+        links_.erase(found); // whoever closes it holds it
+        close_if_done();
+    }
+}
+
+// -- receiving -----------------------------------------------------------------------------------------------------
+
+void udp_port::receive() {
+    if (receiving_ || !socket_.is_open()) {
+        return;
+    }
+    receiving_ = true;
+    socket_.async_receive_from(
+        asio::buffer(buffer_), sender_,
+        [self = shared_from_this()](error_code code, std::size_t count) { self->on_received(code, count); });
+}
+
+// Until all is handed over it counts as receiving: a link that starts meanwhile must not begin to fill the buffer.
+void udp_port::on_received(error_code code, std::size_t count) {
+    int turn = datagrams_per_turn;
+    while (socket_.is_open() && code != asio::error::would_block && code != asio::error::operation_aborted) {
+        if (!code) { // else the network tells of something sent before, which is nobody's business
+            try {
+                hand_over({buffer_.data(), count});
+            } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+                receiving_ = false;
+                receive();
+                throw;
+            }
+        }
+        if (--turn == 0 || !socket_.is_open()) {
+            break;
+        }
+        count = socket_.receive_from(asio::buffer(buffer_), sender_, 0, code);
+    }
+    receiving_ = false;
+    receive();
+}
+
+void udp_port::hand_over(std::string_view datagram) {
+    if (is_empty(datagram)) {
+        return;
+    }
+    if (const auto link = link_of_sender()) {
+        link->deliver(datagram);
+    }
+}
+
+std::shared_ptr<udp_link> udp_port::link_of_sender() {
+    if (recent_ && recent_->endpoint() == sender_) {
+        return recent_;
+    }
+    if (const auto found = links_.find(sender_); found != links_.end()) {
+        recent_ = found->second;
+        return recent_;
+    }
+    if (!on_link_) {
+        return nullptr;
+    }
+    identity who{.transport = "udp",
+                 .address = to_string(url_of("udp", sender_)),
+                 .name = {},
+                 .uid = {},
+                 .local = sender_.address().is_loopback()};
+    auto made = std::make_shared<udp_link>(shared_from_this(), sender_, std::move(who));
+    links_.emplace(sender_, made);
+    recent_ = made;
+    const auto tell = on_link_; // which may be taken away meanwhile
+    tell(made);
+    return made;
+}
+
+// -- sending -------------------------------------------------------------------------------------------------------
+
+bool udp_port::send(const udp_link& to, std::string_view datagram) {
+    error_code code;
+    const auto bytes = asio::buffer(datagram.data(), datagram.size());
+    const auto try_it = [&] {
+        if (connected_) {
+            socket_.send(bytes, 0, code);
+        } else {
+            socket_.send_to(bytes, to.endpoint(), 0, code);
+        }
+    };
+    try_it();
+    if (code == asio::error::connection_refused) { // of an earlier datagram; this one has not been sent
+        try_it();
+    }
+    return code != asio::error::would_block;
+}
+
+void udp_port::wait_for_room(std::shared_ptr<udp_link> link) {
+    waiting_.push_back(std::move(link));
+    if (waiting_.size() == 1) {
+        socket_.async_wait(udp::socket::wait_write, [self = shared_from_this()](error_code) {
+            for (const auto& each : std::exchange(self->waiting_, {})) {
+                each->on_room();
+            }
+        });
+    }
+}
+
+} // namespace cles::transport

@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "transport/udp_link.hpp"
+
+#include <boost/asio/ip/udp.hpp>
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <array>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string_view>
+#include <vector>
+
+namespace cles::transport {
+
+/// A UDP socket and the links that share it: one for each source where it listens, one alone where it was dialled.
+///
+/// It lives until it is closed and its last link is. A wake-up hands over what there is, up to a number of datagrams;
+/// then others have their turn. In steady state it allocates nothing.
+class udp_port : public std::enable_shared_from_this<udp_port> {
+  public:
+    using udp = boost::asio::ip::udp;
+
+    explicit udp_port(udp::socket socket);
+
+    /// Listens: from now on, whoever sends something becomes a link.
+    void accept(std::function<void(link_ptr)> on_link);
+    /// The one link of a socket that is connected.
+    link_ptr connect_link(const udp::endpoint& peer, identity who);
+    /// Nobody comes in any more.
+    void close();
+    [[nodiscard]] udp::endpoint local() const;
+
+    // For its links.
+    void receive();
+    /// False: the socket has no room just now. A datagram that cannot be sent for another reason is as good as lost on
+    /// its way.
+    bool send(const udp_link& to, std::string_view datagram);
+    void wait_for_room(std::shared_ptr<udp_link> link);
+    void forget(const udp_link& link);
+    [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
+
+  private:
+    struct endpoint_hash {
+        std::size_t operator()(const udp::endpoint& e) const noexcept;
+    };
+
+    void on_received(boost::system::error_code code, std::size_t count);
+    void hand_over(std::string_view datagram);
+    std::shared_ptr<udp_link> link_of_sender();
+    void close_if_done();
+
+    udp::socket socket_;
+    bool connected_ = false;
+    bool receiving_ = false;
+    std::function<void(link_ptr)> on_link_;
+    boost::unordered_flat_map<udp::endpoint, std::shared_ptr<udp_link>, endpoint_hash> links_;
+    std::shared_ptr<udp_link> recent_; // most datagrams come from where the one before came from
+    std::vector<std::shared_ptr<udp_link>> waiting_;
+    udp::endpoint sender_;
+    std::array<char, 2048> buffer_{}; // more than a datagram may have: what is longer is known for it
+};
+
+} // namespace cles::transport

@@ -1,0 +1,286 @@
+// SPDX-License-Identifier: BSL-1.0
+// What a link keeps to that carries each line as a datagram.
+
+#include <cles/error.hpp>
+
+#include "support/link_pair.hpp"
+
+#include <boost/asio/error.hpp>
+#include <boost/asio/ip/udp.hpp>
+#include <boost/test/data/monomorphic.hpp>
+#include <boost/test/data/test_case.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+BOOST_AUTO_TEST_SUITE(datagram_link)
+
+using namespace cles::test;
+namespace asio = boost::asio;
+using asio::ip::udp;
+
+namespace {
+
+/// A socket that is no link, to send what no link sends.
+struct plain_socket {
+    plain_socket(asio::io_context& io, const cles::url& where)
+        : to{asio::ip::make_address(where.host), where.port}, socket{io, to.protocol()} {}
+    void send(std::string_view datagram) { socket.send_to(asio::buffer(datagram.data(), datagram.size()), to); }
+
+    udp::endpoint to;
+    udp::socket socket;
+};
+
+using lines = std::vector<std::string>;
+
+} // namespace
+
+BOOST_DATA_TEST_CASE(it_says_what_a_datagram_holds, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.connect();
+    BOOST_TEST(pair.near.link->datagram() == 1200U);
+    BOOST_TEST(pair.far.link->datagram() == 1200U);
+}
+
+BOOST_DATA_TEST_CASE(a_stream_says_that_it_is_none, every_carrier, kind) {
+    link_pair pair{kind};
+    pair.connect();
+    BOOST_TEST(pair.near.link->datagram() == 0U);
+    BOOST_TEST(pair.far.run([&] { return pair.far.link->datagram(); }) == 0U);
+}
+
+BOOST_DATA_TEST_CASE(each_line_crosses_both_ways_with_a_batch_of_its_own, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.near.say("one\ntwo\n");
+    pair.until([&] { return pair.far.lines() == 3; });
+    BOOST_TEST((pair.far.events->lines == lines{"hello", "one", "two"}));
+    BOOST_TEST(pair.far.events->calls == "lblblb");
+    pair.far.say("three\nfour\n");
+    pair.until([&] { return pair.near.lines() == 2; });
+    BOOST_TEST((pair.near.events->lines == lines{"three", "four"}));
+    BOOST_TEST(pair.near.unsent() == 0U);
+    BOOST_TEST(pair.near.link->sent() == std::string{"hello\none\ntwo\n"}.size());
+    BOOST_TEST(pair.far.link->received() == pair.near.link->sent());
+}
+
+BOOST_DATA_TEST_CASE(the_lf_at_the_end_may_be_left_out, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    plain_socket someone{pair.io, pair.address()};
+    someone.send("PULL self:cles");
+    pair.accept();
+    pair.far.start();
+    pair.until([&] { return pair.far.events->lines.size() == 2; });
+    BOOST_TEST(pair.far.events->lines.back() == "PULL self:cles");
+}
+
+BOOST_DATA_TEST_CASE(several_lines_in_one_datagram_are_handed_over_as_they_came, every_datagram, kind) {
+    link_pair pair{kind};
+    plain_socket someone{pair.io, pair.address()};
+    someone.send("one\ntwo\n");
+    pair.accept();
+    pair.far.start();
+    pair.until([&] { return pair.far.lines() == 1; });
+    BOOST_TEST(pair.far.events->lines[0] == "one\ntwo"); // the session's to refuse
+}
+
+BOOST_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_nobody_comes_in_by_it, every_datagram, kind) {
+    link_pair pair{kind};
+    plain_socket someone{pair.io, pair.address()};
+    for (const auto* nothing : {"", "\n", "\r\n"}) {
+        someone.send(nothing);
+    }
+    someone.send("x");
+    pair.accept();
+    pair.far.start();
+    pair.until([&] { return pair.far.lines() == 1; });
+    BOOST_TEST(pair.far.events->lines[0] == "x");
+}
+
+BOOST_DATA_TEST_CASE(one_over_the_limit_is_told_and_the_link_goes_on, every_datagram, kind) {
+    link_pair pair{kind};
+    plain_socket someone{pair.io, pair.address()};
+    someone.send(std::string(1200, 'a'));
+    someone.send(std::string(1201, 'b'));
+    someone.send(std::string(9000, 'c'));
+    someone.send("later");
+    pair.accept();
+    pair.far.start();
+    pair.until([&] { return pair.far.lines() == 2; });
+    BOOST_TEST(pair.far.events->calls == "lbobob"
+                                         "lb");
+    BOOST_TEST((pair.far.events->lines[0] == std::string(1200, 'a')));
+    BOOST_TEST((pair.far.events->head == std::string(1200, 'c')));
+}
+
+BOOST_DATA_TEST_CASE(each_source_is_a_link_of_its_own, every_datagram, kind) {
+    link_pair pair{kind};
+    std::vector<link_end> nears;
+    std::vector<link_end> fars;
+    for (int i = 0; i < 20; ++i) {
+        pair.open();
+        nears.push_back(std::exchange(pair.near, {}));
+        fars.push_back(std::exchange(pair.far, {}));
+    }
+    for (std::size_t i = 0; i < nears.size(); ++i) {
+        nears[i].say(std::to_string(i) + "\n");
+        fars[i].say("back " + std::to_string(i) + "\n");
+    }
+    for (std::size_t i = 0; i < nears.size(); ++i) {
+        pair.until([&] { return fars[i].lines() == 2 && nears[i].lines() == 1; });
+        BOOST_TEST(fars[i].events->lines[1] == std::to_string(i));
+        BOOST_TEST(nears[i].events->lines[0] == "back " + std::to_string(i));
+    }
+    for (auto& end : nears) {
+        end.drop();
+    }
+    for (auto& end : fars) {
+        end.drop();
+    }
+}
+
+// A link that is started when its first datagram comes, as services do, must not read the next one over it.
+BOOST_AUTO_TEST_CASE(what_waits_behind_the_first_datagram_of_a_source_leaves_it_whole) {
+    asio::io_context io;
+    const auto where = cles::parse_url(fresh_address(carrier::udp4));
+    const auto door = cles::find_transport("udp")->listen(io.get_executor(), where, {});
+    const auto events = std::make_shared<link_recorder>();
+    door->start([&](const cles::link_ptr& link) { link->start(events); });
+    plain_socket someone{io, door->local()};
+    for (const auto* line : {"the first", "2nd", "a longer third"}) {
+        someone.send(line);
+    }
+    run_until(io, [&] { return events->lines.size() == 3; });
+    BOOST_TEST((events->lines == lines{"the first", "2nd", "a longer third"}));
+}
+
+BOOST_DATA_TEST_CASE(a_link_that_was_dialled_hears_its_peer_alone, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    // What the port of the near end is, the far end knows.
+    const auto near = cles::parse_url(pair.far.link->peer().address);
+    plain_socket stranger{pair.io, near};
+    stranger.send("a stranger's word");
+    pair.far.say("the peer's word\n");
+    pair.until([&] { return pair.near.lines() == 1; });
+    run_ready(pair.io);
+    BOOST_TEST((pair.near.events->lines == lines{"the peer's word"}));
+}
+
+BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    std::string text;
+    for (int i = 0; i < 600; ++i) {
+        text += "x\n";
+    }
+    bool others_had_a_turn = false;
+    std::size_t seen_by_others = 0;
+    pair.far.events->hook = [&](char call) {
+        if (call == 'l' && !others_had_a_turn) {
+            others_had_a_turn = true;
+            asio::post(pair.io, [&] { seen_by_others = pair.far.events->lines.size(); });
+        }
+    };
+    pair.near.say(text); // as much as the kernel holds; the rest is lost
+    pair.until([&] { return pair.far.lines() > 300; });
+    BOOST_TEST(others_had_a_turn);
+    BOOST_TEST(seen_by_others > 0U);
+    BOOST_TEST(seen_by_others <= 257U);
+}
+
+BOOST_DATA_TEST_CASE(what_comes_while_a_link_is_paused_is_lost, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.until([&] { return pair.far.lines() == 1; });
+    pair.far.link->pause(true);
+    pair.near.say("lost\n");
+    run_ready(pair.io);
+    pair.far.link->pause(false);
+    pair.near.say("heard\n");
+    pair.until([&] { return pair.far.lines() == 2; });
+    BOOST_TEST(pair.far.events->lines[1] == "heard");
+}
+
+BOOST_DATA_TEST_CASE(nobody_listening_is_no_error_but_silence, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.stop_listening();
+    cles::link_ptr made;
+    pair.transport().dial(pair.io.get_executor(), pair.address(), pair.bounds(),
+                          [&](boost::system::error_code code, cles::link_ptr link) {
+                              BOOST_TEST(!code);
+                              made = std::move(link);
+                          });
+    pair.until([&] { return made != nullptr; });
+    pair.near.link = std::exchange(made, nullptr);
+    pair.near.start();
+    for (int i = 0; i < 5; ++i) { // the network says that they are refused
+        pair.near.say("hello?\n");
+        run_ready(pair.io);
+    }
+    BOOST_TEST(!pair.near.over());
+    asio::io_context other;
+    const auto back = pair.transport().listen(other.get_executor(), pair.address(), pair.bounds());
+    cles::link_ptr arrived;
+    back->start([&](cles::link_ptr link) { arrived = std::move(link); });
+    pair.near.say("hello again\n"); // and when somebody listens again, it goes on
+    run_until(other, [&] { return arrived != nullptr; });
+    arrived->close();
+}
+
+BOOST_DATA_TEST_CASE(links_outlive_their_acceptor_and_the_address_is_free_after_the_last, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.stop_listening();
+    pair.near.say("still there\n");
+    pair.until([&] { return pair.far.lines() == 2; });
+    plain_socket late{pair.io, pair.address()};
+    late.send("nobody comes in any more");
+    run_ready(pair.io);
+    pair.far.drop();
+    BOOST_CHECK_NO_THROW(pair.transport().listen(pair.io.get_executor(), pair.address(), pair.bounds()));
+}
+
+BOOST_DATA_TEST_CASE(a_closed_link_says_nothing_and_its_source_may_come_in_again, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.until([&] { return pair.far.lines() == 1; });
+    const auto first = std::exchange(pair.far, {});
+    first.link->close();
+    pair.near.say("again\n");
+    pair.accept();
+    pair.far.start();
+    pair.until([&] { return pair.far.lines() == 1; });
+    BOOST_TEST(first.events->calls == "lb");
+}
+
+BOOST_DATA_TEST_CASE(to_finish_is_to_send_what_is_left_and_to_be_lost, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.until([&] { return pair.far.lines() == 1; });
+    pair.far.link->output().append("bye\n");
+    pair.far.link->finish();
+    BOOST_TEST(!pair.far.lost()); // never from inside the call
+    pair.until([&] { return pair.far.lost() && pair.near.lines() == 1; });
+    BOOST_TEST(pair.far.events->in_order());
+}
+
+BOOST_DATA_TEST_CASE(an_owner_may_close_the_link_from_inside_its_line, every_datagram, kind) {
+    link_pair pair{kind};
+    pair.open();
+    pair.far.events->hook = [&](char call) {
+        if (call == 'l') {
+            pair.far.link->close();
+        }
+    };
+    pair.near.say("one\n");
+    pair.until([&] { return pair.far.lines() >= 1; });
+    run_ready(pair.io);
+    BOOST_TEST(pair.far.events->calls == "l");
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/reflection_limit.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstddef>
+#include <deque>
+#include <string>
+#include <utility>
+
+BOOST_AUTO_TEST_SUITE(reflection_limit)
+
+using namespace std::chrono_literals;
+using cles::time_point;
+
+const time_point start{1h};
+
+BOOST_AUTO_TEST_CASE(no_second_sees_more_than_64_KiB_to_one_address) {
+    cles::core::reflection_limit limit;
+    std::deque<std::pair<time_point, std::size_t>> window;
+    std::size_t in_window = 0;
+    std::size_t sent = 0;
+    for (auto now = start; now < start + 5s; now += 1ms) {
+        for (int i = 0; i < 3; ++i) { // asks for far more
+            if (limit.admit("192.0.2.1", 1200, now)) {
+                window.emplace_back(now, 1200);
+                in_window += 1200;
+                sent += 1200;
+            }
+        }
+        while (!window.empty() && window.front().first <= now - 1s) {
+            in_window -= window.front().second;
+            window.pop_front();
+        }
+        BOOST_REQUIRE(in_window < 65536U);
+    }
+    BOOST_TEST(sent > 5U * 45U * 1024U); // and it is not far less either
+}
+
+BOOST_AUTO_TEST_CASE(addresses_are_apart) {
+    cles::core::reflection_limit limit;
+    while (limit.admit("192.0.2.1", 1000, start)) {
+    }
+    BOOST_TEST(limit.admit("192.0.2.2", 1000, start));
+    BOOST_TEST(!limit.admit("192.0.2.1", 1000, start));
+}
+
+BOOST_AUTO_TEST_CASE(a_small_datagram_may_pass_where_a_large_one_does_not) {
+    cles::core::reflection_limit limit;
+    while (limit.admit("192.0.2.1", 1200, start)) {
+    }
+    BOOST_TEST(limit.admit("192.0.2.1", 100, start));
+}
+
+BOOST_AUTO_TEST_CASE(an_address_recovers) {
+    cles::core::reflection_limit limit;
+    while (limit.admit("192.0.2.1", 1200, start)) {
+    }
+    BOOST_TEST(!limit.admit("192.0.2.1", 1200, start + 1ms));
+    BOOST_TEST(limit.admit("192.0.2.1", 1200, start + 100ms));
+}
+
+BOOST_AUTO_TEST_CASE(forged_addresses_are_bounded_in_count_and_forgotten) {
+    using limit_type = cles::core::reflection_limit;
+    limit_type limit;
+    for (std::size_t i = 0; i < limit_type::most_addresses; ++i) {
+        BOOST_REQUIRE(limit.admit("10." + std::to_string(i), 100, start));
+    }
+    BOOST_TEST(!limit.admit("192.0.2.1", 100, start));
+    BOOST_TEST(limit.admit("10.5", 100, start)); // those who are known go on
+    BOOST_TEST(limit.addresses() == limit_type::most_addresses);
+    BOOST_TEST(limit.admit("192.0.2.1", 100, start + 1s));
+    BOOST_TEST(limit.addresses() == 1U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
