@@ -6,7 +6,8 @@
 
 #include <cstdint>
 
-/// The baseline: a packed struct over a stream, with blocking sockets, as a careful engineer writes it by hand for one task.
+/// The baseline: a packed struct over a stream, with blocking sockets, as a careful engineer writes it by hand for one
+/// task.
 namespace cles::perf::icd {
 
 class server {

@@ -54,7 +54,8 @@ BOOST_AUTO_TEST_CASE(a_scalar_is_wrapped_as_value) {
 BOOST_AUTO_TEST_CASE(nothing_is_an_empty_object) { BOOST_TEST(both("") == "id=7 {}\n"); }
 
 BOOST_AUTO_TEST_CASE(a_success_whose_first_key_is_error_becomes_failed) {
-    for (const std::string_view body : {"{\"error\":\"busy\"}", "{\"error\":5}", "{\"error\":{},\"a\":1}", "{\"err\\u006fr\":1}"}) {
+    for (const std::string_view body :
+         {"{\"error\":\"busy\"}", "{\"error\":5}", "{\"error\":{},\"a\":1}", "{\"err\\u006fr\":1}"}) {
         const auto answer = both(body);
         BOOST_TEST(answer.starts_with("id=7 {\"error\":\"failed\""), answer);
     }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/request_checks.hpp"
-
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>

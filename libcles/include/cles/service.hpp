@@ -28,7 +28,8 @@
 #include <vector>
 
 #if !defined(BOOST_ASIO_SEPARATE_COMPILATION) || !defined(BOOST_ASIO_NO_DEPRECATED)
-#error "CLES is compiled with BOOST_ASIO_SEPARATE_COMPILATION and BOOST_ASIO_NO_DEPRECATED, and so must be whoever uses \
+#error                                                                                                                 \
+    "CLES is compiled with BOOST_ASIO_SEPARATE_COMPILATION and BOOST_ASIO_NO_DEPRECATED, and so must be whoever uses \
 it: the target cles::cles of CMake and the flags of pkg-config's cles set them"
 #endif
 

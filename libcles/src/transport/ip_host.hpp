@@ -12,8 +12,8 @@
 
 namespace cles::transport {
 
-/// All addresses of a URL's host, in the order in which the system prefers them: as it stands, or looked up, which waits
-/// for the system's resolver. None only with an error.
+/// All addresses of a URL's host, in the order in which the system prefers them: as it stands, or looked up, which
+/// waits for the system's resolver. None only with an error.
 std::vector<boost::asio::ip::address> resolve_all(const url& where, boost::system::error_code& code);
 /// The first of them.
 boost::asio::ip::address resolve(const url& where, boost::system::error_code& code);
