@@ -45,6 +45,11 @@ cles::service_options options_of(const serve_command& wanted, const cles::log_si
     if (options.listen.empty()) {
         options.listen.emplace_back(default_url);
     }
+    for (const auto& where : options.listen) {
+        if (where.starts_with("inproc:")) {
+            throw usage_error("--listen '" + where + "': nobody outside of this process could reach it");
+        }
+    }
     options.insecure = wanted.insecure;
     options.networks = wanted.networks;
     options.log = log;

@@ -179,7 +179,7 @@ class Life(unittest.TestCase):
 
     def test_bad_arguments(self):
         for arguments in (("--listen", "nowhere"), ("--listen", "carrier-pigeon://x"), ("--name", "a b"), ("--name", "all"),
-                          ("--rate", "-1"), ("--rate", "x"), ("--listen", "tcp://127.0.0.1:99999"), ("extra",)):
+                          ("--rate", "-1"), ("--rate", "x"), ("--listen", "inproc://here"), ("--listen", "tcp://127.0.0.1:99999"), ("extra",)):
             code, out, err = cles("serve", *arguments)
             self.assertEqual((code, out), (2, ""), (arguments, err))
             self.assertTrue(err.startswith("cles: "), err)

@@ -113,7 +113,7 @@ void connection::finish() {
 
 void connection::close() {
     if (!gone_) {
-        link_->flush(); // what was asked before is answered
+        send_output(); // what was asked before is answered
     }
     abandon("the link was closed");
 }
@@ -140,10 +140,7 @@ void connection::flush() {
         return;
     }
     serve_more();
-    if (datagrams_) {
-        datagrams_->limit(link_->output(), now_ ? *now_ : engine_->now());
-    }
-    link_->flush();
+    send_output();
     follow_backlog();
     if (may_serve_more()) {
         engine_->flush_soon(*this);
@@ -153,6 +150,13 @@ void connection::flush() {
         updates_wait_ = false;
         session_.serving().drain(engine_->now());
     }
+}
+
+void connection::send_output() {
+    if (datagrams_) {
+        datagrams_->limit(link_->output(), now_ ? *now_ : engine_->now());
+    }
+    link_->flush();
 }
 
 bool connection::may_serve_more() {

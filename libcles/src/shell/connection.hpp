@@ -91,6 +91,7 @@ class connection final : public link_events,
     time_point now();
     void on_quiet() override;
     void on_stall(time_point now);
+    void send_output();
     [[nodiscard]] bool may_serve_more();
     void serve_more();
     void follow_backlog();
