@@ -18,7 +18,7 @@ class networks {
     explicit networks(const std::vector<std::string>& texts);
 
     /// Whether a numeric address is of one of them.
-    [[nodiscard]] bool contain(std::string_view address) const;
+    [[nodiscard]] bool contain(std::string_view text) const;
 
   private:
     std::vector<boost::asio::ip::network_v4> v4_;

@@ -13,6 +13,8 @@ namespace cles::transport {
 udp_link::udp_link(std::shared_ptr<udp_port> socket, boost::asio::ip::udp::endpoint peer, identity who)
     : port_(std::move(socket)), peer_(std::move(peer)), who_(std::move(who)) {}
 
+udp_link::~udp_link() { udp_link::close(); }
+
 void udp_link::start(std::shared_ptr<link_events> owner) {
     owner_ = std::move(owner);
     if (port_ == nullptr) {
@@ -73,7 +75,7 @@ void udp_link::send_rest() {
         if (!port_->send(*this, line)) {
             if (!waiting_) {
                 waiting_ = true;
-                port_->wait_for_room(shared_from_this());
+                port_->wait_for_room(weak_from_this());
             }
             return;
         }

@@ -22,6 +22,9 @@ class udp_port;
 class udp_link final : public link, public std::enable_shared_from_this<udp_link> {
   public:
     udp_link(std::shared_ptr<udp_port> socket, boost::asio::ip::udp::endpoint peer, identity who);
+    udp_link(const udp_link&) = delete;
+    udp_link& operator=(const udp_link&) = delete;
+    ~udp_link() override;
 
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }

@@ -52,7 +52,7 @@ void udp_port::accept(std::function<void(link_ptr)> on_link) {
 link_ptr udp_port::connect_link(const udp::endpoint& peer, identity who) {
     connected_ = true;
     auto made = std::make_shared<udp_link>(shared_from_this(), peer, std::move(who));
-    links_.emplace(peer, made);
+    links_.emplace(peer, made.get());
     return made;
 }
 
@@ -70,11 +70,11 @@ void udp_port::close_if_done() {
 
 void udp_port::forget(const udp_link& link) {
     const auto found = links_.find(link.endpoint());
-    if (found != links_.end() && found->second.get() == &link) {
-        if (recent_.get() == &link) {
-            recent_.reset();
+    if (found != links_.end() && found->second == &link) {
+        if (recent_ == &link) {
+            recent_ = nullptr;
         }
-        links_.erase(found); // whoever closes it holds it
+        links_.erase(found);
         close_if_done();
     }
 }
@@ -123,12 +123,12 @@ void udp_port::hand_over(std::string_view datagram) {
 }
 
 std::shared_ptr<udp_link> udp_port::link_of_sender() {
-    if (recent_ && recent_->endpoint() == sender_) {
-        return recent_;
+    if (recent_ != nullptr && recent_->endpoint() == sender_) {
+        return recent_->shared_from_this();
     }
     if (const auto found = links_.find(sender_); found != links_.end()) {
         recent_ = found->second;
-        return recent_;
+        return recent_->shared_from_this();
     }
     if (!on_link_) {
         return nullptr;
@@ -139,8 +139,8 @@ std::shared_ptr<udp_link> udp_port::link_of_sender() {
                  .uid = {},
                  .local = sender_.address().is_loopback()};
     auto made = std::make_shared<udp_link>(shared_from_this(), sender_, std::move(who));
-    links_.emplace(sender_, made);
-    recent_ = made;
+    links_.emplace(sender_, made.get());
+    recent_ = made.get();
     const auto tell = on_link_; // which may be taken away meanwhile
     tell(made);
     return made;
@@ -165,12 +165,14 @@ bool udp_port::send(const udp_link& to, std::string_view datagram) {
     return code != asio::error::would_block;
 }
 
-void udp_port::wait_for_room(std::shared_ptr<udp_link> link) {
+void udp_port::wait_for_room(std::weak_ptr<udp_link> link) {
     waiting_.push_back(std::move(link));
     if (waiting_.size() == 1) {
         socket_.async_wait(udp::socket::wait_write, [self = shared_from_this()](error_code) {
             for (const auto& each : std::exchange(self->waiting_, {})) {
-                each->on_room();
+                if (const auto alive = each.lock()) {
+                    alive->on_room();
+                }
             }
         });
     }

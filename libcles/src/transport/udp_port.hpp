@@ -19,7 +19,8 @@ namespace cles::transport {
 
 /// A UDP socket and the links that share it: one for each source where it listens, one alone where it was dialled.
 ///
-/// It lives until it is closed and its last link is. A wake-up hands over what there is, up to a number of datagrams;
+/// It lives until it is closed and its last link is; it is the links that keep it, and their owners that keep them. A
+/// wake-up hands over what there is, up to a number of datagrams;
 /// then others have their turn. In steady state it allocates nothing.
 class udp_port : public std::enable_shared_from_this<udp_port> {
   public:
@@ -40,7 +41,7 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
     /// False: the socket has no room just now. A datagram that cannot be sent for another reason is as good as lost on
     /// its way.
     bool send(const udp_link& to, std::string_view datagram);
-    void wait_for_room(std::shared_ptr<udp_link> link);
+    void wait_for_room(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
 
@@ -58,9 +59,9 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
     bool connected_ = false;
     bool receiving_ = false;
     std::function<void(link_ptr)> on_link_;
-    boost::unordered_flat_map<udp::endpoint, std::shared_ptr<udp_link>, endpoint_hash> links_;
-    std::shared_ptr<udp_link> recent_; // most datagrams come from where the one before came from
-    std::vector<std::shared_ptr<udp_link>> waiting_;
+    boost::unordered_flat_map<udp::endpoint, udp_link*, endpoint_hash> links_; // which take themselves out
+    udp_link* recent_ = nullptr; // most datagrams come from where the one before came from
+    std::vector<std::weak_ptr<udp_link>> waiting_;
     udp::endpoint sender_;
     std::array<char, 2048> buffer_{}; // more than a datagram may have: what is longer is known for it
 };
