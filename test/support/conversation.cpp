@@ -216,7 +216,12 @@ void conversation::happen(char name, std::string_view rest) {
     } else if (what == "publish") {
         const auto path = word(rest);
         noun("car1:" + std::string{path});
-        node_->publish(path, json(rest));
+        const auto body = json(rest);
+        try {
+            node_->publish(path, body);
+        } catch (const error& refused) {
+            throw script_error{"this cannot be published: " + refused.message()};
+        }
     } else if (what == "done" || what == "fail" || what == "progress") {
         on_handler(what, rest);
     } else {
