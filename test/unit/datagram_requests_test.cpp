@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/datagram_requests.hpp"
 #include "support/session_fixture.hpp"
+#include "support/told.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -55,6 +56,19 @@ BOOST_AUTO_TEST_CASE(a_reply_or_an_update_of_several_lines_is_dropped) {
     BOOST_TEST(link.ask("id=7 {}\nid=8 {}").empty());
     BOOST_TEST(node.counts().replies_dropped == 1U);
     BOOST_TEST(link.ask("UPDATE car2:x seq=1 epoch=0000000a {}\nx").empty());
+}
+
+BOOST_AUTO_TEST_CASE(an_update_of_several_lines_is_dropped_in_the_middle_of_a_stream_too) {
+    std::string heard;
+    cles::test::told_feed feed{"car2", "x", false, [&](const std::string& what) { heard += what + "; "; }};
+    link.session().bound().add(feed);
+    for (int seq = 1; seq <= 3; ++seq) {
+        link.ask("UPDATE car2:x seq=" + std::to_string(seq) + " epoch=0000000a {}");
+    }
+    link.ask("UPDATE car2:x seq=4 epoch=0000000a {\"a\":\n1}");
+    link.ask("UPDATE car2:x seq=5 epoch=0000000a {}");
+    BOOST_TEST(heard ==
+               "update car2:x 1 {}; update car2:x 2 {}; update car2:x 3 {}; gap car2:x 1; update car2:x 5 {}; ");
 }
 
 BOOST_AUTO_TEST_CASE(a_datagram_over_the_limit_is_too_large_and_the_source_goes_on) {

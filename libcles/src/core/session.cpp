@@ -14,19 +14,16 @@ session::session(std::shared_ptr<node> host, outlet& out, binder& updates, const
     : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {}
 
 void session::on_line(std::string_view line, time_point now) {
-    if (closed_) {
-        return;
-    }
-    if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
-        on_update(found);
-        return;
-    }
     line = protocol::trim(line);
-    if (line.empty()) {
+    if (line.empty() || closed_) {
         return;
     }
     if (is_datagram() && protocol::has_many_lines(line)) {
         on_many_lines(line, now);
+        return;
+    }
+    if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
+        on_update(found);
         return;
     }
     if (protocol::is_reply(line)) {
