@@ -59,7 +59,7 @@ class told_feed final : public core::subscription {
 
   private:
     bool on_event(const detail::raw_event& event) override {
-        if (!event.checked && !is_valid_json(event.body, detail::answer_depth)) {
+        if (!event.has_json()) {
             return false;
         }
         const auto noun = std::string{event.publisher} + ":" + path();

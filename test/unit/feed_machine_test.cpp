@@ -38,7 +38,7 @@ class counting_host final : public cles::core::feed_host {
 class wait final : public cles::detail::pending_event {
   public:
     bool deliver(const cles::detail::raw_event& event) override {
-        if (!event.checked && !cles::is_valid_json(event.body)) {
+        if (!event.has_json()) {
             return false;
         }
         switch (event.kind) {

@@ -22,7 +22,7 @@ class listener final : public cles::core::subscription {
 
   private:
     bool on_event(const cles::detail::raw_event& event) override {
-        if (!cles::is_valid_json(event.body)) {
+        if (!event.has_json()) {
             return false;
         }
         if (event.kind == feed_event::gap) {

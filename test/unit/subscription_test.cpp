@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSL-1.0
-#include <cles/json_reader.hpp>
-
 #include "core/subscription.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -21,7 +19,7 @@ class recorder final : public cles::core::subscription {
 
   private:
     bool on_event(const cles::detail::raw_event& event) override {
-        if (!cles::is_valid_json(event.body)) {
+        if (!event.has_json()) {
             return false;
         }
         if (event.kind == feed_event::gap) {

@@ -65,7 +65,7 @@ bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code&
     constexpr std::string_view what = "the update";
     if constexpr (std::is_same_v<T, json_text>) {
         item.value.text = event.body;
-        return event.checked || is_valid_json(event.body, answer_depth);
+        return event.has_json();
     } else if constexpr (comes_wrapped<T>) {
         wrapped<T> value{};
         const auto verdict = read_result(event.body, value, code, why, what);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/pending.hpp>
+
 #include <boost/system/error_code.hpp>
 
 #include <cstdint>
@@ -28,6 +30,9 @@ struct raw_event {
     std::uint64_t seq = 0;
     std::uint64_t missed = 0;
     std::string_view text{};
+
+    /// Whether the body is valid JSON; looked at only where that is not known.
+    [[nodiscard]] bool has_json() const { return checked || is_valid_answer(body); }
 };
 
 /// One call of `async_next` that waits.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/error.hpp>
+#include <cles/json_reader.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -15,6 +16,7 @@ namespace cles::detail {
 
 /// How many brackets deep an answer may be: as deep as a body by default, and what may be wrapped around it.
 inline constexpr std::size_t answer_depth = 32 + 3;
+inline bool is_valid_answer(std::string_view json) { return is_valid_json(json, answer_depth); }
 
 /// One operation that waits for its result. Whoever holds it has it ended once, by `offer`, `fail` or `discard`, which
 /// consume it.

@@ -24,7 +24,7 @@ pending::verdict read_result(std::string_view json, T& value, boost::system::err
     if (read_json(reader, value) && reader.at_end()) {
         return pending::verdict::completed;
     }
-    if (!is_valid_json(json, answer_depth)) {
+    if (!is_valid_answer(json)) {
         return pending::verdict::malformed;
     }
     code = errc::conversion;
@@ -42,7 +42,7 @@ class reply_operation final : public pending {
         boost::system::error_code code;
         std::string why;
         if constexpr (std::is_void_v<T>) {
-            if (!is_valid_json(json, answer_depth)) {
+            if (!is_valid_answer(json)) {
                 return verdict::malformed;
             }
             finish(code, why);

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/feed_machine.hpp"
 
-#include <cles/json_reader.hpp>
-
 #include <utility>
 
 namespace cles::core {
@@ -124,7 +122,7 @@ bool feed_machine::on_event(const detail::raw_event& event) {
         }
         return true;
     }
-    if (!event.checked && !is_valid_json(event.body, detail::answer_depth)) {
+    if (!event.has_json()) {
         return false;
     }
     queue_.push(event);

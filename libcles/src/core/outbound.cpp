@@ -137,7 +137,7 @@ void outbound::on_reply(const protocol::reply_line& reply) {
     const auto due = e->due();
     bool ended = false;
     if (reply.progress) {
-        if (e->progress && is_valid_json(reply.body, detail::answer_depth)) {
+        if (e->progress && detail::is_valid_answer(reply.body)) {
             // Called from a copy: it may withdraw its own request.
             const auto report = e->progress;
             const bool late = *reply.progress < e->reported; // datagrams may overtake each other

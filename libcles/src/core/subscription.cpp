@@ -25,7 +25,7 @@ bool subscription::take(const protocol::request_line& update) {
                             .publisher = update.noun.target,
                             .seq = *update.seq};
     if (verdict.missed != 0 && !thinned_) {
-        event.checked = is_valid_json(event.body, detail::answer_depth);
+        event.checked = event.has_json();
         if (!event.checked) {
             order_ = before;
             return false;

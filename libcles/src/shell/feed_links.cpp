@@ -23,7 +23,7 @@ class bind_reply final : public detail::pending {
         : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked) {}
 
     verdict offer(std::string_view json) override {
-        if (!is_valid_json(json, detail::answer_depth)) {
+        if (!detail::is_valid_answer(json)) {
             return verdict::malformed;
         }
         const std::unique_ptr<bind_reply> self{this};
@@ -69,7 +69,7 @@ class renewal_reply final : public detail::pending {
         : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked) {}
 
     verdict offer(std::string_view json) override {
-        if (!is_valid_json(json)) {
+        if (!detail::is_valid_answer(json)) {
             return verdict::malformed;
         }
         const std::unique_ptr<renewal_reply> self{this};
