@@ -19,6 +19,7 @@
 
 #include <array>
 #include <chrono>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -268,6 +269,17 @@ BOOST_AUTO_TEST_CASE(a_feed_renews_and_its_binding_stays) {
         run_until(n.io, [&] { return feed.items.size() == static_cast<std::size_t>(published); });
     }
     BOOST_TEST(feed.count(feed_event::update) == feed.items.size()); // no loss, no return, no gap
+    BOOST_TEST(metric(*n.car, "leases_expired") == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_renewals_answer_may_be_as_deep_as_the_first) {
+    nodes n{carrier::udp4, {.lease = 60ms}};
+    const cles::json_text deepest{std::string(32, '[') + std::string(32, ']')};
+    n.car->update("place", std::map<std::string, cles::json_text>{{"inside", deepest}});
+    feed_log feed;
+    feed.bind(*n.tower, "car1:place");
+    run_until(n.io, [&] { return metric(*n.car, "BIND") >= 3; }); // itself and two renewals
+    BOOST_TEST(metric(*n.tower, "replies_dropped") == 0U);
     BOOST_TEST(metric(*n.car, "leases_expired") == 0U);
 }
 

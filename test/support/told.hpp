@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cles/feed_event.hpp>
-#include <cles/json_reader.hpp>
 #include <cles/pending.hpp>
 
 #include "core/subscription.hpp"
