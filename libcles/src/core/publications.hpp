@@ -4,9 +4,8 @@
 #include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
 
+#include "core/text_map.hpp"
 #include "core/topic.hpp"
-
-#include <boost/unordered/unordered_flat_map.hpp>
 
 #include <cstddef>
 #include <functional>
@@ -59,12 +58,6 @@ class publications {
     [[nodiscard]] std::vector<std::string> tasks() const;
 
   private:
-    struct text_hash : boost::hash<std::string_view> {
-        using is_transparent = void;
-    };
-    template <class V>
-    using map = boost::unordered_flat_map<std::string, V, text_hash, std::equal_to<>>;
-
     void end(topic& t, std::size_t body_at);
     void mark(topic& t);
 
@@ -73,12 +66,12 @@ class publications {
     std::string publisher_;
     std::string epoch_;
     std::function<void()> wake_;
-    map<std::unique_ptr<topic>> topics_;
+    text_map<std::unique_ptr<topic>> topics_;
     struct task_nouns {
         std::size_t count = 0;
         std::size_t published = 0; // of them
     };
-    map<task_nouns> nouns_; // per task
+    text_map<task_nouns> nouns_; // per task
     std::vector<topic*> dirty_;
     topic* recent_ = nullptr; // most publish the same noun again
 };

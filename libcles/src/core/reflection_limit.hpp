@@ -3,11 +3,9 @@
 
 #include <cles/limits.hpp>
 
-#include <boost/unordered/unordered_flat_map.hpp>
+#include "core/text_map.hpp"
 
 #include <cstddef>
-#include <functional>
-#include <string>
 #include <string_view>
 
 namespace cles::core {
@@ -31,15 +29,12 @@ class reflection_limit {
         double room = static_cast<double>(at_once);
         time_point at{};
     };
-    struct text_hash : boost::hash<std::string_view> {
-        using is_transparent = void;
-    };
 
     static void fill(bucket& b, time_point now) noexcept;
     bucket* find_or_make(std::string_view address, time_point now);
     void forget_full(time_point now);
 
-    boost::unordered_flat_map<std::string, bucket, text_hash, std::equal_to<>> buckets_;
+    text_map<bucket> buckets_;
     time_point tidied_{};
 };
 

@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/subscription.hpp"
 
-#include <cles/json_reader.hpp>
-#include <cles/pending.hpp>
-
 #include <algorithm>
 
 namespace cles::core {
@@ -50,13 +47,13 @@ bool subscriptions::add(subscription& s) {
     if (has(s.target(), s.path())) {
         return false;
     }
-    forget_recent();
+    forget_last();
     by_path_[s.path()].push_back(&s);
     return true;
 }
 
 void subscriptions::remove(const subscription& s) {
-    forget_recent();
+    forget_last();
     const auto found = by_path_.find(s.path());
     if (found != by_path_.end()) {
         std::erase(found->second, &s);
@@ -67,23 +64,16 @@ void subscriptions::remove(const subscription& s) {
 }
 
 subscription* subscriptions::find(std::string_view publisher, std::string_view path) const {
-    if (recent_ != nullptr && recent_->path() == path && recent_->target() == publisher) {
-        return recent_;
-    }
     const auto found = by_path_.find(path);
     if (found == by_path_.end()) {
         return nullptr;
     }
-    subscription* by_self = nullptr; // `self` is whoever is at the other end
     for (auto* s : found->second) {
-        if (s->target() == publisher) {
-            return recent_ = s;
-        }
-        if (s->target() == "self") {
-            by_self = s;
+        if (s->target() == publisher || s->target() == "self") { // whoever is at the other end; no other is beside it
+            return s;
         }
     }
-    return by_self;
+    return nullptr;
 }
 
 subscriptions::match subscriptions::recognise(std::string_view line) noexcept {
@@ -105,8 +95,7 @@ subscriptions::match subscriptions::find(std::string_view line, const protocol::
     return {.update = &update, .whose = s};
 }
 
-void subscriptions::forget_recent() noexcept {
-    recent_ = nullptr;
+void subscriptions::forget_last() noexcept {
     last_ = nullptr;
     head_of_ = nullptr;
     head_.forget();

@@ -3,14 +3,12 @@
 
 #include <cles/feed_event.hpp>
 
+#include "core/text_map.hpp"
 #include "core/update_order.hpp"
 #include "protocol/message.hpp"
 #include "protocol/update_head.hpp"
 
-#include <boost/unordered/unordered_flat_map.hpp>
-
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -69,16 +67,12 @@ class subscriptions {
     [[nodiscard]] bool empty() const noexcept { return by_path_.empty(); }
 
   private:
-    void forget_recent() noexcept;
+    void forget_last() noexcept;
 
-    struct text_hash : boost::hash<std::string_view> {
-        using is_transparent = void;
-    };
     // Mostly one node publishes a path on a link, so that a short list is quicker than a second key.
-    boost::unordered_flat_map<std::string, std::vector<subscription*>, text_hash, std::equal_to<>> by_path_;
-    mutable subscription* recent_ = nullptr; // most updates are of the noun of the one before
-    subscription* last_ = nullptr;
-    subscription* head_of_ = nullptr;
+    text_map<std::vector<subscription*>> by_path_;
+    subscription* last_ = nullptr;    // whom the update before was for
+    subscription* head_of_ = nullptr; // whom updates with the head in mind are for
     protocol::update_head head_;
     std::string scratch_;
 };
