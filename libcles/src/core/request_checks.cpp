@@ -79,6 +79,10 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
     return std::nullopt;
 }
 
+protocol::failure no_room_for_links(const node& n) {
+    return {.code = errc::busy, .message = n.name + " has as many links as it may", .retry_ms = 1000};
+}
+
 std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun) {
     if (noun.task != "cles" || noun.parameters.size() != 2 || noun.parameters[0] != "cancel") {
         return std::nullopt;

@@ -28,6 +28,9 @@ bool passes(std::string_view via, std::string_view name);
 /// What keeps a node from serving a request, whatever it asks for: access, target, body.
 std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& request);
 
+/// What a link is told that comes past the limit.
+protocol::failure no_room_for_links(const node& n);
+
 /// The id in "cles/cancel/<id>"; nothing for other nouns and for what is no id.
 std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun);
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/session.hpp"
 
-#include <cles/json_reader.hpp>
-
+#include "core/request_checks.hpp"
 #include "protocol/line.hpp"
 
 #include <string>
@@ -19,7 +18,7 @@ void session::on_line(std::string_view line, time_point now) {
         return;
     }
     if (is_datagram() && protocol::has_many_lines(line)) {
-        on_many_lines(line, now);
+        refuse(line, "a datagram holds one line", now);
         return;
     }
     if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
@@ -68,14 +67,14 @@ void session::on_update(const subscriptions::match& found) {
     }
 }
 
-// Taken for its first line, as far as an answer has to know whom it is for.
-void session::on_many_lines(std::string_view text, time_point now) {
+// Its first line says whom an answer is for.
+void session::refuse(std::string_view text, const char* why, time_point now) {
     if (protocol::is_reply(text)) {
         ++node_->counts.replies_dropped;
         return;
     }
     auto meant = protocol::salvage(protocol::trim(text.substr(0, text.find('\n'))));
-    meant.why = "a datagram holds one line";
+    meant.why = why;
     inbound_.on_malformed(text, meant, now);
 }
 
@@ -85,8 +84,7 @@ void session::turn_away(std::string_view line) {
     if (!line.empty() && !protocol::is_reply(line) && meant.wants_reply) {
         auto& out = out_.output();
         protocol::append_reply_head(out, meant.id);
-        protocol::append_failure(
-            out, {.code = errc::busy, .message = node_->name + " has as many links as it may", .retry_ms = 1000});
+        protocol::append_failure(out, no_room_for_links(*node_));
         out.push_back('\n');
     }
 }
@@ -114,16 +112,9 @@ void session::on_overlong(std::string_view head, time_point now) {
 // It may have been meant to be longer, and so is not run.
 void session::on_cut(std::string_view rest, time_point now) {
     rest = protocol::trim(rest);
-    if (rest.empty() || closed_) {
-        return;
+    if (!rest.empty() && !closed_) {
+        refuse(rest, "the last line is not ended by LF", now);
     }
-    if (protocol::is_reply(rest)) {
-        ++node_->counts.replies_dropped;
-        return;
-    }
-    auto what = protocol::salvage(rest);
-    what.why = "the last line is not ended by LF";
-    inbound_.on_malformed(rest, what, now);
 }
 
 void session::on_end(time_point now) {

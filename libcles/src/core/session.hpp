@@ -41,7 +41,7 @@ class session {
 
   private:
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
-    void on_many_lines(std::string_view text, time_point now);
+    void refuse(std::string_view text, const char* why, time_point now);
     void on_reply(std::string_view line);
     void on_update(const subscriptions::match& found);
 

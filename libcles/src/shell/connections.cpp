@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/connections.hpp"
 
+#include "core/request_checks.hpp"
 #include "protocol/message.hpp"
 #include "shell/engine.hpp"
 
@@ -49,9 +50,7 @@ void connections::turn_away(link_ptr arrived) {
         adopt(std::move(arrived), connection::origin::refused);
         return;
     }
-    protocol::append_failure(
-        arrived->output(),
-        {.code = errc::busy, .message = engine_.node().name + " has as many links as it may", .retry_ms = 1000});
+    protocol::append_failure(arrived->output(), core::no_room_for_links(engine_.node()));
     arrived->output().push_back('\n');
     arrived->flush();
     arrived->close();
