@@ -21,8 +21,28 @@ std::uint16_t parse_port(std::string_view whole, std::string_view text) {
     return port;
 }
 
+std::uint8_t parse_dscp(std::string_view whole, std::string_view query) {
+    constexpr std::string_view key = "dscp=";
+    constexpr unsigned highest = 63; // six bits (RFC 2474)
+    unsigned value = highest + 1;
+    if (query.starts_with(key)) {
+        query.remove_prefix(key.size());
+        const auto end = query.data() + query.size();
+        const auto [ptr, code] = std::from_chars(query.data(), end, value);
+        value = code == std::errc{} && ptr == end ? value : highest + 1;
+    }
+    if (value > highest) {
+        refuse(whole, "behind '?' there is 'dscp=' and a number from 0 to 63, or nothing");
+    }
+    return static_cast<std::uint8_t>(value);
+}
+
 void parse_host_and_port(std::string_view whole, std::string_view rest, url& out) {
     out.port = default_port;
+    if (const auto query = rest.find('?'); query != std::string_view::npos) {
+        out.dscp = parse_dscp(whole, rest.substr(query + 1));
+        rest = rest.substr(0, query);
+    }
     std::string_view after;
     if (rest.starts_with('[')) {
         const auto close = rest.find(']');
@@ -52,7 +72,7 @@ void parse_host_and_port(std::string_view whole, std::string_view rest, url& out
         refuse(whole, "the host is missing");
     }
     if (out.host.find_first_of("/?#@ ") != std::string::npos || after.find('/') != std::string_view::npos) {
-        refuse(whole, "a " + out.scheme + " URL ends behind its port");
+        refuse(whole, "a " + out.scheme + " URL ends behind its port, or with ?dscp=...");
     }
     if (!after.empty()) {
         out.port = parse_port(whole, after.substr(1));
@@ -106,7 +126,11 @@ std::string to_string(const url& u) {
     } else {
         text += u.host;
     }
-    return text + ":" + std::to_string(u.port);
+    text += ":" + std::to_string(u.port);
+    if (u.dscp) {
+        text += "?dscp=" + std::to_string(*u.dscp);
+    }
+    return text;
 }
 
 } // namespace cles

@@ -5,6 +5,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -33,7 +34,10 @@ BOOST_AUTO_TEST_CASE(a_url_is_read_into_its_parts_and_written_again) {
         {"unix://@car1", "unix", "", 0, "@car1", "unix://@car1"},
         {"unix:///a b/c:d", "unix", "", 0, "/a b/c:d", "unix:///a b/c:d"},
         {"inproc://car1", "inproc", "car1", 0, "", "inproc://car1"},
-        {"shm://10.0.0.2:5", "shm", "10.0.0.2", 5, "", "shm://10.0.0.2:5"}, // schemes may be added
+        {"tcp://10.0.0.2:7?dscp=46", "tcp", "10.0.0.2", 7, "", "tcp://10.0.0.2:7?dscp=46"},
+        {"udp://[::1]?dscp=0", "udp", "::1", 25370, "", "udp://[::1]:25370?dscp=0"},
+        {"unix:///run/a?dscp=1", "unix", "", 0, "/run/a?dscp=1", "unix:///run/a?dscp=1"}, // a file's name
+        {"shm://10.0.0.2:5", "shm", "10.0.0.2", 5, "", "shm://10.0.0.2:5"},               // schemes may be added
     };
     for (const auto& e : examples) {
         const auto u = cles::parse_url(e.text);
@@ -44,6 +48,11 @@ BOOST_AUTO_TEST_CASE(a_url_is_read_into_its_parts_and_written_again) {
         BOOST_TEST(to_string(u) == e.written, e.text);
         BOOST_TEST(to_string(cles::parse_url(to_string(u))) == e.written, e.text);
     }
+}
+
+BOOST_AUTO_TEST_CASE(a_dscp_is_read_where_there_is_one) {
+    BOOST_TEST((cles::parse_url("tcp://10.0.0.2").dscp == std::nullopt));
+    BOOST_TEST((cles::parse_url("tcp://10.0.0.2?dscp=63").dscp == std::uint8_t{63}));
 }
 
 BOOST_AUTO_TEST_CASE(a_bad_url_is_refused_with_itself_and_what_is_wrong) {
@@ -76,6 +85,13 @@ BOOST_AUTO_TEST_CASE(a_bad_url_is_refused_with_itself_and_what_is_wrong) {
         {"tcp://localhost:80/", "ends behind its port"},
         {"tcp://user@localhost", "ends behind its port"},
         {"tcp://local host", "ends behind its port"},
+        {"tcp://localhost?", "0 to 63"},
+        {"tcp://localhost:80?x=1", "0 to 63"},
+        {"tcp://localhost:80?dscp=", "0 to 63"},
+        {"tcp://localhost:80?dscp=64", "0 to 63"},
+        {"tcp://localhost:80?dscp=-1", "0 to 63"},
+        {"tcp://localhost:80?dscp=46&x", "0 to 63"},
+        {"tcp://localhost:80?dscp=99999999999", "0 to 63"},
         {"unix://", "absolute path"},
         {"unix:///", "absolute path"},
         {"unix://@", "absolute path"},

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -12,17 +13,19 @@ inline constexpr std::uint16_t default_port = 25370;
 /// Where a link leads, in parts.
 ///
 /// ```
-/// url      = ( "tcp://" / "udp://" ) host [ ":" port ] / "unix://" path / "inproc://" name
+/// url      = ( "tcp://" / "udp://" ) host [ ":" port ] [ "?dscp=" number ] / "unix://" path / "inproc://" name
 /// host     = IPv4 address / "[" IPv6 address [ "%25" zone ] "]" / host name
 /// path     = "/" ... (a socket file) / "@" ... (an abstract socket)
 /// ```
 ///
-/// The port is 25370 where none is given; 0 asks the system for a free one when listening.
+/// The port is 25370 where none is given; 0 asks the system for a free one when listening. A DSCP (RFC 2474) is set in
+/// every packet that this end sends on the link, so that the network may treat some links better than others.
 struct url {
     std::string scheme;
     std::string host; ///< of `tcp` and `udp`, without brackets; of `inproc`, the name
     std::uint16_t port = 0;
-    std::string path; ///< of `unix`
+    std::string path;                   ///< of `unix`
+    std::optional<std::uint8_t> dscp{}; ///< of `tcp` and `udp`: 0 to 63
 };
 
 /// \throws cles::error with `invalid_url`, saying what is wrong

@@ -6,6 +6,7 @@
 #include "transport/ip_host.hpp"
 #include "transport/stream_acceptor.hpp"
 #include "transport/stream_dialler.hpp"
+#include "transport/traffic_class.hpp"
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
@@ -29,14 +30,15 @@ std::vector<tcp::endpoint> endpoints_of(const url& where, error_code& code) {
     return endpoints;
 }
 
-void tune(tcp::socket& socket) {
+void tune(tcp::socket& socket, const url& where) {
     error_code ignored;
+    set_traffic_class(socket, where, ignored);
     socket.set_option(tcp::no_delay{true}, ignored);
     socket.set_option(asio::socket_base::keep_alive{true}, ignored);
 }
 
-identity identify(tcp::socket& socket) {
-    tune(socket);
+identity identify(tcp::socket& socket, const url& where) {
+    tune(socket, where);
     error_code gone;
     const auto peer = socket.remote_endpoint(gone);
     identity who{.transport = "tcp", .address = {}, .name = {}, .uid = {}};
@@ -49,8 +51,9 @@ identity identify(tcp::socket& socket) {
 
 class tcp_acceptor final : public acceptor {
   public:
-    tcp_acceptor(tcp::acceptor socket, const limits& bounds)
-        : inside_(std::make_shared<stream_acceptor<tcp>>(std::move(socket), bounds, identify)) {}
+    tcp_acceptor(tcp::acceptor socket, const url& where, const limits& bounds)
+        : inside_(std::make_shared<stream_acceptor<tcp>>(
+              std::move(socket), bounds, [where](tcp::socket& accepted) { return identify(accepted, where); })) {}
     ~tcp_acceptor() override { inside_->close(); }
 
     [[nodiscard]] url local() const override {
@@ -87,7 +90,7 @@ class tcp_transport final : public link_transport {
         }
         socket.bind(endpoint);
         socket.listen();
-        return std::make_unique<tcp_acceptor>(std::move(socket), bounds);
+        return std::make_unique<tcp_acceptor>(std::move(socket), where, bounds);
     }
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
@@ -98,7 +101,8 @@ class tcp_transport final : public link_transport {
             asio::post(executor, [done = std::move(done), code] { done(code, nullptr); });
             return [] {};
         }
-        auto dialler = std::make_shared<stream_dialler<tcp>>(executor, bounds, identify, std::move(done));
+        auto dialler = std::make_shared<stream_dialler<tcp>>(
+            executor, bounds, [where](tcp::socket& socket) { return identify(socket, where); }, std::move(done));
         dialler->start(std::move(endpoints));
         return [weak = std::weak_ptr{dialler}] {
             if (const auto alive = weak.lock()) {

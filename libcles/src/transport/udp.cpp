@@ -2,6 +2,7 @@
 #include "transport/udp.hpp"
 
 #include "transport/ip_host.hpp"
+#include "transport/traffic_class.hpp"
 #include "transport/udp_port.hpp"
 
 #include <boost/asio/ip/udp.hpp>
@@ -50,6 +51,10 @@ class udp_transport final : public link_transport {
             socket.set_option(asio::ip::v6_only{true});
         }
         socket.bind(endpoint);
+        set_traffic_class(socket, where, code);
+        if (code) {
+            throw boost::system::system_error{code};
+        }
         return std::make_unique<udp_acceptor>(std::make_shared<udp_port>(std::move(socket)));
     }
 
@@ -61,6 +66,9 @@ class udp_transport final : public link_transport {
         udp::socket socket{executor};
         if (!code) {
             socket.open(endpoint.protocol(), code);
+        }
+        if (!code) {
+            set_traffic_class(socket, where, code);
         }
         if (!code) {
             socket.connect(endpoint, code);
