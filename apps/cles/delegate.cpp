@@ -13,6 +13,7 @@ void add_delegate(CLI::App& app, context& shared) {
     auto request = std::make_shared<request_command>(cles::verb::delegate, shared);
     auto* command = app.add_subcommand("delegate", "Have a task done and get its result");
     request->add_options(*command);
+    request->add_urgent_option(*command);
     request->add_body_option(*command);
     request->add_progress_option(*command);
     command->footer("Ctrl-C withdraws the task.\n\n"

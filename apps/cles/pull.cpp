@@ -14,6 +14,7 @@ void add_pull(CLI::App& app, context& shared) {
     auto request = std::make_shared<request_command>(cles::verb::pull, shared);
     auto* command = app.add_subcommand("pull", "Get data once");
     request->add_options(*command);
+    request->add_urgent_option(*command);
     refuse_body(*command, "PULL");
     command->footer("Examples:\n"
                     "  cles pull car1:localization\n"

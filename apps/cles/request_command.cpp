@@ -22,6 +22,7 @@ struct request_loop {
         printer out{wanted.format_, wanted.count_ != 1};
         progress_line progress{wanted.progress_};
         auto options = asker.options_for(wanted.noun_, wanted.timeout_);
+        options.urgent(wanted.urgent_);
         if (wanted.verb_ == cles::verb::delegate && progress.is_wanted()) {
             options.on_progress(
                 [&progress](double fraction, std::string_view details) { progress.show(fraction, details); });
@@ -50,6 +51,10 @@ void request_command::add_options(CLI::App& command) {
 
 void request_command::add_body_option(CLI::App& command) {
     command.add_option("-d,--data", body_, "The body: JSON, @FILE, or - for stdin")->type_name("JSON");
+}
+
+void request_command::add_urgent_option(CLI::App& command) {
+    command.add_flag("--urgent", urgent_, "Let the answer pass others that wait at the node");
 }
 
 void request_command::add_progress_option(CLI::App& command) {

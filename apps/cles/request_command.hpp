@@ -27,6 +27,8 @@ class request_command {
     void add_options(CLI::App& command);
     /// For a verb with a body only.
     void add_body_option(CLI::App& command);
+    /// For all but UPDATE.
+    void add_urgent_option(CLI::App& command);
     /// For DELEGATE.
     void add_progress_option(CLI::App& command);
 
@@ -46,6 +48,7 @@ class request_command {
     std::chrono::milliseconds interval_{1000};
     output_format format_ = output_format::automatic;
     bool progress_ = false;
+    bool urgent_ = false;
 };
 
 } // namespace tool

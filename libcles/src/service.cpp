@@ -34,8 +34,8 @@ std::string foreign_adverb(std::string_view command) {
     parts.next(); // verb
     parts.next(); // noun
     for (auto part = parts.next(); !part.empty(); part = parts.next()) {
-        if (!part.starts_with("deadline=")) {
-            return "of the adverbs only 'deadline' can be given here, not " + protocol::quoted(part);
+        if (!part.starts_with("deadline=") && part != "urgent=yes") {
+            return "of the adverbs only 'deadline' and 'urgent' can be given here, not " + protocol::quoted(part);
         }
     }
     return {};
@@ -108,6 +108,7 @@ std::uint64_t service::send_command(std::string_view command, const call_options
     if (chosen.deadline_.count() <= 0 && parsed.deadline_ms != protocol::default_deadline(parsed.verb)) {
         chosen.deadline(std::chrono::milliseconds{parsed.deadline_ms});
     }
+    chosen.urgent(chosen.urgent_ || parsed.urgent);
     const auto noun = std::string{parsed.noun.target} + ":" + std::string{parsed.noun.path};
     return engine_->send({parsed.verb, noun, parsed.body}, chosen, std::move(operation));
 }

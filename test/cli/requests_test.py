@@ -221,6 +221,14 @@ class Wire(unittest.TestCase):
         (_, _, _), node = self.ask("{}", "delegate", "car1:x", "--progress")
         self.assertIn(" progress=yes", node.lines[0])
 
+    def test_urgent_where_it_is_said(self):
+        for verb in ("pull", "push", "delegate"):
+            (code, _, _), node = self.ask("{}", verb, "car1:x", "--urgent")
+            self.assertEqual(code, 0)
+            self.assertIn(" urgent=yes", node.lines[0])
+        (_, _, _), node = self.ask("{}", "pull", "car1:x")
+        self.assertNotIn("urgent", node.lines[0])
+
     def test_progress_with_details(self):
         def answer(line, send):
             send(id_of(line) + 'progress=0.25 {"step":"one"}')

@@ -8,6 +8,8 @@
 #include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
+#include <cstddef>
 #include <string>
 
 BOOST_AUTO_TEST_SUITE(link_flow)
@@ -15,6 +17,8 @@ BOOST_AUTO_TEST_SUITE(link_flow)
 using namespace cles::test;
 
 namespace {
+
+const auto line_lengths = boost::unit_test::data::make({std::size_t{1'000}, std::size_t{200'000}});
 
 std::string many_lines(std::size_t count, std::size_t length) {
     std::string text;
@@ -47,6 +51,33 @@ BOOST_DATA_TEST_CASE(what_a_peer_does_not_read_waits_and_nothing_is_lost, every_
     BOOST_TEST(pair.near.link->sent() == text.size() + 5);
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines[count - 1].starts_with("7999."); }));
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines.back(); }) == "more");
+}
+
+// As short lines and as long ones, of which one is on its way in any case.
+BOOST_DATA_TEST_CASE(what_is_urgent_passes_what_waits_and_breaks_no_line, every_socket* line_lengths, kind, length) {
+    link_pair pair{kind};
+    pair.open();
+    pair.far.run([&] { pair.far.link->pause(true); });
+    const std::size_t count = 16'000'000 / length;
+    pair.near.say(many_lines(count, length));
+    run_ready(pair.io);
+    BOOST_TEST(pair.near.link->unsent() > 0U);
+    for (const auto* line : {"first\n", "second\n"}) {
+        pair.near.link->urgent_output().append(line);
+        pair.near.link->flush();
+    }
+
+    pair.far.run([&] { pair.far.link->pause(false); });
+    pair.until([&] { return pair.far.lines() == count + 2; });
+    auto lines = pair.far.run([&] { return pair.far.events->lines; });
+    const auto first = std::find(lines.begin(), lines.end(), "first");
+    BOOST_REQUIRE((lines.end() - first > 2)); // some have been passed
+    BOOST_TEST(*(first + 1) == "second");
+    lines.erase(first, first + 2);
+    for (std::size_t i = 0; i < count; ++i) {
+        BOOST_REQUIRE(lines[i].starts_with(std::to_string(i) + "."));
+        BOOST_REQUIRE(lines[i].size() == std::to_string(i).size() + length);
+    }
 }
 
 BOOST_DATA_TEST_CASE(on_room_is_not_told_from_inside_flush, every_carrier, kind) {

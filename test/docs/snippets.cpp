@@ -68,6 +68,7 @@ asio::awaitable<void> asking(cles::service& car) {
     co_await car.async_push("car0:target", where);
     const auto metres = co_await car.async_delegate<double>("car0:park", where, cles::call_options{}.deadline(20s));
     const auto answer = co_await car.async_request("PULL car0:tyre/2"); // JSON, as text
+    co_await car.async_push("car0:brake", 0.8, cles::call_options{}.urgent());
     std::cout << metres << answer.text;
 }
 

@@ -57,6 +57,23 @@ struct two_nodes {
     cles::service tower;
 };
 
+BOOST_DATA_TEST_CASE(what_is_urgent_does_not_wait_behind_large_answers, carriers, kind) {
+    two_nodes n{kind};
+    n.car.on_pull("map", [] { return std::string(900'000, 'x'); });
+    constexpr std::size_t count = 20;
+    std::vector<answer<cles::json_text>> large(count);
+    for (auto& each : large) {
+        n.tower.async_pull("car1:map", each.take());
+    }
+    answer<int> small;
+    n.tower.async_pull<int>("car1:speed", cles::call_options{}.urgent(), small.take());
+    n.wait_for(small);
+    BOOST_TEST(small.value == 42);
+    BOOST_TEST(!large.back().done());
+    n.wait_for(large.back());
+    BOOST_TEST(large.back().value.text.size() > 900'000U);
+}
+
 BOOST_DATA_TEST_CASE(pull_gives_data_typed_and_raw, carriers, kind) {
     two_nodes n{kind};
     answer<localization> typed;

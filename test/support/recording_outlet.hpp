@@ -15,6 +15,7 @@ class recording_outlet : public core::outlet {
     explicit recording_outlet(std::size_t datagram = 0) : datagram_bytes(datagram) {}
 
     std::string& output() override { return text_; }
+    std::string& urgent_output() override { return datagram_bytes == 0 ? urgent_ : text_; }
     [[nodiscard]] std::size_t datagram() const noexcept override { return datagram_bytes; }
     void wake() override { ++wakes; }
     [[nodiscard]] bool is_behind() const override { return behind; }
@@ -26,7 +27,7 @@ class recording_outlet : public core::outlet {
     void close() override { ++closes; }
 
     /// What has been sent since the last time.
-    std::string take() { return std::exchange(text_, {}); }
+    std::string take() { return std::exchange(urgent_, {}) + std::exchange(text_, {}); }
     /// The same, line by line and without LF. A last line that is not ended shows as "... <no LF>".
     std::vector<std::string> take_lines() {
         std::vector<std::string> lines;
@@ -56,6 +57,7 @@ class recording_outlet : public core::outlet {
 
   private:
     std::string text_;
+    std::string urgent_; // goes before it
 };
 
 } // namespace cles::test

@@ -183,6 +183,7 @@ BOOST_AUTO_TEST_CASE(known_adverbs_are_taken_between_their_bounds) {
         {"UPDATE a:b", "reply", {"no"}, {"yes"}},
         {"PULL a:b", "hops", {"0", "8", "16"}, {"17", "-1", "00", "x"}},
         {"DELEGATE a:b id=7", "progress", {"yes"}, {"no", "Yes", "1"}},
+        {"PULL a:b id=7", "urgent", {"yes"}, {"no", "Yes", "1"}},
         {"BIND a:b",
          "lease",
          {"0", "1", "60000", "60001", "18446744073709551615", "99999999999999999999999"},
@@ -264,9 +265,9 @@ BOOST_AUTO_TEST_CASE(an_unknown_adverb_that_begins_with_must_is_refused) {
 BOOST_AUTO_TEST_CASE(a_known_adverb_is_ignored_on_a_verb_that_it_is_not_for) {
     for (const std::string_view text :
          {"PULL a:b reply=no", "DELEGATE a:b reply=no", "BIND a:b reply=no", "PULL a:b reply=maybe",
-          "PUSH a:b progress=yes", "PULL a:b progress=x", "PULL a:b lease=x", "UPDATE a:b lease=0", "PULL a:b every=0",
-          "PUSH a:b keep=0", "PULL a:b seq=1", "BIND a:b epoch=x", "PUSH a:b seq=1 seq=1",
-          "PULL a:b every=1 every=1"}) {
+          "PUSH a:b progress=yes", "BIND a:b urgent=x", "UPDATE a:b urgent=x", "PULL a:b progress=x",
+          "PULL a:b lease=x", "UPDATE a:b lease=0", "PULL a:b every=0", "PUSH a:b keep=0", "PULL a:b seq=1",
+          "BIND a:b epoch=x", "PUSH a:b seq=1 seq=1", "PULL a:b every=1 every=1"}) {
         const auto p = parse(text);
         BOOST_TEST(p.ok, text << ": " << why(text));
         BOOST_TEST(p.line.wants_reply, text);
@@ -348,7 +349,9 @@ BOOST_AUTO_TEST_CASE(nodes_write_the_verb_in_capitals_and_one_sp_between_parts) 
                         .id = 7,
                         .deadline_ms = 200,
                         .wants_progress = true,
-                        .body = "{\"x\":1}"}) == "DELEGATE car1:plan/a id=7 deadline=200 progress=yes {\"x\":1}\n");
+                        .urgent = true,
+                        .body = "{\"x\":1}"}) ==
+               "DELEGATE car1:plan/a id=7 deadline=200 progress=yes urgent=yes {\"x\":1}\n");
     BOOST_TEST(written({.verb = verb::bind, .noun = "car1:speed", .id = 8, .lease_ms = 0}) ==
                "BIND car1:speed id=8 lease=0\n");
     BOOST_TEST(written({.verb = verb::bind, .noun = "car1:speed", .every_ms = 20, .keep = 5, .adverbs = "via=car3"}) ==

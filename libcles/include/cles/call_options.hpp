@@ -26,6 +26,12 @@ class call_options {
         at_ = url;
         return *this;
     }
+    /// A small request that must not wait behind large ones: it travels on a link of its own, and its answer goes
+    /// before others that wait at the peer. A peer that does not know the adverb `urgent` answers it in its turn.
+    call_options& urgent(bool hurry = true) {
+        urgent_ = hurry;
+        return *this;
+    }
     /// Where the peer's own words go if the request fails; written before the request completes, which it must outlive.
     call_options& diagnostics(std::string& text) {
         diagnostics_ = &text;
@@ -40,6 +46,7 @@ class call_options {
 
     std::chrono::milliseconds deadline_{0};
     std::string at_{};
+    bool urgent_ = false;
     std::string* diagnostics_ = nullptr;
     std::function<void(double, std::string_view)> on_progress_{};
 };

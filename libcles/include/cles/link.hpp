@@ -58,6 +58,8 @@ class link {
     /// Begins to read. The link keeps its owner alive until it is closed or lost.
     virtual void start(std::shared_ptr<link_events> owner) = 0;
     virtual std::string& output() = 0;
+    /// Lines that go before what waits there. By default nothing does.
+    virtual std::string& urgent_output() { return output(); }
     /// Bytes of a datagram at most, a line's LF among them; 0 where the link is a stream.
     [[nodiscard]] virtual std::size_t datagram() const noexcept { return 0; }
     /// Tries to hand the output to the transport at once; what it does not take follows when it does.

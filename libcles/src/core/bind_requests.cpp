@@ -35,7 +35,7 @@ void bind_requests::serve(const protocol::request_line& r, time_point now) {
             leases_->drop(path);
         }
         bound_.unbind(path);
-        replies_.done(r.id, r.wants_reply, {});
+        replies_.done(reply_to{r}, {});
         return;
     }
     auto& published = node_.published;
@@ -50,7 +50,7 @@ void bind_requests::serve(const protocol::request_line& r, time_point now) {
             return;
         }
         auto& t = published.open(path);
-        replies_.done(r.id, r.wants_reply, t.last_body());
+        replies_.done(reply_to{r}, t.last_body());
         bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
         if (leases_) {
             leases_->set(path, now + std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)});

@@ -37,7 +37,7 @@ bool call::progress(double fraction, std::string_view json) {
         return true; // the next one tells more
     }
     reported_ = std::max(reported_, std::clamp(fraction, 0.0, 1.0));
-    auto& out = owner_->out_.output();
+    auto& out = terms_.urgent ? owner_->out_.urgent_output() : owner_->out_.output();
     const auto line = out.size();
     protocol::append_progress_head(out, terms_.id, reported_);
     const auto body = out.size();

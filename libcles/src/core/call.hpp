@@ -30,6 +30,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
         std::uint64_t id = 0;
         bool wants_reply = true;
         bool wants_progress = false;
+        bool urgent = false;
         std::string publish_path{}; ///< of a request to publish: where
         std::string publish_body{};
     };

@@ -35,10 +35,9 @@ bool datagram_requests::admit(const protocol::request_line& r) {
         out_.output().append(seen_.reply(r.id, r.text));
         return false;
     case dedup::verdict::clash:
-        replies_.fail_apart(
-            r.id, r.wants_reply,
-            {.code = errc::bad_request,
-             .message = node_.name + ": the id " + std::to_string(r.id) + " is in flight with another request"});
+        replies_.fail_apart(reply_to{r}, {.code = errc::bad_request,
+                                          .message = node_.name + ": the id " + std::to_string(r.id) +
+                                                     " is in flight with another request"});
         return false;
     }
     if (runs_once(r) && !seen_.begin(r.id, r.text, out_.datagram())) {

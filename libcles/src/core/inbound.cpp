@@ -101,14 +101,14 @@ void inbound::on_malformed(std::string_view, const protocol::malformed_request& 
     }
     const protocol::failure why{.code = errc::bad_request, .message = node_->name + ": " + what.why};
     if (!datagrams_ && what.id != 0 && calls_.contains(what.id)) {
-        replies_.fail(what.id, what.wants_reply, why);
+        replies_.fail({what.id, what.wants_reply}, why);
         lose();
         ending_ = closing_ = true;
         finish_if_done();
     } else if (what.id == 0 && what.wants_reply && must_wait()) {
         answer_in_turn(failure_text(why), now);
     } else {
-        replies_.fail_apart(what.id, what.wants_reply, why);
+        replies_.fail_apart({what.id, what.wants_reply}, why);
     }
 }
 
@@ -125,7 +125,7 @@ void inbound::on_overlong(std::string_view head, time_point now) {
     if (meant.id == 0 && meant.wants_reply && must_wait()) {
         answer_in_turn(failure_text(why), now);
     } else {
-        replies_.fail_apart(meant.id, meant.wants_reply, why);
+        replies_.fail_apart({meant.id, meant.wants_reply}, why);
     }
     if (datagrams_) { // the next one has nothing to do with it
         return;
@@ -251,7 +251,7 @@ void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, ti
     } else if (why) {
         replies_.fail(r, *why);
     } else {
-        replies_.done(r.id, r.wants_reply, {});
+        replies_.done(reply_to{r}, {});
     }
 }
 
@@ -310,7 +310,11 @@ void inbound::run_later(const protocol::request_line& r, const handler& h, const
         replies_.fail(r, busy(node_->name + " runs as many handlers as it may"));
         return;
     }
-    call::terms wanted{.verb = r.verb, .id = r.id, .wants_reply = r.wants_reply, .wants_progress = r.wants_progress};
+    call::terms wanted{.verb = r.verb,
+                       .id = r.id,
+                       .wants_reply = r.wants_reply,
+                       .wants_progress = r.wants_progress,
+                       .urgent = r.urgent};
     if (r.verb == verb::update) {
         wanted.publish_path = protocol::canonical_path(r.noun, path_);
         append_compact_json(request.body(), wanted.publish_body);
@@ -353,12 +357,13 @@ void inbound::answer(call& c, std::string_view json) {
             return;
         }
     }
-    replies_.done(wanted.id, wanted.wants_reply, json);
+    replies_.done({wanted.id, wanted.wants_reply, wanted.urgent}, json);
     detach(c);
 }
 
 void inbound::refuse(call& c, const protocol::failure& why) {
-    replies_.fail(c.wanted().id, c.wanted().wants_reply, after_run(why));
+    const auto& wanted = c.wanted();
+    replies_.fail({wanted.id, wanted.wants_reply, wanted.urgent}, after_run(why));
     detach(c);
 }
 

@@ -15,6 +15,8 @@ class outlet {
 
     /// Lines to send are appended here, LF included.
     virtual std::string& output() = 0;
+    /// The same for lines that go before those: the replies to urgent requests.
+    virtual std::string& urgent_output() { return output(); }
     /// Bytes of a datagram at most, each of which carries one line with its LF; 0 where it is a stream.
     [[nodiscard]] virtual std::size_t datagram() const noexcept { return 0; }
     /// Something was appended outside of a call that the link made: it is to be sent soon.

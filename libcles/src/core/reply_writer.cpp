@@ -34,37 +34,37 @@ void reply_writer::note(std::uint64_t id, std::string_view reply) {
     }
 }
 
-void reply_writer::done(std::uint64_t id, bool wanted, std::string_view body) {
+void reply_writer::done(reply_to where, std::string_view body) {
     std::string text;
-    protocol::append_reply_head(text, id);
+    protocol::append_reply_head(text, where.id);
     const auto at = text.size();
     text.append(body);
-    send(id, wanted, text, at);
+    send(where, text, at);
 }
 
-void reply_writer::send(std::uint64_t id, bool wanted, std::string& text, std::size_t body) {
+void reply_writer::send(reply_to where, std::string& text, std::size_t body) {
     close_result(text, body);
     if (protocol::begins_with_error(std::string_view{text}.substr(body))) {
-        fail(id, wanted, {.code = errc::failed, .message = node_.name + ": the result's first key is 'error'"});
+        fail(where, {.code = errc::failed, .message = node_.name + ": the result's first key is 'error'"});
     } else if (text.size() > longest_) {
-        fail(id, wanted,
+        fail(where,
              {.code = errc::too_large,
               .message = node_.name + ": the answer has " + std::to_string(text.size()) + " bytes, the limit is " +
                          std::to_string(longest_) + (out_.datagram() == 0 ? "" : " by datagram: use TCP"),
               .ran = true});
-    } else if (wanted) {
+    } else if (where.wanted) {
         text.push_back('\n');
-        out_.output().append(text);
-        note(id, text);
+        output_for(where).append(text);
+        note(where.id, text);
     } else {
-        note(id, {});
+        note(where.id, {});
     }
 }
 
-void reply_writer::fail(std::uint64_t id, bool wanted, const protocol::failure& why) {
-    if (!wanted) {
+void reply_writer::fail(reply_to where, const protocol::failure& why) {
+    if (!where.wanted) {
         ++node_.counts.errors_unsent;
-        note(id, {});
+        note(where.id, {});
         return;
     }
     ++node_.counts.errors;
@@ -72,9 +72,9 @@ void reply_writer::fail(std::uint64_t id, bool wanted, const protocol::failure& 
     if (!told.message.starts_with(node_.name)) { // a handler's own words do not say whose they are
         told.message.insert(0, node_.name + ": ");
     }
-    auto& out = out_.output();
+    auto& out = output_for(where);
     const auto line = out.size();
-    protocol::append_reply_head(out, id);
+    protocol::append_reply_head(out, where.id);
     const auto body = out.size();
     protocol::append_failure(out, told);
     if (out.size() - line > longest_) { // a handler may have many words; the peer would close the link over them
@@ -83,12 +83,12 @@ void reply_writer::fail(std::uint64_t id, bool wanted, const protocol::failure& 
         protocol::append_failure(out, told);
     }
     out.push_back('\n');
-    note(id, std::string_view{out}.substr(line));
+    note(where.id, std::string_view{out}.substr(line));
 }
 
-void reply_writer::fail_apart(std::uint64_t id, bool wanted, const protocol::failure& why) {
+void reply_writer::fail_apart(reply_to where, const protocol::failure& why) {
     auto* seen = std::exchange(seen_, nullptr);
-    fail(id, wanted, why);
+    fail(where, why);
     seen_ = seen;
 }
 

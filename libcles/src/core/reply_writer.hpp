@@ -15,6 +15,17 @@
 
 namespace cles::core {
 
+/// Which request a reply is for, and how it is sent.
+struct reply_to {
+    std::uint64_t id = 0; ///< 0: the request had none
+    bool wanted = true;
+    bool urgent = false;
+
+    reply_to(std::uint64_t of, bool reply_wanted, bool hurry = false) noexcept
+        : id(of), wanted(reply_wanted), urgent(hurry && of != 0) {} // without an id the order counts
+    explicit reply_to(const protocol::request_line& r) noexcept : reply_to(r.id, r.wants_reply, r.urgent) {}
+};
+
 /// Writes the replies of one link: a handler's result, or the error that it has to become.
 class reply_writer {
   public:
@@ -36,24 +47,27 @@ class reply_writer {
         const auto body = text.size();
         json_writer writer{text};
         std::forward<F>(write)(writer);
-        send(r.id, r.wants_reply, text, body);
+        send(reply_to{r}, text, body);
         constexpr std::size_t roomy = 65536;
         if (text.capacity() <= roomy) {
             spare_ = std::move(text);
         }
     }
     /// A reply with this body; empty for {}.
-    void done(std::uint64_t id, bool wanted, std::string_view body);
-    void fail(std::uint64_t id, bool wanted, const protocol::failure& why);
+    void done(reply_to where, std::string_view body);
+    void fail(reply_to where, const protocol::failure& why);
     /// The same, where it is not the reply to the request of that id which is in flight.
-    void fail_apart(std::uint64_t id, bool wanted, const protocol::failure& why);
-    void fail(const protocol::request_line& r, const protocol::failure& why) { fail(r.id, r.wants_reply, why); }
+    void fail_apart(reply_to where, const protocol::failure& why);
+    void fail(const protocol::request_line& r, const protocol::failure& why) { fail(reply_to{r}, why); }
     void fail(const protocol::request_line& r, errc code, std::string message) {
-        fail(r.id, r.wants_reply, {.code = code, .message = std::move(message)});
+        fail(reply_to{r}, {.code = code, .message = std::move(message)});
     }
 
   private:
-    void send(std::uint64_t id, bool wanted, std::string& text, std::size_t body);
+    [[nodiscard]] std::string& output_for(reply_to where) {
+        return where.urgent ? out_.urgent_output() : out_.output();
+    }
+    void send(reply_to where, std::string& text, std::size_t body);
     void note(std::uint64_t id, std::string_view reply);
 
     node& node_;

@@ -46,10 +46,24 @@ bool take(Target& target, const std::optional<Source>& source) {
     return source.has_value();
 }
 
-enum class known : std::uint8_t { id, deadline, reply, hops, progress, lease, every, keep, seq, epoch, via, none };
+enum class known : std::uint8_t {
+    id,
+    deadline,
+    reply,
+    hops,
+    progress,
+    urgent,
+    lease,
+    every,
+    keep,
+    seq,
+    epoch,
+    via,
+    none
+};
 
-constexpr std::array<std::string_view, 11> known_keys{"id",    "deadline", "reply", "hops",  "progress", "lease",
-                                                      "every", "keep",     "seq",   "epoch", "via"};
+constexpr std::array<std::string_view, 12> known_keys{"id",    "deadline", "reply", "hops", "progress", "urgent",
+                                                      "lease", "every",    "keep",  "seq",  "epoch",    "via"};
 
 constexpr std::uint8_t on(std::initializer_list<verb> verbs) {
     std::uint8_t mask = 0;
@@ -60,11 +74,12 @@ constexpr std::uint8_t on(std::initializer_list<verb> verbs) {
 }
 
 constexpr std::uint8_t on_all = on({verb::pull, verb::push, verb::delegate, verb::bind, verb::update});
-constexpr std::array<std::uint8_t, 11> known_on{on_all,
+constexpr std::array<std::uint8_t, 12> known_on{on_all,
                                                 on_all,
                                                 on({verb::push, verb::update}),
                                                 on_all,
                                                 on({verb::delegate}),
+                                                on({verb::pull, verb::push, verb::delegate}),
                                                 on({verb::bind}),
                                                 on({verb::bind}),
                                                 on({verb::bind}),
@@ -98,6 +113,7 @@ bool apply(known k, std::string_view value, request_line& out) {
         }
         return false;
     case known::progress: out.wants_progress = true; return value == "yes";
+    case known::urgent: out.urgent = true; return value == "yes";
     case known::lease: {
         auto lease = parse_number(value);
         if (!lease && is_number(value)) {
@@ -244,6 +260,9 @@ void append_request(std::string& out, const request_text& request) {
     }
     if (request.wants_progress) {
         out.append(" progress=yes");
+    }
+    if (request.urgent) {
+        out.append(" urgent=yes");
     }
     if (request.lease_ms) {
         append_adverb(out, "lease", *request.lease_ms);

@@ -36,6 +36,7 @@ struct request_line {
     std::uint32_t deadline_ms = default_deadline_ms;
     bool wants_reply = true;
     bool wants_progress = false;
+    bool urgent = false;
     std::uint8_t hops = 8;
     std::optional<std::uint32_t> lease_ms;
     std::uint32_t every_ms = 0; ///< 0: every update
@@ -72,6 +73,7 @@ struct request_text {
     std::uint32_t deadline_ms = 0;
     bool wants_reply = true;
     bool wants_progress = false;
+    bool urgent = false;
     std::optional<std::uint32_t> lease_ms{};
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;

@@ -67,6 +67,7 @@ class connection final : public link_events,
 
     // outlet
     std::string& output() override { return link_->output(); }
+    std::string& urgent_output() override { return link_->urgent_output(); }
     [[nodiscard]] std::size_t datagram() const noexcept override { return link_->datagram(); }
     void wake() override;
     [[nodiscard]] bool is_behind() const override;

@@ -155,20 +155,20 @@ void engine::set_peer(std::string_view name, std::string_view where) {
     recent_route_ = nullptr;
 }
 
-shell::route* engine::route_to(std::string_view target, std::string_view at, boost::system::error_code& code,
-                               std::string& why) {
-    if (!at.empty()) {
-        return find_route(target, at, code, why);
+shell::route* engine::route_to(std::string_view target, std::string_view at, bool urgent,
+                               boost::system::error_code& code, std::string& why) {
+    if (!at.empty() || urgent) {
+        return find_route(target, at, urgent, code, why);
     }
     if (recent_route_ == nullptr || recent_target_ != target) {
-        recent_route_ = find_route(target, at, code, why);
+        recent_route_ = find_route(target, at, false, code, why);
         recent_target_ = target;
     }
     return recent_route_;
 }
 
-shell::route* engine::find_route(std::string_view target, std::string_view at, boost::system::error_code& code,
-                                 std::string& why) {
+shell::route* engine::find_route(std::string_view target, std::string_view at, bool urgent,
+                                 boost::system::error_code& code, std::string& why) {
     std::string address{at};
     if (address.empty() && (target == "self" || target == node_->name)) {
         address = "inproc://" + listeners_.self_door();
@@ -178,7 +178,8 @@ shell::route* engine::find_route(std::string_view target, std::string_view at, b
     if (address.empty() && transport::is_open(listeners_.shared_door(target))) {
         address = "inproc://" + listeners_.shared_door(target);
     }
-    if (const auto found = routes_.find(address); found != routes_.end()) {
+    const auto key = urgent ? address + " urgent" : address;
+    if (const auto found = routes_.find(key); found != routes_.end()) {
         return found->second.get();
     }
     try {
@@ -197,7 +198,7 @@ shell::route* engine::find_route(std::string_view target, std::string_view at, b
             recent_route_ = nullptr;
         }
         auto made = std::make_shared<shell::route>(shared_from_this(), where);
-        return routes_.emplace(address, std::move(made)).first->second.get();
+        return routes_.emplace(key, std::move(made)).first->second.get();
     } catch (const error& e) {
         code = e.code();
         why = e.message();
@@ -229,7 +230,7 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
         fail_later(std::move(operation), code, std::move(why));
         return 0;
     }
-    auto* r = route_to(noun.target, options.at_, code, why);
+    auto* r = route_to(noun.target, options.at_, options.urgent_, code, why);
     if (r == nullptr) {
         fail_later(std::move(operation), code, std::move(why));
         return 0;
@@ -245,6 +246,7 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
              .noun = request.noun,
              .body = request.body,
              .id = id,
+             .urgent = options.urgent_,
              .begun = begun,
              .deadline = begun + limit},
             std::move(operation), options.on_progress_);

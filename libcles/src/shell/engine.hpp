@@ -72,8 +72,8 @@ class engine final : public std::enable_shared_from_this<engine> {
 
     // For the feeds.
     [[nodiscard]] shell::feed_links& feeds() noexcept { return feeds_; }
-    /// The route for a target, or null with the reason in `code` and `why`.
-    shell::route* route_to(std::string_view target, std::string_view at, boost::system::error_code& code,
+    /// The route for a target, or null with the reason in `code` and `why`. What is urgent has links of its own.
+    shell::route* route_to(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
                            std::string& why);
     [[nodiscard]] std::uint64_t draw_id() noexcept { return node_->next_id++; }
     /// A feed no longer waits for a link.
@@ -82,7 +82,7 @@ class engine final : public std::enable_shared_from_this<engine> {
   private:
     void ask_for_turn();
     void turn();
-    shell::route* find_route(std::string_view target, std::string_view at, boost::system::error_code& code,
+    shell::route* find_route(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
                              std::string& why);
     void check_path(std::string_view noun) const;
 

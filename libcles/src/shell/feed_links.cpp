@@ -123,7 +123,7 @@ void feed_links::bind(core::feed_machine& feed) {
     }
     boost::system::error_code code;
     std::string why;
-    auto* r = engine_.route_to(feed.target(), found->second.terms.at, code, why);
+    auto* r = engine_.route_to(feed.target(), found->second.terms.at, false, code, why);
     if (r == nullptr) {
         refuse_later(feed, code, why);
         return;

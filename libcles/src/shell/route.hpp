@@ -31,6 +31,7 @@ class route : public std::enable_shared_from_this<route> {
         std::string_view noun;
         std::string_view body;
         std::uint64_t id = 0;
+        bool urgent = false;
         time_point begun{};
         time_point deadline{};
     };
@@ -64,6 +65,7 @@ class route : public std::enable_shared_from_this<route> {
         std::string noun;
         std::string body;
         std::uint64_t id = 0;
+        bool urgent = false;
         time_point deadline{};
         detail::pending_ptr operation;
         core::outbound::progress_function progress;

@@ -14,7 +14,9 @@ using boost::system::error_code;
 namespace {
 
 constexpr int lines_per_turn = 1024;
-constexpr std::size_t roomy = 262144; // buffers that grew past this are given back
+constexpr std::size_t bytes_per_turn = 65536; // of what is written in answer
+constexpr std::size_t piece = 65536;          // sent as one, before what is urgent has another chance
+constexpr std::size_t roomy = 262144;         // buffers that grew past this are given back
 
 } // namespace
 
@@ -100,8 +102,9 @@ void stream_link::hand_over() {
 bool stream_link::hand_over_batch() {
     const auto owner = owner_;
     int turn = lines_per_turn;
+    const auto enough = written() + bytes_per_turn;
     bool more = true;
-    while (more && turn-- > 0 && !paused_ && state_ == state::open) {
+    while (more && turn-- > 0 && written() < enough && !paused_ && state_ == state::open) {
         std::string_view line;
         switch (input_.next(line)) {
         case protocol::line_buffer::status::line: owner->on_line(line); break;
@@ -155,7 +158,14 @@ void stream_link::pause(bool stop) {
 // -- writing -------------------------------------------------------------------------------------------------------
 
 void stream_link::flush() {
-    if (state_ == state::closed || state_ == state::discarding || output_.empty() || !sending_.empty()) {
+    if (state_ == state::closed || state_ == state::discarding || !sending_.empty()) {
+        return;
+    }
+    if (!urgent_.empty()) {
+        output_.insert(0, urgent_);
+        urgent_.clear();
+    }
+    if (output_.empty()) {
         return;
     }
     error_code code;
@@ -179,10 +189,20 @@ void stream_link::flush() {
     write_rest();
 }
 
+// As far as to the end of a line, where what is urgent may pass: of this one, if it waits already.
 void stream_link::write_rest() {
+    const auto line = sending_.find('\n', sending_at_ + (urgent_.empty() ? piece : 0));
+    const auto end = line == std::string::npos ? sending_.size() : line + 1;
     socket_.async_send(
-        asio::buffer(sending_.data() + sending_at_, sending_.size() - sending_at_),
+        asio::buffer(sending_.data() + sending_at_, end - sending_at_),
         [self = shared_from_this()](error_code code, std::size_t count) { self->on_written(code, count); });
+}
+
+void stream_link::let_urgent_pass() {
+    if (!urgent_.empty() && sending_[sending_at_ - 1] == '\n') {
+        sending_.insert(sending_at_, urgent_);
+        urgent_.clear();
+    }
 }
 
 void stream_link::on_written(error_code code, std::size_t count) {
@@ -196,6 +216,7 @@ void stream_link::on_written(error_code code, std::size_t count) {
     sent_ += count;
     sending_at_ += count;
     if (sending_at_ < sending_.size()) {
+        let_urgent_pass();
         write_rest();
         return;
     }

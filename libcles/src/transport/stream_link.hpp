@@ -28,9 +28,10 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
 
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }
+    std::string& urgent_output() override { return urgent_; }
     void flush() override;
     [[nodiscard]] std::size_t unsent() const noexcept override {
-        return output_.size() + sending_.size() - sending_at_;
+        return urgent_.size() + output_.size() + sending_.size() - sending_at_;
     }
     [[nodiscard]] std::uint64_t sent() const noexcept override { return sent_; }
     [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
@@ -46,8 +47,10 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void on_read(boost::system::error_code code, std::size_t count);
     void hand_over();
     bool hand_over_batch();
+    [[nodiscard]] std::uint64_t written() const noexcept { return sent_ + unsent(); }
     void continue_later();
     void write_rest();
+    void let_urgent_pass();
     void on_written(boost::system::error_code code, std::size_t count);
     void say_goodbye();
     void discard();
@@ -59,6 +62,7 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     std::shared_ptr<link_events> owner_;
     protocol::line_buffer input_;
     std::string output_;
+    std::string urgent_;  // goes before it
     std::string sending_; // what the socket did not take at once
     std::string nowhere_; // where input goes that is discarded
     std::size_t sending_at_ = 0;
