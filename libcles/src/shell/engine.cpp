@@ -47,7 +47,8 @@ void check_node_name(const std::string& name) {
 } // namespace
 
 engine::engine(asio::any_io_executor executor, service_options options)
-    : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks) {
+    : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks),
+      multicast_(options.multicast) {
     check_node_name(options.name);
     for (const auto& [name, where] : options.peers) {
         set_peer(name, where);
@@ -66,6 +67,10 @@ void engine::start(const std::vector<std::string>& listen_at) {
     });
     for (const auto& where : listen_at) {
         listen(where);
+    }
+    if (multicast_.is_on()) {
+        group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
+        group_->start();
     }
     listeners_.open_local_doors();
 }
@@ -344,6 +349,9 @@ void engine::stop() {
         }
     };
     feeds_.stop();
+    if (group_) {
+        group_->close();
+    }
     tell(node_->published.take_waiters());
     recent_route_ = nullptr;
     for (auto routes = std::exchange(routes_, {}); const auto& [where, r] : routes) {
