@@ -69,10 +69,21 @@ void engine::start(const std::vector<std::string>& listen_at) {
         listen(where);
     }
     if (multicast_.is_on()) {
-        group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
-        group_->start();
+        join_group();
     }
     listeners_.open_local_doors();
+}
+
+void engine::join_group() {
+    try {
+        group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
+        group_->start();
+    } catch (const error& e) {
+        if (multicast_.required) {
+            throw;
+        }
+        say(log_level::warning, "no multicast: " + e.message());
+    }
 }
 
 // -- links ---------------------------------------------------------------------------------------------------------
@@ -349,10 +360,10 @@ void engine::stop() {
         }
     };
     feeds_.stop();
-    if (group_) {
-        group_->close();
-    }
     tell(node_->published.take_waiters());
+    if (group_) {
+        group_->stop();
+    }
     recent_route_ = nullptr;
     for (auto routes = std::exchange(routes_, {}); const auto& [where, r] : routes) {
         tell(r->stop());

@@ -83,6 +83,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     void forget_waiting(const core::feed_machine& feed);
 
   private:
+    void join_group();
     void ask_for_turn();
     void turn();
     shell::route* find_route(std::string_view target, std::string_view at, boost::system::error_code& code,
