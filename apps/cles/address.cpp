@@ -11,6 +11,8 @@
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
+#include <cstdlib>
+
 namespace tool {
 namespace {
 
@@ -24,15 +26,21 @@ void check_url(const std::string& text) {
 } // namespace
 
 void address_book::add_options(CLI::App& command) {
-    auto* at = command.add_option("-a,--at", at_, "Where the node is (default " + std::string{default_url} + ")");
-    at->type_name("URL")->envname("CLES_AT");
+    auto* at = command.add_option("-a,--at", at_,
+                                  "Where the node is (default CLES_AT, or else " + std::string{default_url} + ")");
+    at->type_name("URL");
     auto* peer = command.add_option("-p,--peer", peers_, "Where a node of that name is; may be repeated");
     peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
 }
 
+std::string address_book::at() const {
+    const char* otherwise = std::getenv("CLES_AT");
+    return at_.empty() && otherwise != nullptr ? otherwise : at_;
+}
+
 void address_book::check() const {
-    if (!at_.empty()) {
-        check_url(at_);
+    if (const auto where = at(); !where.empty()) {
+        check_url(where);
     }
     for (const auto& peer : peers_) {
         const auto equals = peer.find('=');
@@ -60,11 +68,12 @@ std::string address_book::url_for(std::string_view node) const {
     if (peers().contains(std::string{node})) {
         return {};
     }
-    if (at_.empty() && !peers_.empty()) {
+    const auto where = at();
+    if (where.empty() && !peers_.empty()) {
         throw cles::error(cles::errc::no_target,
                           "no --peer is called '" + std::string{node} + "', and there is no --at");
     }
-    return at_.empty() ? std::string{default_url} : at_;
+    return where.empty() ? std::string{default_url} : where;
 }
 
 std::string address_book::where_is(std::string_view node) const {

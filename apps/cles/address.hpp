@@ -30,9 +30,13 @@ class address_book {
     /// As above, but a peer's own URL.
     [[nodiscard]] std::string where_is(std::string_view node) const;
 
+    /// On the command line, and not in the environment.
+    [[nodiscard]] bool has_at() const noexcept { return !at_.empty(); }
     void set_at(std::string url) { at_ = std::move(url); }
 
   private:
+    [[nodiscard]] std::string at() const;
+
     std::string at_;
     std::vector<std::string> peers_;
 };

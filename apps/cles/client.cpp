@@ -24,20 +24,23 @@ namespace asio = boost::asio;
 
 namespace {
 
-cles::service_options options_of(const address_book& addresses, int verbosity) {
+cles::service_options options_of(const address_book& addresses, int verbosity,
+                                 const cles::multicast_options& multicast) {
     addresses.check();
     cles::service_options options;
     options.name = "cles-" + std::to_string(::getpid());
     options.peers = addresses.peers();
     options.log = log_of_client(verbosity);
+    options.multicast = multicast;
+    options.insecure = true; // nothing is served here
     return options;
 }
 
 } // namespace
 
-client::client(const address_book& addresses, int verbosity)
+client::client(const address_book& addresses, int verbosity, const cles::multicast_options& multicast)
     : addresses_(addresses), signals_(io_, SIGINT, SIGTERM), end_timer_(io_), output_timer_(io_), sleep_timer_(io_),
-      node_(io_, options_of(addresses, verbosity)) {}
+      node_(io_, options_of(addresses, verbosity, multicast)) {}
 
 cles::call_options client::options_for(std::string_view noun, std::optional<std::chrono::milliseconds> limit) const {
     cles::call_options options;

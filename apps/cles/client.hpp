@@ -23,7 +23,8 @@ namespace tool {
 /// when nobody reads its output any more; a request in flight is then withdrawn.
 class client {
   public:
-    client(const address_book& addresses, int verbosity);
+    /// `multicast`: where it takes part; nowhere, if nothing is said.
+    client(const address_book& addresses, int verbosity, const cles::multicast_options& multicast = {});
 
     cles::service& node() noexcept { return node_; }
     boost::asio::io_context& context() noexcept { return io_; }

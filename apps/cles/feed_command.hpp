@@ -4,6 +4,7 @@
 #include <cles/call_options.hpp>
 
 #include "address.hpp"
+#include "multicast_option.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -21,6 +22,7 @@ class client;
 /// What commands have in common that bind: to what, where, and for how long.
 struct feed_command {
     address_book addresses{};
+    multicast_option multicast{};
     std::string noun{};
     std::optional<std::chrono::milliseconds> timeout{};
     std::chrono::milliseconds every{0};
@@ -29,6 +31,10 @@ struct feed_command {
     std::uint64_t count = 0;
 
     void add_options(CLI::App& command, const std::string& count_help);
+    /// Whether the group is bound, and no link: `all:` where no address was given, and what --multicast asks for.
+    [[nodiscard]] bool is_multicast() const;
+    /// Where the client that binds takes part in multicast.
+    [[nodiscard]] cles::multicast_options group() const;
     [[nodiscard]] cles::bind_options options(const client& asker) const;
     /// Has the client end when the duration is over, if one was given.
     void arm(client& asker) const;

@@ -189,7 +189,7 @@ void add_hz(CLI::App& app, context& shared) {
                     "  cles hz car1:localization --duration 10s -o json | tail -1 | jq .rate");
     command->callback([wanted, &shared] {
         check_noun(wanted->feed.noun);
-        client asker{wanted->feed.addresses, shared.verbosity};
+        client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.group()};
         wanted->feed.arm(asker);
         rate_meter meter{asker, *wanted};
         shared.exit_code = asker.run(meter.run());

@@ -7,6 +7,7 @@
 #include "exit_code.hpp"
 #include "failure.hpp"
 #include "logging.hpp"
+#include "multicast_option.hpp"
 #include "output.hpp"
 #include "play_node.hpp"
 
@@ -33,6 +34,7 @@ struct serve_command {
     std::vector<std::string> listen;
     bool insecure = false;
     std::vector<std::string> networks;
+    multicast_option multicast;
     double rate = 10;
     int busy_poll_us = 0;
     int real_time = 0;
@@ -52,6 +54,7 @@ cles::service_options options_of(const serve_command& wanted, const cles::log_si
     }
     options.insecure = wanted.insecure;
     options.networks = wanted.networks;
+    options.multicast = wanted.multicast.where();
     options.log = log;
     return options;
 }
@@ -103,20 +106,22 @@ void add_serve(CLI::App& app, context& shared) {
         ->type_name("PRIO")
         ->check(CLI::Range(1, 99).description(""));
     command->add_flag("--insecure", wanted->insecure,
-                      "Allow listening beyond this host, where anybody may ask for anything");
+                      "Allow listening and multicast beyond this host, where anybody may ask for anything");
     command
         ->add_option("--network", wanted->networks,
                      "Hosts that may be sent as much by UDP as they ask for, as in 10.0.0.0/8; may be repeated")
         ->type_name("NETWORK")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    wanted->multicast.add_to(*command, "By which interface it publishes to whoever binds by multicast");
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
                     "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop it.\n\n"
                     "Examples:\n"
                     "  cles serve\n"
                     "  cles serve --name car2 --listen tcp://127.0.0.1:0 --listen unix:///tmp/car2.sock --rate 50\n"
                     "  cles serve --listen tcp://0.0.0.0 --insecure\n"
-                    "  cles serve --listen tcp://127.0.0.1 --listen udp://127.0.0.1");
+                    "  cles serve --listen tcp://127.0.0.1 --listen udp://127.0.0.1\n"
+                    "  cles serve --multicast eth0 --insecure");
     command->callback([wanted, &shared] { shared.exit_code = serve(*wanted, shared.verbosity); });
 }
 

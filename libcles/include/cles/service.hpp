@@ -7,6 +7,7 @@
 #include <cles/identity.hpp>
 #include <cles/limits.hpp>
 #include <cles/log.hpp>
+#include <cles/multicast.hpp>
 #include <cles/pending.hpp>
 #include <cles/registrar.hpp>
 #include <cles/reply_operation.hpp>
@@ -44,6 +45,8 @@ struct service_options {
     /// Networks ("10.0.0.0/8", "fd00::/8") whose hosts are who they say, so that as much is sent to them by UDP as they
     /// ask for. All others but loopback get less than 64 KiB a second, lest the node be used to flood a third party.
     std::vector<std::string> networks{};
+    /// Whether and where it takes part in multicast; beyond loopback only where it is `insecure` too.
+    multicast_options multicast{};
     cles::limits limits{};
     authoriser authorise{}; ///< nobody is refused where it is empty
     log_sink log{};
@@ -83,8 +86,8 @@ struct outgoing {
 class service : public registrar {
   public:
     /// Starts listening at once; accepting begins when the executor runs.
-    /// \throws cles::error: `invalid_name`, `invalid_url` (of a network too), `unknown_scheme`, `insecure_listen`, or
-    /// the system's code where an address cannot be had (the message names it)
+    /// \throws cles::error: `invalid_name`, `invalid_url` (of a network or multicast group too), `unknown_scheme`,
+    /// `insecure_listen`, or the system's code where an address or interface cannot be had (the message names it)
     service(boost::asio::any_io_executor executor, service_options options);
     template <std::derived_from<boost::asio::execution_context> Context>
     service(Context& context, service_options options)

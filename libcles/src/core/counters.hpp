@@ -25,11 +25,16 @@ struct counters {
     std::uint64_t updates_dropped = 0;   ///< unwanted, repeated or malformed
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to strangers who would have got too much
+    std::uint64_t group_received = 0;     ///< datagrams of the multicast group, other than its own
+    std::uint64_t group_dropped = 0;      ///< of these: neither BIND nor update, or malformed, or past a limit
+    std::uint64_t group_sent = 0;
+    std::uint64_t group_unsent = 0; ///< too large, or too much waited already
     std::uint64_t links_accepted = 0;
     std::uint64_t links_refused = 0;
     std::uint64_t links_lost = 0;
     std::uint64_t bytes_received = 0;
     std::uint64_t bytes_sent = 0;
+    std::uint64_t group_leases = 0; ///< that live now
     std::uint64_t links_open = 0;
     std::uint64_t handlers_running = 0;
 };

@@ -47,7 +47,8 @@ void check_node_name(const std::string& name) {
 } // namespace
 
 engine::engine(asio::any_io_executor executor, service_options options)
-    : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks) {
+    : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks),
+      multicast_(options.multicast) {
     check_node_name(options.name);
     for (const auto& [name, where] : options.peers) {
         set_peer(name, where);
@@ -67,7 +68,22 @@ void engine::start(const std::vector<std::string>& listen_at) {
     for (const auto& where : listen_at) {
         listen(where);
     }
+    if (multicast_.is_on()) {
+        join_group();
+    }
     listeners_.open_local_doors();
+}
+
+void engine::join_group() {
+    try {
+        group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
+        group_->start();
+    } catch (const error& e) {
+        if (multicast_.required) {
+            throw;
+        }
+        say(log_level::warning, "no multicast: " + e.message());
+    }
 }
 
 // -- links ---------------------------------------------------------------------------------------------------------
@@ -347,6 +363,9 @@ void engine::stop() {
     };
     feeds_.stop();
     tell(node_->published.take_waiters());
+    if (group_) {
+        group_->stop();
+    }
     recent_route_ = nullptr;
     for (auto routes = std::exchange(routes_, {}); const auto& [where, r] : routes) {
         tell(r->stop());

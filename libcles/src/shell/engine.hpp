@@ -13,6 +13,7 @@
 #include "shell/connections.hpp"
 #include "shell/deadline_timer.hpp"
 #include "shell/feed_links.hpp"
+#include "shell/group.hpp"
 #include "shell/listeners.hpp"
 #include "shell/networks.hpp"
 #include "shell/route.hpp"
@@ -54,6 +55,8 @@ class engine final : public std::enable_shared_from_this<engine> {
     [[nodiscard]] std::string stranger(const identity& peer) const;
     void say(log_level level, std::string_view text) const { node_->say(level, text); }
     [[nodiscard]] shell::connections& connections() noexcept { return connections_; }
+    /// The multicast group; null where it is off.
+    [[nodiscard]] shell::group* group() noexcept { return group_.get(); }
     /// A connection has ended.
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
     /// Has its output written when what runs now has ended.
@@ -80,6 +83,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     void forget_waiting(const core::feed_machine& feed);
 
   private:
+    void join_group();
     void ask_for_turn();
     void turn();
     shell::route* find_route(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
@@ -92,6 +96,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     std::shared_ptr<shell::deadline_timer> timer_;
     bool insecure_;
     shell::networks networks_;
+    multicast_options multicast_;
     core::directory directory_;
     shell::listeners listeners_{*this};
     shell::connections connections_{*this};
@@ -99,6 +104,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     std::string recent_target_; // most requests go where the one before went
     shell::route* recent_route_ = nullptr;
     shell::feed_links feeds_{*this};
+    std::unique_ptr<shell::group> group_;
     std::vector<std::shared_ptr<shell::connection>> to_flush_;
     std::vector<std::shared_ptr<shell::connection>> flushing_;
     std::uint64_t published_at_last_turn_ = 0;

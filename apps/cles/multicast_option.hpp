@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/multicast.hpp>
+
+#include <string>
+
+namespace CLI {
+class App;
+}
+
+namespace tool {
+
+/// --multicast: by which interface the command takes part in multicast. Where it is not given, CLES_MULTICAST says so;
+/// where that is not set either, it is loopback, as far as that can be joined.
+class multicast_option {
+  public:
+    /// `help` says what the command does with it.
+    void add_to(CLI::App& command, const std::string& help);
+
+    /// On the command line, and not in the environment.
+    [[nodiscard]] bool is_given() const noexcept { return !given_.empty(); }
+    /// \throws usage_error where it makes no sense
+    [[nodiscard]] cles::multicast_options where() const;
+
+  private:
+    std::string given_;
+};
+
+} // namespace tool

@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "core/group_bindings.hpp"
+#include "core/group_feeds.hpp"
+#include "core/group_output.hpp"
+#include "core/group_source.hpp"
+#include "core/node.hpp"
+#include "protocol/message.hpp"
+
+#include <cstdint>
+#include <string_view>
+
+namespace cles::core {
+
+/// What is told of the reserved task by the group.
+class group_presence {
+  public:
+    group_presence() = default;
+    group_presence(const group_presence&) = delete;
+    group_presence& operator=(const group_presence&) = delete;
+    /// `BIND all:cles`: somebody asks who is there.
+    virtual void on_solicitation(time_point now) = 0;
+    /// `UPDATE car1:cles seq= epoch= {...}` of another node, its body valid JSON; views are valid for the call.
+    virtual void on_announcement(const group_source& from, const protocol::request_line& update, time_point now) = 0;
+
+  protected:
+    ~group_presence() = default;
+};
+
+/// What a node makes of what it hears in its multicast group (docs/protocol.md, "Multicast"): BIND of `all:` or of a
+/// node's name, and updates. All else is dropped and counted, and nothing is ever answered there.
+class group_session {
+  public:
+    /// `self`: where what this node sends comes from.
+    group_session(node& host, const group_source& self, group_output& out, std::uint32_t seed)
+        : node_(host), self_(self), bindings_(host, out, seed), feeds_(host, out, ~seed) {}
+
+    /// Who hears of the reserved task from now on; null: nobody. It must outlive this.
+    void attend(group_presence* presence) noexcept { presence_ = presence; }
+
+    /// What others are bound to here.
+    [[nodiscard]] group_bindings& bindings() noexcept { return bindings_; }
+    /// What this node is bound to.
+    [[nodiscard]] group_feeds& feeds() noexcept { return feeds_; }
+
+    void on_datagram(const group_source& from, std::string_view datagram, time_point now);
+
+  private:
+    bool serve(const group_source& from, std::string_view datagram, time_point now);
+    bool on_bind(const group_source& from, const protocol::request_line& bind, time_point now);
+    [[nodiscard]] bool permits(const group_source& from, const protocol::request_line& bind) const;
+    bool on_update(const group_source& from, const protocol::request_line& update, time_point now);
+
+    node& node_;
+    group_source self_;
+    group_bindings bindings_;
+    group_feeds feeds_;
+    group_presence* presence_ = nullptr;
+};
+
+} // namespace cles::core

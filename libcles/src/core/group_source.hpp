@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <boost/container_hash/hash.hpp>
+
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+namespace cles::core {
+
+/// Who sent a datagram to the group: the IPv4 address and port of a socket that is one node's for as long as it runs.
+struct group_source {
+    std::uint32_t address = 0; ///< 127.0.0.1 is 0x7f000001
+    std::uint16_t port = 0;
+
+    auto operator<=>(const group_source&) const = default;
+    [[nodiscard]] bool is_loopback() const noexcept { return address >> 24U == 127; }
+};
+
+inline std::size_t hash_value(const group_source& s) noexcept {
+    std::size_t seed = s.port;
+    boost::hash_combine(seed, s.address);
+    return seed;
+}
+
+/// "10.0.0.2"
+inline std::string host_text(const group_source& s) {
+    std::string text;
+    for (const unsigned shift : {24U, 16U, 8U, 0U}) {
+        text.append(text.empty() ? "" : ".").append(std::to_string(s.address >> shift & 0xFFU));
+    }
+    return text;
+}
+
+} // namespace cles::core

@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/group.hpp"
+
+#include "protocol/datagram.hpp"
+#include "shell/engine.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <random>
+#include <string>
+#include <utility>
+
+namespace cles::shell {
+namespace {
+
+core::group_source source_of(const boost::asio::ip::udp::endpoint& end) {
+    return {.address = end.address().to_v4().to_uint(), .port = end.port()};
+}
+
+std::string text_of(const boost::asio::ip::udp::endpoint& end) {
+    return end.address().to_string() + ":" + std::to_string(end.port());
+}
+
+std::shared_ptr<transport::group_port> join(detail::engine& host, const multicast_options& where, bool insecure) {
+    check(where);
+    const auto cannot =
+        "cannot join " + where.group + ":" + std::to_string(where.port) + " on '" + where.interface + "': ";
+    try {
+        const auto by = transport::find_interface(where.interface);
+        if (!by.loopback && !insecure) {
+            throw error(errc::insecure_listen, "multicast on '" + where.interface +
+                                                   "' can be reached from other hosts, and nobody proves who they "
+                                                   "are; say 'insecure' if that is meant");
+        }
+        auto made = std::make_shared<transport::group_port>(host.executor(), by, where);
+        host.say(log_level::info, host.node().name + " takes part in " + text_of(made->group()) + " on " +
+                                      where.interface + ", sending from " + text_of(made->source()));
+        return made;
+    } catch (const error&) {
+        throw;
+    } catch (const boost::system::system_error& e) {
+        throw error(e.code(), cannot + e.code().message());
+    }
+}
+
+} // namespace
+
+group::group(detail::engine& host, const multicast_options& where, bool insecure)
+    : engine_(host), port_(join(host, where, insecure)), source_(source_of(port_->source())),
+      session_(host.node(), source_, *this, std::random_device{}()) {}
+
+group::~group() { port_->close(); }
+
+void group::start() { port_->start(*this); }
+
+void group::stop() {
+    for (auto* feed : session_.feeds().remove_all()) {
+        if (auto waiting = feed->mail().close()) {
+            boost::asio::post(engine_.executor(), [waiting = std::move(waiting)]() mutable {
+                waiting.release()->fail(errc::stopped, "the service has been stopped");
+            });
+        }
+    }
+    session_.bindings().clear();
+    port_->close();
+}
+
+bool group::send(std::string_view line) {
+    auto& counts = engine_.node().counts;
+    if (line.size() > protocol::datagram_bytes || !port_->send(line)) {
+        ++counts.group_unsent;
+        return false;
+    }
+    ++counts.group_sent;
+    return true;
+}
+
+void group::on_datagram(const boost::asio::ip::udp::endpoint& from, std::string_view datagram) {
+    const auto keep = engine_.shared_from_this();
+    session_.on_datagram(source_of(from), datagram, engine_.now());
+}
+
+void group::on_batch() { engine_.settle(); }
+
+void group::on_room() {
+    const auto keep = engine_.shared_from_this();
+    session_.bindings().drain(engine_.now());
+    engine_.settle();
+}
+
+} // namespace cles::shell

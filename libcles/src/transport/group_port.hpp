@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/multicast.hpp>
+
+#include "transport/ip_interface.hpp"
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/ip/udp.hpp>
+
+#include <array>
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::transport {
+
+/// What comes from a multicast group, on the port's executor.
+class group_events {
+  public:
+    group_events() = default;
+    group_events(const group_events&) = delete;
+    group_events& operator=(const group_events&) = delete;
+    /// What came in a datagram, its own ones too; valid for the call.
+    virtual void on_datagram(const boost::asio::ip::udp::endpoint& from, std::string_view datagram) = 0;
+    /// All that there was has been handed over.
+    virtual void on_batch() = 0;
+    /// What had to wait has been sent.
+    virtual void on_room() = 0;
+
+  protected:
+    ~group_events() = default;
+};
+
+/// A node's place in a multicast group, by one interface: the shared port, at which all nodes of the host hear the
+/// group and nothing else (no unicast, no other group or interface), and a socket of its own to send from, which tells
+/// the others who it is for as long as the node runs.
+class group_port : public std::enable_shared_from_this<group_port> {
+  public:
+    using udp = boost::asio::ip::udp;
+
+    /// Joins. \throws boost::system::system_error
+    group_port(const boost::asio::any_io_executor& executor, const ip_interface& by, const multicast_options& where);
+
+    /// Begins to hand over what comes, up to a number of datagrams a turn; nothing is allocated for one. The owner
+    /// stays until `close`.
+    void start(group_events& owner);
+    /// Sends a line, its LF included, as one datagram; what finds no room in the socket waits for it. False where as
+    /// much waits as may. A datagram that cannot be sent for another reason is as good as lost on its way.
+    bool send(std::string_view line);
+    /// Bytes that wait for room.
+    [[nodiscard]] std::size_t unsent() const noexcept { return waiting_.size() - waiting_at_; }
+    void close();
+
+    /// Where what this node sends comes from.
+    [[nodiscard]] const udp::endpoint& source() const noexcept { return source_; }
+    [[nodiscard]] const udp::endpoint& group() const noexcept { return group_; }
+
+    static constexpr std::size_t most_waiting = 1U << 16U;
+
+  private:
+    void receive();
+    void on_received(boost::system::error_code code, std::size_t count);
+    bool try_to_send(std::string_view line);
+    void send_rest();
+
+    udp::endpoint group_;
+    udp::endpoint source_;
+    udp::socket shared_;
+    udp::socket own_;
+    group_events* owner_ = nullptr; // null: closed
+    udp::endpoint sender_;
+    std::array<char, 2048> buffer_{}; // more than a datagram may have: what is longer is known for it
+    std::string waiting_;
+    std::size_t waiting_at_ = 0;
+    bool waits_for_room_ = false;
+};
+
+} // namespace cles::transport

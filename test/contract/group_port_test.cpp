@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSL-1.0
+// What a multicast group is heard and spoken to by. Over loopback, with a port of the test's own.
+#include "support/group_address.hpp"
+#include "support/run_until.hpp"
+#include "transport/group_port.hpp"
+
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/ip/multicast.hpp>
+#include <boost/system/system_error.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+BOOST_AUTO_TEST_SUITE(group_port)
+
+using namespace cles::test;
+namespace asio = boost::asio;
+using asio::ip::udp;
+
+namespace {
+
+struct member final : cles::transport::group_events {
+    member(asio::io_context& io, const cles::multicast_options& where)
+        : port(std::make_shared<cles::transport::group_port>(io.get_executor(),
+                                                             cles::transport::find_interface(where.interface), where)) {
+        port->start(*this);
+    }
+    ~member() { port->close(); }
+
+    void on_datagram(const udp::endpoint& from, std::string_view datagram) override {
+        heard.emplace_back(datagram);
+        sources.push_back(from);
+        if (close_at_next) {
+            port->close();
+        }
+    }
+    void on_batch() override { ++batches; }
+    void on_room() override {}
+
+    std::shared_ptr<cles::transport::group_port> port;
+    std::vector<std::string> heard;
+    std::vector<udp::endpoint> sources;
+    int batches = 0;
+    bool close_at_next = false;
+};
+
+struct fixture {
+    asio::io_context io;
+    cles::multicast_options where = fresh_group();
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixture) {
+    member one{io, where};
+    member two{io, where};
+    BOOST_TEST(one.port->send("BIND all:x\n"));
+    run_until(io, [&] { return one.heard.size() == 1 && two.heard.size() == 1; });
+    BOOST_TEST(two.heard[0] == "BIND all:x\n");
+    BOOST_TEST((two.sources[0] == one.port->source()));
+    BOOST_TEST((one.sources[0] == one.port->source()));
+    BOOST_TEST((one.port->source() != two.port->source()));
+    BOOST_TEST(one.port->source().address().is_loopback());
+}
+
+BOOST_FIXTURE_TEST_CASE(the_shared_port_serves_the_group_alone, fixture) {
+    member one{io, where};
+    member two{io, where};
+    udp::socket plain{io, udp::v4()};
+    plain.send_to(asio::buffer("to the address", 14), {asio::ip::address_v4::loopback(), where.port});
+    auto other_group = where;
+    other_group.group = "239.255.25.38";
+    member stranger{io, other_group};
+    stranger.port->send("to another group\n");
+    two.port->send("to the group\n");
+    run_until(io, [&] { return !one.heard.empty() && !stranger.heard.empty(); });
+    run_ready(io);
+    BOOST_TEST(one.heard == std::vector<std::string>{"to the group\n"}, boost::test_tools::per_element());
+}
+
+BOOST_FIXTURE_TEST_CASE(datagrams_keep_their_order_and_their_bounds, fixture) {
+    member one{io, where};
+    member two{io, where};
+    for (int i = 0; i < 300; ++i) { // more than a turn hands over
+        one.port->send(std::to_string(i) + "\n");
+    }
+    run_until(io, [&] { return two.heard.size() == 300; });
+    for (std::size_t i = 0; i < 300; ++i) {
+        BOOST_TEST(two.heard[i] == std::to_string(i) + "\n");
+    }
+    BOOST_TEST(two.batches >= 2);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_hears_hears_no_more, fixture) {
+    member one{io, where};
+    member two{io, where};
+    two.close_at_next = true;
+    one.port->send("1\n");
+    one.port->send("2\n");
+    run_until(io, [&] { return one.heard.size() == 2; });
+    run_ready(io);
+    BOOST_TEST(two.heard.size() == 1U);
+    BOOST_TEST(two.port->send("into the void\n"));
+}
+
+BOOST_FIXTURE_TEST_CASE(datagrams_go_out_with_a_TTL_of_1, fixture) {
+    udp::socket sniffer{io, udp::v4()};
+    sniffer.set_option(asio::socket_base::reuse_address{true});
+    sniffer.bind({asio::ip::make_address_v4(where.group), where.port});
+    const auto by = cles::transport::find_interface("lo");
+    sniffer.set_option(asio::ip::multicast::join_group{asio::ip::make_address_v4(where.group), by.address});
+    const int on = 1;
+    BOOST_REQUIRE(::setsockopt(sniffer.native_handle(), IPPROTO_IP, IP_RECVTTL, &on, sizeof on) == 0);
+    sniffer.non_blocking(true);
+    member one{io, where};
+    one.port->send("x\n");
+
+    std::array<char, 64> data{};
+    alignas(cmsghdr) std::array<char, 64> control{};
+    iovec piece{.iov_base = data.data(), .iov_len = data.size()};
+    msghdr message{};
+    message.msg_iov = &piece;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    run_until(io, [&] { return ::recvmsg(sniffer.native_handle(), &message, 0) == 2; });
+    const auto* first = CMSG_FIRSTHDR(&message);
+    BOOST_REQUIRE(first != nullptr);
+    BOOST_TEST(first->cmsg_type == IP_TTL);
+    int ttl = 0;
+    std::memcpy(&ttl, CMSG_DATA(first), sizeof ttl);
+    BOOST_TEST(ttl == 1);
+}
+
+BOOST_FIXTURE_TEST_CASE(an_interface_that_is_none_is_refused, fixture) {
+    const auto code_of = [](const std::string& name) {
+        try {
+            cles::transport::find_interface(name);
+        } catch (const boost::system::system_error& e) {
+            return e.code().value();
+        }
+        return 0;
+    };
+    BOOST_TEST(code_of("nowhere0") == ENODEV);
+    BOOST_TEST(code_of("a-name-longer-than-any-interface") == ENODEV);
+    BOOST_TEST(code_of("") == ENODEV);
+    BOOST_TEST(cles::transport::find_interface("lo").loopback);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

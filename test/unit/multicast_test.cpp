@@ -1,0 +1,64 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
+#include <cles/multicast.hpp>
+
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+
+BOOST_AUTO_TEST_SUITE(multicast)
+
+namespace {
+
+std::string refusal(const std::string& text) {
+    try {
+        cles::parse_multicast(text);
+    } catch (const cles::error& e) {
+        BOOST_TEST((e.code() == cles::errc::invalid_url));
+        return e.message();
+    }
+    return {};
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_CASE(it_is_off_by_default_and_by_name) {
+    BOOST_TEST(!cles::multicast_options{}.is_on());
+    BOOST_TEST(!cles::parse_multicast("off").is_on());
+}
+
+BOOST_AUTO_TEST_CASE(an_interface_alone_takes_the_group_of_the_protocol) {
+    const auto where = cles::parse_multicast("eth0");
+    BOOST_TEST(where.interface == "eth0");
+    BOOST_TEST(where.group == "239.255.25.37");
+    BOOST_TEST(where.port == 25370);
+}
+
+BOOST_AUTO_TEST_CASE(group_and_port_may_be_named) {
+    const auto group = cles::parse_multicast("lo,239.1.2.3");
+    BOOST_TEST(group.group == "239.1.2.3");
+    BOOST_TEST(group.port == 25370);
+    const auto both = cles::parse_multicast("lo,239.1.2.3:4000");
+    BOOST_TEST(both.interface == "lo");
+    BOOST_TEST(both.group == "239.1.2.3");
+    BOOST_TEST(both.port == 4000);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_wrong_is_named) {
+    BOOST_TEST(refusal("lo,10.0.0.1").find("'10.0.0.1' is not an IPv4 multicast group") == 0U);
+    BOOST_TEST(refusal("lo,ff02::1").find("'ff02' is not") == 0U);
+    BOOST_TEST(refusal("lo,239.1.2.3:0").find("'0' in 'lo,239.1.2.3:0' is no port") == 0U);
+    BOOST_TEST(refusal("lo,239.1.2.3:70000").find("'70000'") == 0U);
+    BOOST_TEST(refusal("lo,239.1.2.3:").find("''") == 0U);
+    BOOST_TEST(refusal("").find("'' names no interface") == 0U);
+    BOOST_TEST(refusal(",239.1.2.3").find("',239.1.2.3' names no interface") == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(options_that_were_set_by_hand_are_checked_too) {
+    cles::multicast_options where{.interface = "lo", .group = "nonsense"};
+    BOOST_CHECK_THROW(cles::check(where), cles::error);
+    where = {.interface = "lo", .port = 0};
+    BOOST_CHECK_THROW(cles::check(where), cles::error);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
