@@ -13,6 +13,10 @@ cles::perf::placement places_of(const bench_options& options) {
     return cores;
 }
 
+std::chrono::nanoseconds limit_of(const bench_options& options) {
+    return options.duration ? std::chrono::nanoseconds{*options.duration} : std::chrono::nanoseconds::max();
+}
+
 const char* to_string(carrier c) {
     switch (c) {
     case carrier::tcp: return "tcp";

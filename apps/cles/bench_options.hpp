@@ -35,6 +35,9 @@ struct bench_options {
 /// The cores that the ends are to run on.
 cles::perf::placement places_of(const bench_options& options);
 
+/// How long a pass may take.
+std::chrono::nanoseconds limit_of(const bench_options& options);
+
 /// As in a URL.
 const char* to_string(carrier c);
 const char* to_string(cles::perf::handler_style s);

@@ -35,7 +35,6 @@ constexpr std::uint64_t most_per_second_alone = 1'000'000;
 constexpr std::uint64_t most_per_second_in_flight = 4'000'000;
 constexpr std::uint64_t most_recorded = 20'000'000;
 constexpr std::uint64_t counted_bytes_of = 5'000;
-constexpr auto no_limit = std::chrono::nanoseconds::max();
 
 std::uint64_t requests_of(const bench_options& options) {
     if (options.requests != 0) {
@@ -47,10 +46,6 @@ std::uint64_t requests_of(const bench_options& options) {
         return std::min(most_recorded, ms * (alone ? most_per_second_alone : most_per_second_in_flight) / 1000);
     }
     return alone ? requests_alone : requests_in_flight;
-}
-
-std::chrono::nanoseconds limit_of(const bench_options& options) {
-    return options.duration ? std::chrono::nanoseconds{*options.duration} : no_limit;
 }
 
 double microseconds(std::chrono::nanoseconds span) { return static_cast<double>(span.count()) / 1e3; }
@@ -112,7 +107,7 @@ void count_bytes(const std::string& url, const std::string& node, const std::str
     cles::service client{io, {.name = "bench", .peers = {{node, tap.url()}}}};
     perf::pull_load load{io, client, noun, options.style, false};
     perf::latency_recorder record{counted_bytes_of};
-    load.run(1, no_limit, record);
+    load.run(1, std::chrono::nanoseconds::max(), record);
     figures.request_bytes = rounded(static_cast<double>(tap.to_server()) / static_cast<double>(counted_bytes_of));
     figures.reply_bytes = rounded(static_cast<double>(tap.to_client()) / static_cast<double>(counted_bytes_of));
 }

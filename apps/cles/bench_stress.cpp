@@ -43,9 +43,7 @@ class pair_of_ends {
     }
 
     latency_figures pass(perf::latency_recorder& record) {
-        const auto limit =
-            options_.duration ? std::chrono::nanoseconds{*options_.duration} : std::chrono::nanoseconds::max();
-        load_->run(options_.in_flight, limit, record);
+        load_->run(options_.in_flight, limit_of(options_), record);
         const auto found = record.quantiles();
         return {.p50_us = found.p50, .p99_us = found.p99, .p999_us = found.p999, .max_us = found.max};
     }
