@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
+#include "bench_medians.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
 #include "perf/byte_tap.hpp"
@@ -47,8 +48,6 @@ std::uint64_t requests_of(const bench_options& options) {
     }
     return alone ? requests_alone : requests_in_flight;
 }
-
-double microseconds(std::chrono::nanoseconds span) { return static_cast<double>(span.count()) / 1e3; }
 
 /// Measures one pass: what it took, on whose processor.
 class pass_meter {

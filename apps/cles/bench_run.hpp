@@ -2,7 +2,9 @@
 #pragma once
 
 #include "bench_options.hpp"
-#include "bench_report.hpp"
+#include "bench_pull_report.hpp"
+#include "bench_stress_report.hpp"
+#include "bench_update_report.hpp"
 
 namespace tool {
 

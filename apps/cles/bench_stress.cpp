@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
+#include "bench_latency.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
 #include "diagnostics.hpp"
@@ -44,8 +45,7 @@ class pair_of_ends {
 
     latency_figures pass(perf::latency_recorder& record) {
         load_->run(options_.in_flight, limit_of(options_), record);
-        const auto found = record.quantiles();
-        return {.p50_us = found.p50, .p99_us = found.p99, .p999_us = found.p999, .max_us = found.max};
+        return to_figures(record.quantiles());
     }
 
   private:

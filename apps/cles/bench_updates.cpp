@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
+#include "bench_medians.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
 #include "perf/byte_tap.hpp"
@@ -30,8 +31,6 @@ std::uint64_t updates_of(const bench_options& options) {
     return options.requests != 0 ? options.requests
                                  : std::clamp<std::uint64_t>(deliveries_of_a_pass / options.binders, 1, most_updates);
 }
-
-double microseconds(std::chrono::nanoseconds span) { return static_cast<double>(span.count()) / 1e3; }
 
 double count_bytes(const std::string& url) {
     perf::byte_tap tap{cles::parse_url(url)};

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-/// What `cles bench` has found, as it goes into JSON and, put into words, into a table. All times are in microseconds.
+/// What PULL costs against the hand-written exchange. All times are in microseconds.
 namespace tool {
 
 /// One exchange: of one pass, or the medians over all passes.
@@ -61,73 +61,10 @@ BOOST_DESCRIBE_STRUCT(pull_report, (),
                       (bench, transport, style, in_flight, rounds, requests, busy_poll_us, client_core, server_core,
                        against, icd, icd_unix, cles, ratio))
 
-struct update_figures {
-    double deliveries_per_s = 0;
-    double updates_per_s = 0;
-    double cpu_us = 0; ///< per delivery
-    double cpu_binder_us = 0;
-    double cpu_publisher_us = 0;
-    std::uint64_t missed = 0; ///< in all passes together
-};
-BOOST_DESCRIBE_STRUCT(update_figures, (),
-                      (deliveries_per_s, updates_per_s, cpu_us, cpu_binder_us, cpu_publisher_us, missed))
-
-struct update_report {
-    std::string bench = "updates";
-    std::string transport{};
-    std::string style{};
-    std::size_t binders = 1;
-    std::size_t rounds = 0;
-    std::uint64_t updates = 0; ///< published in each pass
-    std::int64_t busy_poll_us = 0;
-    int client_core = 0;
-    int server_core = 0;
-    std::optional<double> update_bytes{};
-    update_figures raw{};
-    update_figures typed{};
-};
-BOOST_DESCRIBE_STRUCT(update_report, (),
-                      (bench, transport, style, binders, rounds, updates, busy_poll_us, client_core, server_core,
-                       update_bytes, raw, typed))
-
-struct latency_figures {
-    double p50_us = 0;
-    double p99_us = 0;
-    double p999_us = 0;
-    double max_us = 0;
-};
-BOOST_DESCRIBE_STRUCT(latency_figures, (), (p50_us, p99_us, p999_us, max_us))
-
-struct stress_report {
-    std::string bench = "stress";
-    std::string transport{};
-    std::string style{};
-    std::size_t rounds = 0;
-    std::uint64_t requests = 0; ///< in each pass
-    std::int64_t busy_poll_us = 0;
-    std::size_t processes = 0; ///< that want the cores too
-    int client_core = 0;
-    int server_core = 0;
-    latency_figures idle{};
-    std::optional<latency_figures> idle_fifo{}; ///< nothing where the system does not let us
-    latency_figures loaded{};
-    std::optional<latency_figures> loaded_fifo{};
-};
-BOOST_DESCRIBE_STRUCT(stress_report, (),
-                      (bench, transport, style, rounds, requests, busy_poll_us, processes, client_core, server_core,
-                       idle, idle_fifo, loaded, loaded_fifo))
-
-/// To three decimals: no more than the measurement is good for.
-double rounded(double value);
-
 /// Each figure's median over the passes.
 exchange_figures median_of(const std::vector<exchange_figures>& passes);
-update_figures median_of(const std::vector<update_figures>& passes);
-latency_figures median_of(const std::vector<latency_figures>& passes);
 exchange_ratio ratio_of(const exchange_figures& cles, const exchange_figures& icd);
 
 std::string table_of(const pull_report& report);
-std::string table_of(const update_report& report);
-std::string table_of(const stress_report& report);
 
 } // namespace tool

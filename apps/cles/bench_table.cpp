@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "bench_table.hpp"
+
+namespace tool {
+
+std::string fixed(std::optional<double> value, int digits) { return value ? fixed(*value, digits) : "-"; }
+
+std::string times(double ratio) { return fixed(ratio, 2) + "x"; }
+std::string times(std::optional<double> ratio) { return ratio ? times(*ratio) : "-"; }
+
+std::string cores(int client, std::optional<int> server) {
+    if (!server) {
+        return "client on core " + std::to_string(client);
+    }
+    if (*server == client) {
+        return "both ends on core " + std::to_string(client) + ": they wait for each other's turn";
+    }
+    return "client on core " + std::to_string(client) + ", server on core " + std::to_string(*server);
+}
+
+std::string polling(std::int64_t busy_poll_us) {
+    return busy_poll_us == 0 ? std::string{} : ", CLES polling up to " + std::to_string(busy_poll_us) + " us";
+}
+
+} // namespace tool

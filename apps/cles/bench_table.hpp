@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "statistics.hpp"
+#include "table.hpp"
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+/// How figures are put into a table, and the words for what they were measured on.
+namespace tool {
+
+/// "-" where there is nothing.
+std::string fixed(std::optional<double> value, int digits);
+/// A ratio, as in "1.17x".
+std::string times(double ratio);
+std::string times(std::optional<double> ratio);
+
+/// A name and its figures, line by line.
+class rows {
+  public:
+    explicit rows(const std::vector<std::string>& titles) {
+        for (const auto& title : titles) {
+            table_.column(title);
+        }
+    }
+    void add(const std::vector<std::string>& cells) {
+        table_.row();
+        for (std::size_t i = 0; i < cells.size(); ++i) {
+            table_.set(i, cells[i], i != 0);
+        }
+    }
+    [[nodiscard]] std::string text() const { return table_.text(); }
+
+  private:
+    table table_;
+};
+
+std::string cores(int client, std::optional<int> server);
+std::string polling(std::int64_t busy_poll_us);
+
+} // namespace tool
