@@ -80,7 +80,7 @@ listener listen_tcp(const url& where) {
     socklen_t length = sizeof address;
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     checked(::bind(made.socket.get(), generic, length), "bind");
-    checked(::listen(made.socket.get(), 8), "listen");
+    checked(::listen(made.socket.get(), SOMAXCONN), "listen");
     checked(::getsockname(made.socket.get(), generic, &length), "getsockname");
     made.where.port = ntohs(address.sin_port);
     return made;
@@ -90,7 +90,7 @@ listener listen_unix(const url& where) {
     const unix_address address{where};
     listener made{descriptor{checked(::socket(AF_UNIX, stream, 0), "socket")}, where};
     checked(::bind(made.socket.get(), address.get(), address.length), "bind");
-    checked(::listen(made.socket.get(), 8), "listen");
+    checked(::listen(made.socket.get(), SOMAXCONN), "listen");
     return made;
 }
 
