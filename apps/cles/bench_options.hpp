@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace tool {
 
@@ -28,7 +29,7 @@ struct bench_options {
     cles::run_options how{}; ///< of both ends
     bool one_core = false;   ///< for both ends
 
-    std::size_t binders = 1;
+    std::vector<std::size_t> binders{1}; ///< one number, but for the fan-out
     std::uint32_t keep = 0;
 };
 

@@ -28,8 +28,9 @@ constexpr std::uint64_t most_updates = 1'000'000;
 constexpr std::uint64_t counted_bytes_of = 5'000;
 
 std::uint64_t updates_of(const bench_options& options) {
-    return options.requests != 0 ? options.requests
-                                 : std::clamp<std::uint64_t>(deliveries_of_a_pass / options.binders, 1, most_updates);
+    return options.requests != 0
+               ? options.requests
+               : std::clamp<std::uint64_t>(deliveries_of_a_pass / options.binders.front(), 1, most_updates);
 }
 
 double count_bytes(const std::string& url) {
@@ -75,7 +76,7 @@ update_report bench_updates(const bench_options& options) {
 
     std::vector<update_figures> raw;
     std::vector<update_figures> typed;
-    perf::update_load load{.binders = options.binders,
+    perf::update_load load{.binders = options.binders.front(),
                            .updates = updates_of(options),
                            .style = options.style,
                            .how = options.how,
@@ -92,7 +93,7 @@ update_report bench_updates(const bench_options& options) {
 
     update_report report{.transport = to_string(options.transport),
                          .style = to_string(options.style),
-                         .binders = options.binders,
+                         .binders = options.binders.front(),
                          .rounds = options.rounds,
                          .updates = load.updates,
                          .busy_poll_us = options.how.busy_poll.count(),

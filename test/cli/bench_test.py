@@ -64,6 +64,40 @@ class Updates(unittest.TestCase):
             self.assertGreater(figures["deliveries_per_s"], 0)
 
 
+class FanOut(unittest.TestCase):
+    def expect(self, report, transport, binders):
+        self.assertEqual((report["bench"], report["transport"], report["rounds"], report["rate_hz"]),
+                         ("fan_out", transport, 2, 1000))
+        self.assertEqual([row["binders"] for row in report["rows"]], binders)
+        for row in report["rows"]:
+            self.assertEqual((row["paced_updates"], row["flat_out_updates"]), (50, 50))
+            for figures in (row["icd"], row["cles"]):
+                latency = figures["paced"]["latency"]
+                self.assertTrue(0 < latency["p50_us"] <= latency["p99_us"] <= latency["p999_us"] <= latency["max_us"])
+                self.assertGreater(figures["flat_out"]["deliveries_per_s"], 0)
+            self.assertAlmostEqual(row["ratio"]["p50"], row["cles"]["paced"]["latency"]["p50_us"]
+                                   / row["icd"]["paced"]["latency"]["p50_us"], places=2)
+
+    def measure(self, *arguments):
+        code, out, err = cles("bench", "--fan-out", "--requests", "50", "--rounds", "2", *arguments)
+        self.assertEqual((code, err), (0, ""))
+        return out
+
+    def test_streams_lose_nothing(self):
+        for transport in ("tcp", "unix"):
+            report = json.loads(self.measure("--transport", transport, "--binders", "1,3", "-o", "json"))
+            self.expect(report, transport, [1, 3])
+            for row in report["rows"]:
+                for figures in (row["icd"], row["cles"]):
+                    self.assertEqual((figures["flat_out"]["lost"], figures["paced"]["lost"]), (0, 0))
+
+    def test_the_table_names_both_exchanges_for_each_number_of_binders(self):
+        lines = self.measure("--binders", "1,2", "--style", "callback").splitlines()
+        self.assertEqual([line.split()[:2] for line in lines[1:-1]],
+                         [[name, str(n)] for n in (1, 2) for name in ("hand-written", "CLES", "ratio")])
+        self.assertIn("at 1000 updates/s and as fast as possible; medians of 2 rounds over tcp", lines[-1])
+
+
 class Stress(unittest.TestCase):
     def test_loaded_cores_are_measured_beside_idle_ones(self):
         report = measure("--stress")
@@ -93,7 +127,11 @@ class Usage(unittest.TestCase):
             (("--in-flight", "0"), "--in-flight"),
             (("--busy-poll", "-1"), "--busy-poll"),
             (("--requests", "5", "--duration", "1s"), "--duration"),
-            (("--binders", "2"), "--binders is for --updates"),
+            (("--binders", "2"), "--binders is for --updates and --fan-out"),
+            (("--updates", "--binders", "1,2"), "one number of --binders"),
+            (("--fan-out", "--updates"), "--updates is not for --fan-out"),
+            (("--fan-out", "--duration", "1s"), "--duration is not for --fan-out"),
+            (("--fan-out", "--transport", "udp"), "--transport tcp"),
             (("--updates", "--in-flight", "2"), "--in-flight is not for --updates"),
             (("--updates", "--transport", "inproc"), "--transport"),
             (("--stress", "--updates"), "--updates is not for --stress"),
