@@ -21,7 +21,7 @@ constexpr const char* description =
     "Measure PULL of a localization packet against a hand-written exchange of packed structs over\n"
     "blocking TCP sockets, both in one run, in turn, each server in a process of its own on another\n"
     "core. With --updates or --fan-out, measure BIND and UPDATE instead; with --stress, the steadiness\n"
-    "of PULL.";
+    "of PULL; with --bytes, what all verbs put on the wire.";
 
 constexpr const char* examples = "Examples:\n"
                                  "  cles bench\n"
@@ -31,13 +31,14 @@ constexpr const char* examples = "Examples:\n"
                                  "  cles bench --stress\n"
                                  "  cles bench --against tcp://10.0.0.2\n"
                                  "  cles bench --updates --binders 8\n"
-                                 "  cles bench --fan-out --binders 1,64\n";
+                                 "  cles bench --fan-out --binders 1,64\n"
+                                 "  cles bench --bytes\n";
 
 void run(const CLI::App& command, bench_arguments& given) {
     settle(command, given);
     const auto& options = given.options;
-    if (options.against.empty() && options.transport != carrier::inproc && !options.one_core &&
-        !cles::perf::place_ends().apart()) {
+    if (given.what != measurement::bytes && options.against.empty() && options.transport != carrier::inproc &&
+        !options.one_core && !cles::perf::place_ends().apart()) {
         note("there is one core only: both ends share it, and the figures say little");
     }
     const auto tell = [&](const auto& report) {
@@ -47,6 +48,7 @@ void run(const CLI::App& command, bench_arguments& given) {
     case measurement::pulls: tell(bench_pulls(options)); break;
     case measurement::updates: tell(bench_updates(options)); break;
     case measurement::fan_out: tell(bench_fan_out(options)); break;
+    case measurement::bytes: tell(bench_bytes(options)); break;
     case measurement::stress: tell(bench_stress(options)); break;
     }
 }

@@ -61,6 +61,13 @@ const std::vector<mode> modes{
      {"--in-flight", "--against", "--duration"},
      {carrier::tcp, carrier::unix_socket},
      "goes from one process to another, and every update must come: --transport tcp or unix"},
+    {"--bytes",
+     "Count what each verb puts on the wire, over TCP and UDP, against the packed struct",
+     measurement::bytes,
+     {"--transport", "--in-flight", "--against", "--duration", "--rounds", "--style", "--busy-poll", "--one-core",
+      "--binders", "--keep"},
+     {carrier::tcp},
+     ""},
 };
 
 bool is_given(const CLI::App& command, const char* option) { return command.count(option) != 0; }
@@ -123,7 +130,7 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     auto* requests = command.add_option("--requests", options.requests,
                                         "Requests, or with --updates and --fan-out updates, in each pass (50000; "
                                         "1000000 where many are in flight or published; the baseline at most 50000 "
-                                        "then; with --fan-out 1000 paced)");
+                                        "then; with --fan-out 1000 paced; with --bytes 2000)");
     requests->check(CLI::Range(std::uint64_t{1}, std::uint64_t{100'000'000}).description(""))->type_name("N");
     command.add_option("--duration", given.duration, "How long each pass takes, instead of --requests")
         ->excludes(requests)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "bench_bytes_report.hpp"
 #include "bench_fan_out_report.hpp"
 #include "bench_options.hpp"
 #include "bench_pull_report.hpp"
@@ -17,6 +18,9 @@ update_report bench_updates(const bench_options& options);
 
 /// One publisher and several numbers of binders against the same by hand: paced, and as fast as possible.
 fan_out_report bench_fan_out(const bench_options& options);
+
+/// What each verb puts on the wire with the localization packet, over TCP and UDP, against the packed struct.
+bytes_report bench_bytes(const bench_options& options);
 
 /// The tail of PULL's latency while other processes want the same cores, with and without real-time scheduling.
 stress_report bench_stress(const bench_options& options);

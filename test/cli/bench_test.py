@@ -98,6 +98,31 @@ class FanOut(unittest.TestCase):
         self.assertIn("at 1000 updates/s and as fast as possible; medians of 2 rounds over tcp", lines[-1])
 
 
+class Bytes(unittest.TestCase):
+    def test_each_verb_is_counted_beside_the_struct(self):
+        code, out, err = cles("bench", "--bytes", "--requests", "50", "-o", "json")
+        self.assertEqual((code, err), (0, ""))
+        report = json.loads(out)
+        self.assertEqual((report["bench"], report["exchanges"]), ("bytes", 50))
+        rows = {row["message"]: row for row in report["rows"]}
+        self.assertEqual(list(rows), [f"{verb} {way}" for verb in ("PULL", "PUSH", "DELEGATE", "UPDATE", "BIND")
+                                      for way in ("request", "reply")] + ["update"])
+        self.assertEqual((rows["PULL request"]["icd_tcp"]["bytes"], rows["PULL reply"]["icd_tcp"]["bytes"]), (4, 44))
+        # "PULL car1:localization id=N" with its LF, the id being of one or two digits.
+        self.assertTrue(28 <= rows["PULL request"]["tcp"]["bytes"] <= 30, rows["PULL request"])
+        for row in rows.values():
+            for name, headers in (("icd_tcp", 66), ("tcp", 66), ("icd_udp", 42), ("udp", 42)):
+                self.assertAlmostEqual(row[name]["frame"], row[name]["bytes"] + headers, places=2)
+        update = rows["update"]["tcp"]["bytes"]
+        self.assertEqual(report["in_a_frame"], {"icd_tcp": 32, "icd_udp": 33, "tcp": int(1448 / update), "udp": 1})
+
+    def test_the_table_says_what_was_added(self):
+        code, out, err = cles("bench", "--bytes", "--requests", "10")
+        self.assertEqual((code, err), (0, ""))
+        self.assertIn("Ethernet 14, IPv4 20 and TCP 32 (with timestamps) or UDP 8", out)
+        self.assertIn("updates in one frame of 1500 bytes: TCP, struct 32, CLES ", out)
+
+
 class Stress(unittest.TestCase):
     def test_loaded_cores_are_measured_beside_idle_ones(self):
         report = measure("--stress")
@@ -132,6 +157,8 @@ class Usage(unittest.TestCase):
             (("--fan-out", "--updates"), "--updates is not for --fan-out"),
             (("--fan-out", "--duration", "1s"), "--duration is not for --fan-out"),
             (("--fan-out", "--transport", "udp"), "--transport tcp"),
+            (("--bytes", "--transport", "tcp"), "--transport is not for --bytes"),
+            (("--bytes", "--rounds", "2"), "--rounds is not for --bytes"),
             (("--updates", "--in-flight", "2"), "--in-flight is not for --updates"),
             (("--updates", "--transport", "inproc"), "--transport"),
             (("--stress", "--updates"), "--updates is not for --stress"),
