@@ -21,7 +21,8 @@ constexpr const char* description =
     "Measure PULL of a localization packet against a hand-written exchange of packed structs over\n"
     "blocking TCP sockets, both in one run, in turn, each server in a process of its own on another\n"
     "core. With --updates or --fan-out, measure BIND and UPDATE instead; with --stress, the steadiness\n"
-    "of PULL; with --bytes, what all verbs put on the wire.";
+    "of PULL; with --bytes, what all verbs put on the wire; with --parse, what a message costs by its\n"
+    "length.";
 
 constexpr const char* examples = "Examples:\n"
                                  "  cles bench\n"
@@ -32,13 +33,15 @@ constexpr const char* examples = "Examples:\n"
                                  "  cles bench --against tcp://10.0.0.2\n"
                                  "  cles bench --updates --binders 8\n"
                                  "  cles bench --fan-out --binders 1,64\n"
-                                 "  cles bench --bytes\n";
+                                 "  cles bench --bytes\n"
+                                 "  cles bench --parse -o json\n";
 
 void run(const CLI::App& command, bench_arguments& given) {
     settle(command, given);
     const auto& options = given.options;
-    if (given.what != measurement::bytes && options.against.empty() && options.transport != carrier::inproc &&
-        !options.one_core && !cles::perf::place_ends().apart()) {
+    const bool has_two_ends = given.what != measurement::bytes && given.what != measurement::parse;
+    if (has_two_ends && options.against.empty() && options.transport != carrier::inproc && !options.one_core &&
+        !cles::perf::place_ends().apart()) {
         note("there is one core only: both ends share it, and the figures say little");
     }
     const auto tell = [&](const auto& report) {
@@ -49,6 +52,7 @@ void run(const CLI::App& command, bench_arguments& given) {
     case measurement::updates: tell(bench_updates(options)); break;
     case measurement::fan_out: tell(bench_fan_out(options)); break;
     case measurement::bytes: tell(bench_bytes(options)); break;
+    case measurement::parse: tell(bench_parse(options)); break;
     case measurement::stress: tell(bench_stress(options)); break;
     }
 }

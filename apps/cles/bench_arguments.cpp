@@ -68,6 +68,14 @@ const std::vector<mode> modes{
       "--binders", "--keep"},
      {carrier::tcp},
      ""},
+    {"--parse",
+     "Measure what requests and replies from 64 bytes to 1 MiB cost by their length, without sockets, beside the "
+     "packed struct",
+     measurement::parse,
+     {"--transport", "--in-flight", "--against", "--duration", "--style", "--busy-poll", "--one-core", "--binders",
+      "--keep"},
+     {carrier::tcp},
+     ""},
 };
 
 bool is_given(const CLI::App& command, const char* option) { return command.count(option) != 0; }
@@ -127,10 +135,11 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
         ->type_name("N");
     command.add_option("--against", options.against, "A node that runs already and offers localization")
         ->type_name("URL");
-    auto* requests = command.add_option("--requests", options.requests,
-                                        "Requests, or with --updates and --fan-out updates, in each pass (50000; "
-                                        "1000000 where many are in flight or published; the baseline at most 50000 "
-                                        "then; with --fan-out 1000 paced; with --bytes 2000)");
+    auto* requests =
+        command.add_option("--requests", options.requests,
+                           "Requests, or with --updates and --fan-out updates, in each pass (50000; "
+                           "1000000 where many are in flight or published; the baseline at most 50000 "
+                           "then; with --fan-out 1000 paced; with --bytes 2000; with --parse 8 MiB of them)");
     requests->check(CLI::Range(std::uint64_t{1}, std::uint64_t{100'000'000}).description(""))->type_name("N");
     command.add_option("--duration", given.duration, "How long each pass takes, instead of --requests")
         ->excludes(requests)

@@ -4,6 +4,7 @@
 #include "bench_bytes_report.hpp"
 #include "bench_fan_out_report.hpp"
 #include "bench_options.hpp"
+#include "bench_parse_report.hpp"
 #include "bench_pull_report.hpp"
 #include "bench_stress_report.hpp"
 #include "bench_update_report.hpp"
@@ -21,6 +22,9 @@ fan_out_report bench_fan_out(const bench_options& options);
 
 /// What each verb puts on the wire with the localization packet, over TCP and UDP, against the packed struct.
 bytes_report bench_bytes(const bench_options& options);
+
+/// What requests and replies cost by their length, without sockets, beside the packed struct.
+parse_report bench_parse(const bench_options& options);
 
 /// The tail of PULL's latency while other processes want the same cores, with and without real-time scheduling.
 stress_report bench_stress(const bench_options& options);

@@ -123,6 +123,28 @@ class Bytes(unittest.TestCase):
         self.assertIn("updates in one frame of 1500 bytes: TCP, struct 32, CLES ", out)
 
 
+class Parse(unittest.TestCase):
+    def test_all_lengths_are_measured(self):
+        code, out, err = cles("bench", "--parse", "--requests", "3", "--rounds", "2", "-o", "json")
+        self.assertEqual((code, err), (0, ""))
+        report = json.loads(out)
+        self.assertEqual((report["bench"], report["rounds"]), ("parse", 2))
+        self.assertEqual([row["bytes"] for row in report["rows"]], [64 * 4**i for i in range(8)])
+        for row in report["rows"]:
+            self.assertEqual(row["repetitions"], 3)
+            for name in ("head", "validated", "typed", "reply_validated", "reply_typed"):
+                self.assertGreater(row[name]["ns"], 0, (name, row))
+                self.assertAlmostEqual(row[name]["ns_per_byte"], row[name]["ns"] / row["bytes"], places=2)
+            self.assertLess(row["packed_bytes"], row["bytes"])
+
+    def test_the_table_gives_time_and_time_per_byte(self):
+        code, out, err = cles("bench", "--parse", "--requests", "2", "--rounds", "1")
+        self.assertEqual((code, err), (0, ""))
+        lines = out.splitlines()
+        self.assertEqual([line.split()[0] for line in lines[1:9]], [str(64 * 4**i) for i in range(8)])
+        self.assertIn("ns (ns per byte), medians of 1 rounds", lines[9])
+
+
 class Stress(unittest.TestCase):
     def test_loaded_cores_are_measured_beside_idle_ones(self):
         report = measure("--stress")
@@ -157,6 +179,8 @@ class Usage(unittest.TestCase):
             (("--fan-out", "--updates"), "--updates is not for --fan-out"),
             (("--fan-out", "--duration", "1s"), "--duration is not for --fan-out"),
             (("--fan-out", "--transport", "udp"), "--transport tcp"),
+            (("--parse", "--transport", "tcp"), "--transport is not for --parse"),
+            (("--parse", "--bytes"), "--parse is not for --bytes"),
             (("--bytes", "--transport", "tcp"), "--transport is not for --bytes"),
             (("--bytes", "--rounds", "2"), "--rounds is not for --bytes"),
             (("--updates", "--in-flight", "2"), "--in-flight is not for --updates"),
