@@ -3,7 +3,11 @@
 """`cles bench`: what it measures and how it tells it, on runs too short to say how fast anything is."""
 
 import json
+import os
+import subprocess
+import sys
 import unittest
+from xml.etree import ElementTree
 
 from support import NodeTest, cles, environment, on_terminal
 
@@ -136,6 +140,14 @@ class Parse(unittest.TestCase):
                 self.assertGreater(row[name]["ns"], 0, (name, row))
                 self.assertAlmostEqual(row[name]["ns_per_byte"], row[name]["ns"] / row["bytes"], places=2)
             self.assertLess(row["packed_bytes"], row["bytes"])
+
+    def test_the_plot_is_made_of_the_json(self):
+        code, out, err = cles("bench", "--parse", "--requests", "2", "--rounds", "1", "-o", "json")
+        self.assertEqual((code, err), (0, ""))
+        script = os.path.join(os.path.dirname(__file__), "..", "..", "perf", "plot_parse.py")
+        plot = subprocess.run([sys.executable, script], input=out, capture_output=True, text=True, check=True).stdout
+        lines = [each for each in ElementTree.fromstring(plot).iter() if each.tag.endswith("polyline")]
+        self.assertEqual([len(each.get("points").split()) for each in lines], [8] * 6)
 
     def test_the_table_gives_time_and_time_per_byte(self):
         code, out, err = cles("bench", "--parse", "--requests", "2", "--rounds", "1")
