@@ -3,11 +3,13 @@
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
+#include <boost/asio/redirect_error.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
 #include <algorithm>
 #include <exception>
+#include <limits>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -21,73 +23,87 @@ namespace {
 
 constexpr std::chrono::seconds patience{60}; // beyond what publishing takes by the clock
 constexpr std::chrono::hours longest_deadline{24};
+constexpr std::chrono::milliseconds between_attempts{10};
+constexpr auto not_yet = std::numeric_limits<std::int64_t>::max();
 
 /// What the binders of one pass share.
 class gathering {
   public:
-    gathering(asio::io_context& io, cles::service& client, const fan_out_order& order, latency_recorder* record)
-        : all(record), io_(io), client_(client), order_(order), quiet_(io) {}
+    gathering(asio::io_context& io, cles::service& client, const fan_out_order& order, bool by_group,
+              latency_recorder* record)
+        : all(record), io_(io), client_(client), order_(order), by_group_(by_group), timer_(io) {}
 
     arrivals all;
 
     [[nodiscard]] std::uint64_t updates() const noexcept { return order_.updates; }
-    /// Whether it was published in this pass; the last one of an earlier pass may be repeated.
+    /// Whether it was published in this pass; what was published before may still come.
     [[nodiscard]] bool is_new(const publication& value) const noexcept { return value.published_ns >= began_; }
 
     void bound() {
-        if (++bound_ < order_.binders) {
-            return;
+        if (++bound_ == order_.binders) {
+            asio::co_spawn(io_, run_pass(), [this](std::exception_ptr failure) {
+                if (failure) {
+                    fail(std::move(failure));
+                }
+            });
         }
-        const auto by_the_clock = std::chrono::nanoseconds{order_.interval_ns} * order_.updates;
-        const auto deadline = std::chrono::ceil<std::chrono::milliseconds>(by_the_clock) + patience;
-        client_.async_push("car1:publish", order_,
-                           call_options{}.deadline(std::min<std::chrono::milliseconds>(deadline, longest_deadline)),
-                           [this](boost::system::error_code code, const json_text&) {
-                               if (code) {
-                                   fail(std::make_exception_ptr(cles::error(code, "the PUSH that starts the updates")));
-                                   return;
-                               }
-                               published_ = true;
-                               if (!leave()) {
-                                   asio::co_spawn(io_, wait_for_silence(), [](const std::exception_ptr&) {});
-                               }
-                           });
     }
 
+    /// A binder has had something.
+    void reached() { ++reached_; }
+
     void complete() {
-        ++complete_;
-        leave();
+        if (++complete_ == order_.binders) {
+            timer_.cancel(); // in case that somebody waits for silence
+        }
     }
 
     void fail(std::exception_ptr failure) {
+        if (over_) {
+            return; // feeds that still wait are closed; and what follows from a first failure
+        }
+        over_ = true;
         failure_ = std::move(failure);
-        end();
+        timer_.cancel();
+        io_.stop();
     }
+
+    [[nodiscard]] bool has_begun() const noexcept { return began_ != not_yet; }
 
     [[nodiscard]] const std::exception_ptr& failure() const noexcept { return failure_; }
 
   private:
-    // The next pass must not begin before the publisher has ended this one.
-    bool leave() {
-        const bool over = published_ && complete_ == order_.binders;
-        if (over) {
-            end();
+    asio::awaitable<void> run_pass() {
+        if (by_group_) {
+            co_await reach_all();
         }
-        return over;
-    }
-
-    void end() {
-        quiet_.cancel();
+        began_ = monotonic_ns();
+        const auto by_the_clock = std::chrono::nanoseconds{order_.interval_ns} * order_.updates;
+        const auto wanted = std::chrono::ceil<std::chrono::milliseconds>(by_the_clock) + patience;
+        auto options = call_options{}.deadline(std::min<std::chrono::milliseconds>(wanted, longest_deadline));
+        co_await client_.async_push("car1:publish", order_, options);
+        co_await wait_for_silence();
+        over_ = true;
         io_.stop();
     }
 
+    // Nobody answers a BIND by the group: that it was heard shows when updates come.
+    asio::awaitable<void> reach_all() {
+        const fan_out_order one{.binders = order_.binders, .updates = 1};
+        while (reached_ < order_.binders) {
+            co_await client_.async_push("car1:publish", one);
+            timer_.expires_after(between_attempts);
+            co_await timer_.async_wait(asio::use_awaitable);
+        }
+    }
+
+    // Until all is complete, or nothing comes any more.
     asio::awaitable<void> wait_for_silence() {
-        for (std::uint64_t before = 0;;) {
-            before = all.count();
-            quiet_.expires_after(silence);
-            co_await quiet_.async_wait(asio::use_awaitable);
-            if (all.count() == before) {
-                io_.stop();
+        for (auto before = all.count(); complete_ < order_.binders; before = all.count()) {
+            timer_.expires_after(silence);
+            boost::system::error_code cancelled;
+            co_await timer_.async_wait(asio::redirect_error(asio::use_awaitable, cancelled));
+            if (!cancelled && all.count() == before) {
                 co_return;
             }
         }
@@ -96,11 +112,13 @@ class gathering {
     asio::io_context& io_;
     cles::service& client_;
     const fan_out_order& order_;
-    asio::steady_timer quiet_;
-    std::int64_t began_ = monotonic_ns();
+    bool by_group_;
+    asio::steady_timer timer_;
+    std::int64_t began_ = not_yet;
     std::uint64_t bound_ = 0;
+    std::uint64_t reached_ = 0;
     std::uint64_t complete_ = 0;
-    bool published_ = false;
+    bool over_ = false;
     std::exception_ptr failure_;
 };
 
@@ -124,6 +142,7 @@ class binder {
         if (binding_.keep != 0) {
             options.keep(binding_.keep);
         }
+        options.multicast(binding_.multicast);
         feed_ = co_await client.async_bind<publication>("car1:localization", options);
         all_.bound();
         if (binding_.style == handler_style::callback) {
@@ -157,10 +176,15 @@ class binder {
         if (item.kind == feed_event::lost) {
             throw std::runtime_error("the publisher was lost: " + item.text);
         }
-        seen_ += item.missed;
+        if (item.kind == feed_event::update && !reached_) {
+            reached_ = true;
+            all_.reached();
+        }
         if (item.kind == feed_event::update && all_.is_new(item.value)) {
             all_.all.take(item.value);
             ++seen_;
+        } else if (item.kind == feed_event::gap && all_.has_begun()) {
+            seen_ += item.missed;
         }
         if (seen_ < all_.updates()) {
             return true;
@@ -172,6 +196,7 @@ class binder {
     gathering& all_;
     const fan_out_binding& binding_;
     feed<publication> feed_;
+    bool reached_ = false;
     std::uint64_t seen_ = 0;
 };
 
@@ -179,7 +204,7 @@ class binder {
 
 fan_out_tally take_fan_out(asio::io_context& io, const std::vector<cles::service*>& clients, const fan_out_order& order,
                            const fan_out_binding& binding, latency_recorder* record) {
-    gathering all{io, *clients.front(), order, record};
+    gathering all{io, *clients.front(), order, binding.multicast, record};
     std::vector<std::unique_ptr<binder>> binders;
     for (std::uint64_t i = 0; i < order.binders; ++i) {
         binders.push_back(std::make_unique<binder>(all, binding));

@@ -19,10 +19,11 @@ struct fan_out_binding {
     handler_style style = handler_style::coroutine;
     run_options how{};
     std::uint32_t keep = 0; ///< updates that the publisher queues for a slow binder; 0: the protocol's default
+    bool multicast = false; ///< bind by the group that the clients take part in
 };
 
 /// Binds as many feeds as are ordered to "car1:localization", at the clients in turn, has the updates published, and
-/// takes what comes as C++ values. A client opens a link for each of its feeds. Latencies are recorded where there is a
+/// takes what comes as C++ values. A client opens a link for each of its feeds, but has one socket for the group. Latencies are recorded where there is a
 /// recorder.
 /// \throws cles::error, or std::runtime_error where something came changed
 fan_out_tally take_fan_out(boost::asio::io_context& io, const std::vector<cles::service*>& clients,

@@ -8,6 +8,8 @@
 namespace cles::perf {
 namespace {
 
+constexpr int buffer = 1 << 20; // the system may give less
+
 descriptor datagram_socket() { return descriptor{checked(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), "socket")}; }
 
 sockaddr_in address_of(const multicast_group& group) {
@@ -51,6 +53,7 @@ descriptor join(const multicast_group& group) {
     auto socket = datagram_socket();
     auto address = address_of(group);
     set(socket, SOL_SOCKET, SO_REUSEADDR, 1, "SO_REUSEADDR");
+    set(socket, SOL_SOCKET, SO_RCVBUF, buffer, "SO_RCVBUF");
     set(socket, IPPROTO_IP, IP_MULTICAST_ALL, 0, "IP_MULTICAST_ALL");
     bind_to(socket, address);
     set(socket, IPPROTO_IP, IP_ADD_MEMBERSHIP, on_loopback(address.sin_addr), "IP_ADD_MEMBERSHIP");

@@ -25,7 +25,7 @@ class reserved_group {
     descriptor socket_;
 };
 
-/// A socket that gets what is sent to the group, with the system's own size of buffer.
+/// A socket that gets what is sent to the group, with the flags and the buffer that the library gives its own.
 descriptor join(const multicast_group& group);
 /// A socket whose datagrams go to the group, and no farther than this host.
 descriptor connect_to(const multicast_group& group);

@@ -17,8 +17,11 @@ constexpr std::size_t most_in_flight = 4096;
 constexpr std::size_t most_binders = 1024;
 constexpr int most_busy_poll_us = 1'000'000;
 
-const std::map<std::string, carrier> carriers{
-    {"tcp", carrier::tcp}, {"udp", carrier::udp}, {"unix", carrier::unix_socket}, {"inproc", carrier::inproc}};
+const std::map<std::string, carrier> carriers{{"tcp", carrier::tcp},
+                                              {"udp", carrier::udp},
+                                              {"unix", carrier::unix_socket},
+                                              {"inproc", carrier::inproc},
+                                              {"multicast", carrier::multicast}};
 const std::map<std::string, cles::perf::handler_style> styles{{"coroutine", cles::perf::handler_style::coroutine},
                                                               {"callback", cles::perf::handler_style::callback}};
 
@@ -53,8 +56,8 @@ const std::vector<mode> modes{
      "Measure the way of an UPDATE to many binders, paced and as fast as possible, against the same by hand",
      measurement::fan_out,
      {"--in-flight", "--against", "--duration"},
-     {carrier::tcp, carrier::unix_socket},
-     "has a baseline for --transport tcp and unix only"},
+     {carrier::tcp, carrier::unix_socket, carrier::multicast},
+     "has a baseline for --transport tcp, unix and multicast only"},
     {"--updates",
      "Measure UPDATE to binders that miss nothing instead of PULL",
      measurement::updates,
@@ -91,6 +94,9 @@ void settle_mode(const CLI::App& command, bench_arguments& given) {
                 refuse(option, "is for --updates and --fan-out");
             }
         }
+        if (given.options.transport == carrier::multicast) {
+            refuse("--transport multicast", "is for --fan-out");
+        }
         return;
     }
     given.what = asked->what;
@@ -118,6 +124,9 @@ void settle_binders(bench_arguments& given) {
     } else if (given.what == measurement::fan_out) {
         binders = {1, 8, 64};
     }
+    if (given.options.transport == carrier::multicast && given.options.keep != 0) {
+        refuse("--keep", "has no effect by multicast");
+    }
     if (given.what == measurement::updates && binders.size() != 1) {
         refuse("--updates", "takes one number of --binders");
     }
@@ -127,7 +136,9 @@ void settle_binders(bench_arguments& given) {
 
 void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     auto& options = given.options;
-    command.add_option("--transport", given.transport, "What carries the CLES exchange: tcp, udp, unix or inproc")
+    command
+        .add_option("--transport", given.transport,
+                    "What carries the CLES exchange: tcp, udp, unix or inproc; with --fan-out tcp, unix or multicast")
         ->check(CLI::IsMember(keys_of(carriers)).description(""))
         ->type_name("NAME");
     command.add_option("--in-flight", options.in_flight, "PULLs in flight at once on one link (1)")

@@ -19,6 +19,7 @@ double mean_loss(const std::vector<Figures>& passes) {
 
 paced_figures median_of(const std::vector<paced_figures>& passes) {
     std::vector<latency_figures> latencies;
+    latencies.reserve(passes.size());
     for (const auto& pass : passes) {
         latencies.push_back(pass.latency);
     }

@@ -23,6 +23,7 @@ const char* to_string(carrier c) {
     case carrier::udp: return "udp";
     case carrier::unix_socket: return "unix";
     case carrier::inproc: return "inproc";
+    case carrier::multicast: return "multicast";
     }
     return "";
 }
@@ -33,7 +34,8 @@ const char* to_string(cles::perf::handler_style s) {
 
 std::string bench_url(carrier c) {
     switch (c) {
-    case carrier::tcp: return "tcp://127.0.0.1:0";
+    case carrier::tcp:
+    case carrier::multicast: return "tcp://127.0.0.1:0";
     case carrier::udp: return "udp://127.0.0.1:0";
     case carrier::unix_socket: return "unix://@cles-bench-" + std::to_string(::getpid());
     case carrier::inproc: return "inproc://cles-bench";

@@ -15,7 +15,7 @@
 
 namespace tool {
 
-enum class carrier : std::uint8_t { tcp, udp, unix_socket, inproc };
+enum class carrier : std::uint8_t { tcp, udp, unix_socket, inproc, multicast };
 
 struct bench_options {
     carrier transport = carrier::tcp;
@@ -43,7 +43,7 @@ std::chrono::nanoseconds limit_of(const bench_options& options);
 const char* to_string(carrier c);
 const char* to_string(cles::perf::handler_style s);
 
-/// Where the child is to listen.
+/// Where the child is to listen; where updates go by multicast, for all else.
 std::string bench_url(carrier c);
 
 } // namespace tool

@@ -95,6 +95,10 @@ class FanOut(unittest.TestCase):
                 for figures in (row["icd"], row["cles"]):
                     self.assertEqual((figures["flat_out"]["lost"], figures["paced"]["lost"]), (0, 0))
 
+    def test_multicast(self):
+        report = json.loads(self.measure("--transport", "multicast", "--binders", "1,3", "-o", "json"))
+        self.expect(report, "multicast", [1, 3])
+
     def test_the_table_names_both_exchanges_for_each_number_of_binders(self):
         lines = self.measure("--binders", "1,2", "--style", "callback").splitlines()
         self.assertEqual([line.split()[:2] for line in lines[1:-1]],
@@ -191,6 +195,8 @@ class Usage(unittest.TestCase):
             (("--fan-out", "--updates"), "--updates is not for --fan-out"),
             (("--fan-out", "--duration", "1s"), "--duration is not for --fan-out"),
             (("--fan-out", "--transport", "udp"), "--transport tcp"),
+            (("--transport", "multicast"), "--transport multicast is for --fan-out"),
+            (("--fan-out", "--transport", "multicast", "--keep", "9"), "--keep has no effect by multicast"),
             (("--parse", "--transport", "tcp"), "--transport is not for --parse"),
             (("--parse", "--bytes"), "--parse is not for --bytes"),
             (("--bytes", "--transport", "tcp"), "--transport is not for --bytes"),
