@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::uint64_t rate_hz = 1000;
 constexpr std::uint64_t paced_unless_told = 1000;
-constexpr std::uint64_t deliveries_of_a_pass = 400'000;
-constexpr std::uint64_t most_updates = 100'000;
+constexpr std::uint64_t deliveries_of_a_pass = 200'000;
+constexpr std::uint64_t most_updates = 40'000;
 
 fan_out_orders orders_of(std::size_t binders, const bench_options& options) {
     const auto told = options.requests;
