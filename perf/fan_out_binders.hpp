@@ -23,9 +23,9 @@ struct fan_out_binding {
 };
 
 /// Binds as many feeds as are ordered to "car1:localization", at the clients in turn, has the updates published, and
-/// takes what comes as C++ values. A client opens a link for each of its feeds, but has one socket for the group. Latencies are recorded where there is a
-/// recorder.
-/// \throws cles::error, or std::runtime_error where something came changed
+/// takes what comes as C++ values. A client opens a link for each of its feeds, but has one socket for the group.
+/// Latencies are recorded where there is a recorder. \throws cles::error, or std::runtime_error where something came
+/// changed
 fan_out_tally take_fan_out(boost::asio::io_context& io, const std::vector<cles::service*>& clients,
                            const fan_out_order& order, const fan_out_binding& binding, latency_recorder* record);
 

@@ -25,6 +25,8 @@ void serve_localization(std::string_view url, const run_options& how, const chil
     run(io, how);
 }
 
+const call_options pull_load::hurried = call_options{}.urgent();
+
 pull_load::pull_load(asio::io_context& io, cles::service& client, std::string noun, handler_style style,
                      bool check_samples, run_options how)
     : io_(io), client_(client), noun_(std::move(noun)), style_(style), check_samples_(check_samples), how_(how) {}
@@ -62,7 +64,7 @@ std::chrono::nanoseconds pull_load::run(std::size_t in_flight, std::chrono::nano
 }
 
 void pull_load::ask(lane& from) {
-    client_.async_pull<localization>(noun_, [this, &from](boost::system::error_code code, const localization& value) {
+    auto done = [this, &from](boost::system::error_code code, const localization& value) {
         if (code) {
             lane_ended(std::make_exception_ptr(cles::error(code, "the PULL of " + noun_)));
         } else if (arrived(value, from.began)) {
@@ -70,12 +72,22 @@ void pull_load::ask(lane& from) {
         } else {
             lane_ended(nullptr);
         }
-    });
+    };
+    if (urgent_ != nullptr) {
+        client_.async_pull<localization>(noun_, *urgent_, std::move(done));
+    } else {
+        client_.async_pull<localization>(noun_, std::move(done));
+    }
 }
 
 asio::awaitable<void> pull_load::ask_on_and_on(clock::time_point began) {
     for (;;) {
-        const auto value = co_await client_.async_pull<localization>(noun_);
+        localization value;
+        if (urgent_ != nullptr) {
+            value = co_await client_.async_pull<localization>(noun_, *urgent_);
+        } else {
+            value = co_await client_.async_pull<localization>(noun_);
+        }
         if (!arrived(value, began)) {
             co_return;
         }

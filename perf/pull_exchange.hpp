@@ -34,6 +34,8 @@ class pull_load {
     /// `noun` names the task at its node, to which the client must know the way.
     pull_load(boost::asio::io_context& io, cles::service& client, std::string noun, handler_style style,
               bool check_samples, run_options how = {});
+    /// Has what follows be asked urgently, or not.
+    void ask_urgently(bool hurry) { urgent_ = hurry ? &hurried : nullptr; }
 
     /// Runs until the recorder is full or the time is over. A request counts once its result, as a C++ value, is in the
     /// hands of the caller's code. Returns how long the requests took that were counted.
@@ -45,6 +47,8 @@ class pull_load {
     struct lane {
         clock::time_point began;
     };
+
+    static const call_options hurried;
 
     void ask(lane& from);
     boost::asio::awaitable<void> ask_on_and_on(clock::time_point began);
@@ -58,6 +62,7 @@ class pull_load {
     handler_style style_;
     bool check_samples_;
     run_options how_;
+    const call_options* urgent_ = nullptr;
 
     latency_recorder* record_ = nullptr;
     clock::time_point until_;

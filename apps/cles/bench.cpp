@@ -21,7 +21,8 @@ constexpr const char* description =
     "Measure PULL of a localization packet against a hand-written exchange of packed structs over\n"
     "blocking TCP sockets, both in one run, in turn, each server in a process of its own on another\n"
     "core. With --updates or --fan-out, measure BIND and UPDATE instead; with --stress, the steadiness\n"
-    "of PULL; with --bytes, what all verbs put on the wire; with --parse, what a message costs by its\n"
+    "of PULL; with --urgent, what it takes beside large answers; with --bytes, what all verbs put on the wire; with "
+    "--parse, what a message costs by its\n"
     "length.";
 
 constexpr const char* examples = "Examples:\n"
@@ -30,6 +31,7 @@ constexpr const char* examples = "Examples:\n"
                                  "  cles bench --in-flight 64 --style callback -o json\n"
                                  "  cles bench --busy-poll 50\n"
                                  "  cles bench --stress\n"
+                                 "  cles bench --urgent\n"
                                  "  cles bench --against tcp://10.0.0.2\n"
                                  "  cles bench --updates --binders 8\n"
                                  "  cles bench --fan-out --binders 1,64\n"
@@ -54,6 +56,7 @@ void run(const CLI::App& command, bench_arguments& given) {
     case measurement::bytes: tell(bench_bytes(options)); break;
     case measurement::parse: tell(bench_parse(options)); break;
     case measurement::stress: tell(bench_stress(options)); break;
+    case measurement::urgent: tell(bench_urgent(options)); break;
     }
 }
 

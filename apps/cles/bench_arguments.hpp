@@ -13,7 +13,7 @@ class App;
 namespace tool {
 
 /// What `cles bench` can measure.
-enum class measurement : std::uint8_t { pulls, updates, fan_out, stress, bytes, parse };
+enum class measurement : std::uint8_t { pulls, updates, fan_out, stress, urgent, bytes, parse };
 
 /// The command line as it was given.
 struct bench_arguments {

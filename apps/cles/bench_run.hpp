@@ -8,6 +8,7 @@
 #include "bench_pull_report.hpp"
 #include "bench_stress_report.hpp"
 #include "bench_update_report.hpp"
+#include "bench_urgent_report.hpp"
 
 namespace tool {
 
@@ -28,5 +29,8 @@ parse_report bench_parse(const bench_options& options);
 
 /// The tail of PULL's latency while other processes want the same cores, with and without real-time scheduling.
 stress_report bench_stress(const bench_options& options);
+
+/// Small PULLs beside large ones to the same node: in their turn, and urgently.
+urgent_report bench_urgent(const bench_options& options);
 
 } // namespace tool

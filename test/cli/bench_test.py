@@ -175,6 +175,17 @@ class Stress(unittest.TestCase):
         self.assertEqual("idle_fifo" in report, "loaded_fifo" in report)
 
 
+class Urgent(unittest.TestCase):
+    def test_small_requests_are_measured_beside_large_ones(self):
+        for transport in ("tcp", "unix"):
+            report = measure("--urgent", "--transport", transport)
+            self.assertEqual((report["bench"], report["transport"]), ("urgent", transport))
+            self.assertEqual(report["large_bytes"], 100_000)
+            for name in ("idle", "in_turn", "urgent"):
+                figures = report[name]
+                self.assertTrue(0 < figures["p50_us"] <= figures["p99_us"] <= figures["p999_us"] <= figures["max_us"])
+
+
 class Against(NodeTest):
     def test_a_node_that_runs_already(self):
         report = measure("--against", self.node.url)
@@ -205,6 +216,8 @@ class Usage(unittest.TestCase):
             (("--updates", "--transport", "inproc"), "--transport"),
             (("--stress", "--updates"), "--updates is not for --stress"),
             (("--stress", "--transport", "inproc"), "--transport"),
+            (("--urgent", "--stress"), "--urgent is not for --stress"),
+            (("--urgent", "--transport", "udp"), "--transport tcp or unix"),
             (("--against", "tcp://127.0.0.1:1", "--transport", "tcp"), "--transport"),
         ):
             code, out, err = cles("bench", *arguments)

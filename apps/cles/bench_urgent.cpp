@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/service.hpp>
+
+#include "bench_latency.hpp"
+#include "bench_progress.hpp"
+#include "bench_run.hpp"
+#include "perf/bulk_load.hpp"
+#include "perf/child_process.hpp"
+#include "perf/latency_recorder.hpp"
+#include "perf/pinning.hpp"
+#include "perf/pull_exchange.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <vector>
+
+namespace tool {
+
+namespace perf = cles::perf;
+
+namespace {
+
+constexpr std::uint64_t requests_unless_told = 5'000;
+constexpr std::size_t large_in_flight = 4; // so that the node always has the next to send
+
+void serve(const bench_options& options, const perf::child_process::announce& announce) {
+    boost::asio::io_context io{1};
+    cles::service car{io, {.name = "car1", .listen = {bench_url(options.transport)}}};
+    perf::register_localization(car);
+    perf::register_bulk(car);
+    announce(car.endpoints().front());
+    run(io, options.how);
+}
+
+} // namespace
+
+urgent_report bench_urgent(const bench_options& options) {
+    const auto cores = places_of(options);
+    perf::child_process server{cores.server,
+                               [&](const perf::child_process::announce& announce) { serve(options, announce); }};
+    perf::pin_to(cores.client);
+    boost::asio::io_context io{1};
+    cles::service client{io, {.name = "bench", .peers = {{"car1", server.announced()}}}};
+    perf::pull_load small{io, client, "car1:localization", options.style, true, options.how};
+    perf::bulk_load large{client, "car1"};
+
+    const auto requests = options.requests != 0 ? options.requests : requests_unless_told;
+    perf::latency_recorder record{requests};
+    bench_progress progress{options.rounds * 3};
+    const auto pass = [&](const char* what, std::size_t beside, bool hurry, std::vector<latency_figures>& into) {
+        progress.step(what);
+        small.ask_urgently(hurry);
+        small.run(options.in_flight, limit_of(options), record); // warms up, and makes the link
+        large.start(beside);
+        small.run(options.in_flight, limit_of(options), record);
+        into.push_back(to_figures(record.quantiles()));
+        large.stop();
+        io.restart();
+        while (large.in_flight() != 0) {
+            io.run_one();
+        }
+    };
+    std::vector<latency_figures> idle;
+    std::vector<latency_figures> in_turn;
+    std::vector<latency_figures> urgent;
+    for (std::size_t round = 0; round < options.rounds; ++round) {
+        pass("alone", 0, true, idle);
+        pass("beside large answers", large_in_flight, false, in_turn);
+        pass("beside large answers, urgent", large_in_flight, true, urgent);
+    }
+    return {.transport = to_string(options.transport),
+            .style = to_string(options.style),
+            .rounds = options.rounds,
+            .requests = requests,
+            .busy_poll_us = options.how.busy_poll.count(),
+            .large_bytes = perf::bulk_bytes,
+            .large_in_flight = large_in_flight,
+            .client_core = cores.client,
+            .server_core = cores.server,
+            .idle = median_of(idle),
+            .in_turn = median_of(in_turn),
+            .urgent = median_of(urgent)};
+}
+
+} // namespace tool
