@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/json_scan.hpp"
 
+#include "protocol/plain_text.hpp"
 #include "protocol/utf8.hpp"
 
 #include <array>
@@ -11,15 +12,6 @@ namespace cles::protocol {
 namespace {
 
 constexpr bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
-
-// Characters that stand for themselves in a string and need no further look.
-constexpr auto plain = [] {
-    std::array<bool, 256> table{};
-    for (std::size_t c = 0x20; c < 0x80; ++c) {
-        table[c] = c != '"' && c != '\\';
-    }
-    return table;
-}();
 
 void append_utf8(std::string& out, std::uint32_t c) {
     const auto put = [&](std::uint32_t byte) { out.push_back(static_cast<char>(byte)); };
@@ -176,9 +168,7 @@ std::string_view scan_string(std::string_view text, std::size_t& at, std::string
     const auto start = ++at;
     escaped = false;
     for (;;) {
-        while (at < text.size() && plain[static_cast<unsigned char>(text[at])]) {
-            ++at;
-        }
+        at = plain_end(text, at);
         if (at >= text.size()) {
             return "a string without an end";
         }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/json_writer.hpp>
 
+#include "protocol/plain_text.hpp"
 #include "protocol/utf8.hpp"
 
 #include <array>
@@ -61,11 +62,6 @@ bool append_short_decimal(std::string& out, double d) {
     return false;
 }
 
-constexpr bool plain(char c) noexcept {
-    const auto b = static_cast<unsigned char>(c);
-    return b >= 0x20 && b < 0x80 && c != '"' && c != '\\';
-}
-
 void append_escape(std::string& out, char c) {
     constexpr std::string_view hex = "0123456789abcdef";
     switch (c) {
@@ -86,10 +82,7 @@ void append_escape(std::string& out, char c) {
 void append_string(std::string& out, std::string_view text) {
     out.push_back('"');
     for (std::size_t i = 0; i < text.size();) {
-        auto run = i;
-        while (run < text.size() && plain(text[run])) {
-            ++run;
-        }
+        const auto run = protocol::plain_end(text, i);
         out.append(text.substr(i, run - i));
         i = run;
         if (i == text.size()) {
