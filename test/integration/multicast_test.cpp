@@ -128,7 +128,7 @@ BOOST_FIXTURE_TEST_CASE(one_datagram_serves_eight_binders, network) {
         feeds.push_back(std::make_unique<feed_log>());
         until_bound(*feeds.back(), *towers.back(), i % 2 == 0 ? "all:place" : "car1:place", by_group);
     }
-    run_until(io, [&] { return sniffer.count("BIND") == 8 && metric(*car, "group_leases") == 8; });
+    run_until(io, [&] { return sniffer.count("BIND") >= 8 && metric(*car, "group_leases") == 8; });
     for (int i = 0; i < 5; ++i) {
         car->update("place", i);
         run_until(io, [&] {
@@ -193,13 +193,13 @@ BOOST_FIXTURE_TEST_CASE(a_lease_runs_out_when_its_binder_dies_without_a_word, ne
 
 BOOST_FIXTURE_TEST_CASE(renewals_keep_a_binding_beyond_its_lease, network) {
     cles::limits bounds;
-    bounds.lease = 1500ms;
+    bounds.lease = 3000ms;
     const auto car = node("car1");
     const auto tower = node("tower", bounds);
     stranger sniffer{io, where};
     feed_log feed;
     until_bound(feed, *tower, "all:place");
-    run_until(io, [&] { return sniffer.count("BIND all:place lease=1500") == 6; });
+    run_until(io, [&] { return sniffer.count("BIND all:place lease=3000") >= 5; });
     BOOST_TEST(metric(*car, "leases_expired") == 0U);
     car->update("place", 1);
     run_until(io, [&] { return !feed.items.empty(); });
@@ -223,8 +223,7 @@ BOOST_FIXTURE_TEST_CASE(closing_the_last_feed_and_stopping_say_goodbye, network)
     feed_log three;
     until_bound(three, *tower, "all:speed");
     tower->stop();
-    run_until(io, [&] { return sniffer.count("BIND all:speed lease=0") == 1; });
-    BOOST_TEST(three.is_over());
+    run_until(io, [&] { return three.is_over() && sniffer.count("BIND all:speed lease=0") == 1; });
     BOOST_TEST((three.code == errc::stopped));
 }
 
