@@ -3,6 +3,7 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/system/system_error.hpp>
 
 #include <cerrno>
@@ -16,7 +17,7 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr int datagrams_per_turn = 256;
+constexpr int fetches_per_turn = 16;
 
 template <class T>
 void set_ip_option(asio::ip::udp::socket& socket, int option, const T& value) {
@@ -72,26 +73,28 @@ void group_port::receive() {
     if (owner_ == nullptr) {
         return;
     }
-    shared_.async_receive_from(
-        asio::buffer(buffer_), sender_,
-        [self = shared_from_this()](error_code code, std::size_t count) { self->on_received(code, count); });
+    shared_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
+        if (!code) {
+            self->hand_over();
+        }
+    });
 }
 
-void group_port::on_received(error_code code, std::size_t count) {
-    int turn = datagrams_per_turn;
-    while (owner_ != nullptr && code != asio::error::would_block && code != asio::error::operation_aborted) {
-        if (!code) {
-            try {
-                owner_->on_datagram(sender_, {buffer_.data(), count});
-            } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
-                receive();
-                throw;
-            }
+void group_port::hand_over() {
+    int turn = fetches_per_turn;
+    bool more = true;
+    while (owner_ != nullptr && (!arrived_.empty() || (more && turn-- > 0))) {
+        if (arrived_.empty()) {
+            more = arrived_.fetch(shared_);
+            continue;
         }
-        if (--turn == 0 || owner_ == nullptr) {
-            break;
+        const auto next = arrived_.take();
+        try {
+            owner_->on_datagram(next.from, next.text);
+        } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+            asio::post(shared_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+            throw;
         }
-        count = shared_.receive_from(asio::buffer(buffer_), sender_, 0, code);
     }
     if (owner_ != nullptr) {
         owner_->on_batch();

@@ -3,12 +3,12 @@
 
 #include <cles/multicast.hpp>
 
+#include "transport/datagram_batch.hpp"
 #include "transport/ip_interface.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/udp.hpp>
 
-#include <array>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -61,7 +61,7 @@ class group_port : public std::enable_shared_from_this<group_port> {
 
   private:
     void receive();
-    void on_received(boost::system::error_code code, std::size_t count);
+    void hand_over();
     bool try_to_send(std::string_view line);
     void send_rest();
 
@@ -70,8 +70,7 @@ class group_port : public std::enable_shared_from_this<group_port> {
     udp::socket shared_;
     udp::socket own_;
     group_events* owner_ = nullptr; // null: closed
-    udp::endpoint sender_;
-    std::array<char, 2048> buffer_{}; // more than a datagram may have: what is longer is known for it
+    datagram_batch arrived_;
     std::string waiting_;
     std::size_t waiting_at_ = 0;
     bool waits_for_room_ = false;

@@ -5,6 +5,7 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/container_hash/hash.hpp>
 
 #include <utility>
@@ -15,7 +16,7 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr int datagrams_per_turn = 256;
+constexpr int fetches_per_turn = 16;
 
 bool is_empty(std::string_view datagram) { return datagram.empty() || datagram == "\n" || datagram == "\r\n"; }
 
@@ -86,47 +87,49 @@ void udp_port::receive() {
         return;
     }
     receiving_ = true;
-    socket_.async_receive_from(
-        asio::buffer(buffer_), sender_,
-        [self = shared_from_this()](error_code code, std::size_t count) { self->on_received(code, count); });
+    socket_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
+        if (code) {
+            self->receiving_ = false;
+        } else {
+            self->hand_over();
+        }
+    });
 }
 
-// Until all is handed over it counts as receiving: a link that starts meanwhile must not begin to fill the buffer.
-void udp_port::on_received(error_code code, std::size_t count) {
-    int turn = datagrams_per_turn;
-    while (socket_.is_open() && code != asio::error::would_block && code != asio::error::operation_aborted) {
-        if (!code) { // else the network tells of something sent before, which is nobody's business
-            try {
-                hand_over({buffer_.data(), count});
-            } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
-                receiving_ = false;
-                receive();
-                throw;
-            }
+// Until all is handed over it counts as receiving: a link that starts meanwhile must not begin to wait.
+void udp_port::hand_over() {
+    int turn = fetches_per_turn;
+    bool more = true;
+    while (socket_.is_open() && (!arrived_.empty() || (more && turn-- > 0))) {
+        if (arrived_.empty()) { // what the network tells of something sent before is nobody's business
+            more = arrived_.fetch(socket_);
+            continue;
         }
-        if (--turn == 0 || !socket_.is_open()) {
-            break;
+        try {
+            hand_over(arrived_.take());
+        } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+            asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+            throw;
         }
-        count = socket_.receive_from(asio::buffer(buffer_), sender_, 0, code);
     }
     receiving_ = false;
     receive();
 }
 
-void udp_port::hand_over(std::string_view datagram) {
-    if (is_empty(datagram)) {
+void udp_port::hand_over(const datagram_batch::datagram& one) {
+    if (is_empty(one.text)) {
         return;
     }
-    if (const auto link = link_of_sender()) {
-        link->deliver(datagram);
+    if (const auto link = link_of(one.from)) {
+        link->deliver(one.text);
     }
 }
 
-std::shared_ptr<udp_link> udp_port::link_of_sender() {
-    if (recent_ != nullptr && recent_->endpoint() == sender_) {
+std::shared_ptr<udp_link> udp_port::link_of(const udp::endpoint& sender) {
+    if (recent_ != nullptr && recent_->endpoint() == sender) {
         return recent_->shared_from_this();
     }
-    if (const auto found = links_.find(sender_); found != links_.end()) {
+    if (const auto found = links_.find(sender); found != links_.end()) {
         recent_ = found->second;
         return recent_->shared_from_this();
     }
@@ -134,12 +137,12 @@ std::shared_ptr<udp_link> udp_port::link_of_sender() {
         return nullptr;
     }
     identity who{.transport = "udp",
-                 .address = to_string(url_of("udp", sender_)),
+                 .address = to_string(url_of("udp", sender)),
                  .name = {},
                  .uid = {},
-                 .local = sender_.address().is_loopback()};
-    auto made = std::make_shared<udp_link>(shared_from_this(), sender_, std::move(who));
-    links_.emplace(sender_, made.get());
+                 .local = sender.address().is_loopback()};
+    auto made = std::make_shared<udp_link>(shared_from_this(), sender, std::move(who));
+    links_.emplace(sender, made.get());
     recent_ = made.get();
     const auto tell = on_link_; // which may be taken away meanwhile
     tell(made);

@@ -3,12 +3,12 @@
 
 #include <cles/link.hpp>
 
+#include "transport/datagram_batch.hpp"
 #include "transport/udp_link.hpp"
 
 #include <boost/asio/ip/udp.hpp>
 #include <boost/unordered/unordered_flat_map.hpp>
 
-#include <array>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -50,9 +50,9 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
         std::size_t operator()(const udp::endpoint& e) const noexcept;
     };
 
-    void on_received(boost::system::error_code code, std::size_t count);
-    void hand_over(std::string_view datagram);
-    std::shared_ptr<udp_link> link_of_sender();
+    void hand_over();
+    void hand_over(const datagram_batch::datagram& one);
+    std::shared_ptr<udp_link> link_of(const udp::endpoint& sender);
     void close_if_done();
 
     udp::socket socket_;
@@ -62,8 +62,7 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
     boost::unordered_flat_map<udp::endpoint, udp_link*, endpoint_hash> links_; // which take themselves out
     udp_link* recent_ = nullptr; // most datagrams come from where the one before came from
     std::vector<std::weak_ptr<udp_link>> waiting_;
-    udp::endpoint sender_;
-    std::array<char, 2048> buffer_{}; // more than a datagram may have: what is longer is known for it
+    datagram_batch arrived_;
 };
 
 } // namespace cles::transport
