@@ -24,10 +24,17 @@ void check_url(const std::string& text) {
 } // namespace
 
 void address_book::add_options(CLI::App& command) {
-    auto* at = command.add_option("-a,--at", at_, "Where the node is (default " + std::string{default_url} + ")");
+    auto* at = command.add_option(
+        "-a,--at", at_,
+        "Where the node is, else it is found by its name (default for self: " + std::string{default_url} + ")");
     at->type_name("URL")->envname("CLES_AT");
     auto* peer = command.add_option("-p,--peer", peers_, "Where a node of that name is; may be repeated");
     peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    add_multicast_option(command, multicast_);
+}
+
+cles::multicast_options address_book::multicast() const {
+    return finds_by_name() ? multicast_ : cles::multicast_options{};
 }
 
 void address_book::check() const {
@@ -63,6 +70,10 @@ std::string address_book::url_for(std::string_view node) const {
     if (at_.empty() && !peers_.empty()) {
         throw cles::error(cles::errc::no_target,
                           "no --peer is called '" + std::string{node} + "', and there is no --at");
+    }
+    const bool is_name = node != "self" && node != "any" && node != "all";
+    if (finds_by_name() && is_name) {
+        return {};
     }
     return at_.empty() ? std::string{default_url} : at_;
 }

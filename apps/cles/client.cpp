@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "client.hpp"
 
+#include "diagnostics.hpp"
 #include "exit_code.hpp"
 #include "failure.hpp"
 #include "logging.hpp"
@@ -29,8 +30,20 @@ cles::service_options options_of(const address_book& addresses, int verbosity) {
     cles::service_options options;
     options.name = "cles-" + std::to_string(::getpid());
     options.peers = addresses.peers();
+    options.multicast = addresses.multicast();
+    options.insecure = true; // it listens nowhere; in the group it hears what anybody says
     options.log = log_of_client(verbosity);
     return options;
+}
+
+bool is_no_target(const std::exception_ptr& thrown) {
+    try {
+        std::rethrow_exception(thrown);
+    } catch (const cles::error& e) {
+        return e.code() == cles::errc::no_target;
+    } catch (...) {
+        return false;
+    }
 }
 
 } // namespace
@@ -83,7 +96,26 @@ int client::run(asio::awaitable<void> work) {
     if (early_) {
         return *early_;
     }
-    return thrown ? report_failure(thrown) : exit_code::success;
+    if (!thrown) {
+        return exit_code::success;
+    }
+    const auto code = report_failure(thrown);
+    if (code == exit_code::not_found && addresses_.finds_by_name() && is_no_target(thrown)) {
+        note("cles ls shows who is there; --at URL or --peer NAME=URL says where else to ask");
+    }
+    return code;
+}
+
+std::string client::where_is(std::string_view node) const {
+    auto url = addresses_.where_is(node);
+    if (url.empty()) {
+        for (const auto& other : node_.peers()) {
+            if (other.node == node && other.state != cles::peer_state::clash && !other.endpoints.empty()) {
+                url = other.endpoints.front();
+            }
+        }
+    }
+    return url;
 }
 
 void client::end_early(int code) {

@@ -32,6 +32,9 @@ class client {
     [[nodiscard]] cles::call_options options_for(std::string_view noun,
                                                  std::optional<std::chrono::milliseconds> limit) const;
 
+    /// The URL at which that node is asked, once it has answered.
+    [[nodiscard]] std::string where_is(std::string_view node) const;
+
     /// Ends the work, with success, when so much time has gone.
     void end_after(std::chrono::milliseconds span);
 

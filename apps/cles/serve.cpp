@@ -7,6 +7,7 @@
 #include "exit_code.hpp"
 #include "failure.hpp"
 #include "logging.hpp"
+#include "multicast_option.hpp"
 #include "output.hpp"
 #include "play_node.hpp"
 
@@ -31,6 +32,7 @@ namespace {
 struct serve_command {
     std::string name = "car1";
     std::vector<std::string> listen;
+    cles::multicast_options multicast = default_multicast();
     bool insecure = false;
     std::vector<std::string> networks;
     double rate = 10;
@@ -50,6 +52,7 @@ cles::service_options options_of(const serve_command& wanted, const cles::log_si
             throw usage_error("--listen '" + where + "': nobody outside of this process could reach it");
         }
     }
+    options.multicast = wanted.multicast;
     options.insecure = wanted.insecure;
     options.networks = wanted.networks;
     options.log = log;
@@ -89,6 +92,7 @@ void add_serve(CLI::App& app, context& shared) {
         ->type_name("URL")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    add_multicast_option(*command, wanted->multicast);
     command->add_option("--rate", wanted->rate, "Localizations published a second; 0: only on PULL (default 10)")
         ->type_name("HZ")
         ->check(CLI::Range(0.0, 1e6).description(""));
