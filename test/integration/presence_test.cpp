@@ -85,6 +85,12 @@ struct fixture {
     }
     bool knows(const cles::service& s, std::string_view name) { return find(s.peers(), name) != nullptr; }
 
+    std::uint64_t announcements_sent(cles::service& of) {
+        const auto all = pulled(of, "self:cles/metrics").text;
+        const std::string_view key = "\"announcements_sent\":";
+        return std::stoull(all.substr(all.find(key) + key.size()));
+    }
+
     struct outcome {
         bool ended = false;
         boost::system::error_code code;
@@ -124,6 +130,21 @@ BOOST_FIXTURE_TEST_CASE(a_name_is_found_by_the_first_request, fixture) {
     BOOST_TEST(!answer.code);
     BOOST_TEST(answer.text == R"({"value":"car1"})");
     BOOST_TEST((std::chrono::steady_clock::now() - begun < patience));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_name_is_called_and_answers_without_the_jitter_of_a_round, fixture) {
+    const auto car1 = serving("car1");
+    until([&] { return announcements_sent(*car1) == 1; });
+    speaker caller{here, where};
+    const auto asked = std::chrono::steady_clock::now();
+    for (std::uint64_t i = 2; i < 12; ++i) {
+        caller.say("BIND another:cles");
+        caller.say("BIND car1:cles");
+        until([&] { return announcements_sent(*car1) >= i; });
+    }
+    const auto took = std::chrono::steady_clock::now() - asked;
+    BOOST_TEST((took >= 900ms)); // there is a pause between any two
+    BOOST_TEST((took < 6s));     // ten intervals are longer
 }
 
 BOOST_FIXTURE_TEST_CASE(many_requests_wait_together, fixture) {

@@ -46,7 +46,7 @@ struct fixture : cles::core::announcer::voice {
 BOOST_FIXTURE_TEST_SUITE(announcer, fixture)
 
 BOOST_AUTO_TEST_CASE(it_announces_at_its_start) {
-    node.changed(clock.now());
+    node.hurry(clock.now());
     node.solicited(clock.now());
     BOOST_TEST(!deadlines.next()); // not yet begun
     begin();
@@ -86,10 +86,10 @@ BOOST_AUTO_TEST_CASE(the_interval_has_an_end) {
     BOOST_TEST((interval == 60s));
 }
 
-BOOST_AUTO_TEST_CASE(a_change_does_not_wait_for_the_interval) {
+BOOST_AUTO_TEST_CASE(a_change_or_a_call_by_name_does_not_wait) {
     begin();
     pass(500ms);
-    node.changed(clock.now());
+    node.hurry(clock.now());
     deadlines.expire(clock.now());
     BOOST_TEST(times.size() == 2U);
     BOOST_TEST((last_gap() == 500ms));
@@ -99,7 +99,7 @@ BOOST_AUTO_TEST_CASE(many_changes_are_told_together_with_a_pause_before) {
     begin();
     pass(10ms);
     for (int i = 0; i < 200; ++i) { // for 200 ms
-        node.changed(clock.now());
+        node.hurry(clock.now());
         pass(1ms);
     }
     BOOST_TEST(times.size() == 3U);
@@ -137,7 +137,7 @@ BOOST_AUTO_TEST_CASE(however_often_it_is_asked_it_pauses_between_answers) {
     begin();
     for (int i = 0; i < 1000; ++i) {
         node.solicited(clock.now());
-        node.changed(clock.now());
+        node.hurry(clock.now());
         pass(1ms);
     }
     BOOST_TEST(times.size() <= 11U);
@@ -154,7 +154,7 @@ BOOST_AUTO_TEST_CASE(who_asks_when_it_has_just_announced_itself_is_answered_too)
 BOOST_AUTO_TEST_CASE(once_stopped_it_is_silent) {
     begin();
     node.stop();
-    node.changed(clock.now());
+    node.hurry(clock.now());
     node.solicited(clock.now());
     pass(5s);
     BOOST_TEST(times.size() == 1U);

@@ -11,7 +11,7 @@ void announcer::start(time_point now) {
     by(now);
 }
 
-void announcer::changed(time_point now) { by(now); }
+void announcer::hurry(time_point now) { by(now); }
 
 void announcer::solicited(time_point now) { by(now + jitter_.quarter_of(answer_within * 4)); }
 

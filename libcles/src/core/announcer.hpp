@@ -41,8 +41,8 @@ class announcer final : private deadline {
 
     /// Begins; before that nothing else has an effect.
     void start(time_point now);
-    /// What it would say is another thing now.
-    void changed(time_point now);
+    /// What it would say is another thing now, or somebody asks for this node alone: no time is lost.
+    void hurry(time_point now);
     /// Somebody wants to know who is there.
     void solicited(time_point now);
     void stop() noexcept;

@@ -45,11 +45,12 @@ bool group_session::serve(const group_source& from, std::string_view datagram, t
 bool group_session::on_bind(const group_source&, const protocol::request_line& bind, time_point now) {
     const auto& noun = bind.noun;
     if (noun.task == "cles") {
-        if (noun.target != "all" || !noun.parameters.empty()) {
+        if (!noun.parameters.empty()) {
             return false;
         }
-        if (presence_ != nullptr) {
-            presence_->on_solicitation(now);
+        const bool by_name = noun.target != "all";
+        if (presence_ != nullptr && (!by_name || noun.target == node_.name)) {
+            presence_->on_solicitation(by_name, now);
         }
         return true;
     }

@@ -37,9 +37,15 @@ void neighbours::begin() {
     engine_.settle();
 }
 
+void neighbours::ask_for(std::string_view node) {
+    if (group_ != nullptr) {
+        group_->send("BIND " + std::string{node} + ":cles\n");
+    }
+}
+
 void neighbours::changed() {
     if (group_ != nullptr) {
-        announcer_.changed(engine_.now());
+        announcer_.hurry(engine_.now());
         engine_.settle();
     }
 }
@@ -108,7 +114,13 @@ std::vector<std::string> neighbours::endpoints_to_tell() const {
 
 std::size_t neighbours::others() const { return engine_.node().others.size(); }
 
-void neighbours::on_solicitation(time_point now) { announcer_.solicited(now); }
+void neighbours::on_solicitation(bool by_name, time_point now) {
+    if (by_name) {
+        announcer_.hurry(now); // nobody else answers
+    } else {
+        announcer_.solicited(now);
+    }
+}
 
 // -- what others say -----------------------------------------------------------------------------------------------
 

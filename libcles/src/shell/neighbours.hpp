@@ -43,6 +43,8 @@ class neighbours final : private core::group_presence,
 
     /// As `presence::find`.
     [[nodiscard]] std::optional<std::string_view> find(std::string_view node) const noexcept;
+    /// Asks the node of that name where it is.
+    void ask_for(std::string_view node);
     /// Whether a name that is not known may be heard any moment.
     [[nodiscard]] bool expects_more() const noexcept { return !round_.over(); }
     /// Why a name is not known, as the first part of a sentence; empty without a group.
@@ -54,7 +56,7 @@ class neighbours final : private core::group_presence,
     void announce(std::chrono::milliseconds interval, bool leaving);
     [[nodiscard]] std::size_t others() const override;
     void on_round_over() override;
-    void on_solicitation(time_point now) override;
+    void on_solicitation(bool by_name, time_point now) override;
     void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) override;
     void on_peer(std::string_view node, core::presence::change what, std::string_view where) override;
     [[nodiscard]] std::vector<std::string> endpoints_to_tell() const;

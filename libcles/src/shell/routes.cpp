@@ -81,6 +81,7 @@ route* routes::find(std::string_view target, std::string_view at, boost::system:
         std::shared_ptr<route> made;
         if (at.empty() && address.starts_with(unheard)) {
             made = std::make_shared<route>(engine_.shared_from_this(), target);
+            engine_.neighbours().ask_for(target);
         } else {
             const auto where = parse_url(address);
             if (find_transport(where.scheme) == nullptr) {

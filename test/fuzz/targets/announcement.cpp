@@ -9,8 +9,9 @@
 
 #include "core/presence.hpp"
 #include "core/reachable.hpp"
-#include "fuzz.hpp"
+#include "fuzz/fuzz.hpp"
 #include "protocol/datagram.hpp"
+#include "protocol/line.hpp"
 #include "protocol/message.hpp"
 
 #include <chrono>
@@ -69,7 +70,7 @@ void run(std::string_view input) {
         const auto end = input.find('\n');
         const auto line = protocol::trim(input.substr(0, end));
         input.remove_prefix(end == std::string_view::npos ? input.size() : end + 1);
-        now += std::chrono::milliseconds{line.size() * 7};
+        now += std::chrono::milliseconds{static_cast<int>(line.size()) * 7};
         deadlines.expire(now);
         protocol::request_line update;
         protocol::malformed_request wrong;
