@@ -32,6 +32,7 @@ void a_service();
 void an_open_service();
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
 asio::awaitable<void> asking(cles::service& car);
+asio::awaitable<void> finding(asio::io_context& io);
 asio::awaitable<void> errors(cles::service& car);
 asio::awaitable<void> feeds(cles::service& car, position here);
 void blocking(cles::service& me);
@@ -69,6 +70,15 @@ asio::awaitable<void> asking(cles::service& car) {
     const auto metres = co_await car.async_delegate<double>("car0:park", where, cles::call_options{}.deadline(20s));
     const auto answer = co_await car.async_request("PULL car0:tyre/2"); // JSON, as text
     std::cout << metres << answer.text;
+}
+
+asio::awaitable<void> finding(asio::io_context& io) {
+    cles::service radar{io, {.name = "radar", .listen = {"tcp://127.0.0.1:0"}, .multicast = {.interface = "lo"}}};
+    const auto speed = co_await radar.async_pull<double>("car0:speed"); // wherever car0 is
+    for (const auto& other : radar.peers()) {
+        std::cout << other.node << ' ' << to_string(other.state) << '\n';
+    }
+    std::cout << speed;
 }
 
 asio::awaitable<void> errors(cles::service& car) {
