@@ -11,6 +11,8 @@
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
+#include <cstdlib>
+
 namespace tool {
 namespace {
 
@@ -23,23 +25,24 @@ void check_url(const std::string& text) {
 
 } // namespace
 
-void address_book::add_options(CLI::App& command) {
-    auto* at = command.add_option(
-        "-a,--at", at_,
-        "Where the node is, else it is found by its name (default for self: " + std::string{default_url} + ")");
-    at->type_name("URL")->envname("CLES_AT");
+void address_book::add_options(CLI::App& command, const std::string& multicast_help) {
+    auto* at = command.add_option("-a,--at", at_,
+                                  "Where the node is (default CLES_AT; else it is found by its name, and self is " +
+                                      std::string{default_url} + ")");
+    at->type_name("URL");
     auto* peer = command.add_option("-p,--peer", peers_, "Where a node of that name is; may be repeated");
     peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    add_multicast_option(command, multicast_);
+    multicast_.add_to(command, multicast_help);
 }
 
-cles::multicast_options address_book::multicast() const {
-    return finds_by_name() ? multicast_ : cles::multicast_options{};
+std::string address_book::at() const {
+    const char* otherwise = std::getenv("CLES_AT");
+    return at_.empty() && otherwise != nullptr ? otherwise : at_;
 }
 
 void address_book::check() const {
-    if (!at_.empty()) {
-        check_url(at_);
+    if (const auto where = at(); !where.empty()) {
+        check_url(where);
     }
     for (const auto& peer : peers_) {
         const auto equals = peer.find('=');
@@ -67,15 +70,15 @@ std::string address_book::url_for(std::string_view node) const {
     if (peers().contains(std::string{node})) {
         return {};
     }
-    if (at_.empty() && !peers_.empty()) {
+    const auto where = at();
+    if (where.empty() && !peers_.empty()) {
         throw cles::error(cles::errc::no_target,
                           "no --peer is called '" + std::string{node} + "', and there is no --at");
     }
-    const bool is_name = node != "self" && node != "any" && node != "all";
-    if (finds_by_name() && is_name) {
+    if (finds_by_name() && node != "self" && node != "any" && node != "all") {
         return {};
     }
-    return at_.empty() ? std::string{default_url} : at_;
+    return where.empty() ? std::string{default_url} : where;
 }
 
 std::string address_book::where_is(std::string_view node) const {

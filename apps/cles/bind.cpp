@@ -6,7 +6,6 @@
 #include "context.hpp"
 #include "feed_command.hpp"
 #include "feed_events.hpp"
-#include "noun.hpp"
 #include "printer.hpp"
 
 #include <CLI/App.hpp>
@@ -14,6 +13,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 
 namespace tool {
 namespace {
@@ -25,6 +25,18 @@ struct bind_command {
     output_format format = output_format::automatic;
 };
 
+// Of `all:` it is told whose update it is.
+void show(printer& out, const bind_command& wanted, const cles::feed_item<cles::json_text>& item) {
+    const auto seq = item.kind == cles::feed_event::update ? std::to_string(item.seq) : "-";
+    if (!wanted.feed.noun.starts_with("all:")) {
+        out.print(item.value.text, seq);
+    } else if (resolved(wanted.format) == output_format::table) {
+        out.print(item.value.text, item.publisher + " " + seq);
+    } else {
+        out.print(R"({"node":")" + item.publisher + R"(","seq":)" + seq + R"(,"update":)" + item.value.text + "}");
+    }
+}
+
 asio::awaitable<void> follow(client& asker, const bind_command& wanted) {
     printer out{wanted.format, true};
     const auto options = wanted.feed.options(asker);
@@ -32,7 +44,7 @@ asio::awaitable<void> follow(client& asker, const bind_command& wanted) {
     for (std::uint64_t shown = 0; wanted.feed.count == 0 || shown < wanted.feed.count;) {
         const auto item = co_await feed.async_next();
         if (item.has_value()) {
-            out.print(item.value.text, item.kind == cles::feed_event::update ? std::to_string(item.seq) : "-");
+            show(out, wanted, item);
             ++shown;
         } else {
             note_event(wanted.feed.noun, item);
@@ -53,10 +65,12 @@ void add_bind(CLI::App& app, context& shared) {
                     "Examples:\n"
                     "  cles bind car1:localization\n"
                     "  cles bind car1:localization --every 1s -n 10\n"
+                    "  cles bind all:localization\n"
+                    "  cles bind car1:localization --multicast eth0\n"
                     "  cles bind car1:localization -o json | jq -c '[.lat,.lon]'");
     command->callback([wanted, &shared] {
-        check_noun(wanted->feed.noun);
-        client asker{wanted->feed.addresses, shared.verbosity};
+        wanted->feed.check();
+        client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.is_multicast()};
         wanted->feed.arm(asker);
         shared.exit_code = asker.run(follow(asker, *wanted));
     });

@@ -25,13 +25,15 @@ namespace asio = boost::asio;
 
 namespace {
 
-cles::service_options options_of(const address_book& addresses, int verbosity) {
+cles::service_options options_of(const address_book& addresses, int verbosity, bool in_group) {
     addresses.check();
     cles::service_options options;
     options.name = "cles-" + std::to_string(::getpid());
     options.peers = addresses.peers();
-    options.multicast = addresses.multicast();
-    options.insecure = true; // it listens nowhere; in the group it hears what anybody says
+    if (in_group || addresses.finds_by_name()) {
+        options.multicast = addresses.group();
+    }
+    options.insecure = true; // nothing is served here
     options.log = log_of_client(verbosity);
     return options;
 }
@@ -48,9 +50,9 @@ bool is_no_target(const std::exception_ptr& thrown) {
 
 } // namespace
 
-client::client(const address_book& addresses, int verbosity)
+client::client(const address_book& addresses, int verbosity, bool in_group)
     : addresses_(addresses), signals_(io_, SIGINT, SIGTERM), end_timer_(io_), output_timer_(io_), sleep_timer_(io_),
-      node_(io_, options_of(addresses, verbosity)) {}
+      node_(io_, options_of(addresses, verbosity, in_group)) {}
 
 cles::call_options client::options_for(std::string_view noun, std::optional<std::chrono::milliseconds> limit) const {
     cles::call_options options;

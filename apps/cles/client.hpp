@@ -23,7 +23,8 @@ namespace tool {
 /// when nobody reads its output any more; a request in flight is then withdrawn.
 class client {
   public:
-    client(const address_book& addresses, int verbosity);
+    /// `in_group`: it takes part in multicast, even where nothing is to be found by its name.
+    client(const address_book& addresses, int verbosity, bool in_group = false);
 
     cles::service& node() noexcept { return node_; }
     boost::asio::io_context& context() noexcept { return io_; }

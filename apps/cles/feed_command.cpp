@@ -3,6 +3,8 @@
 
 #include "client.hpp"
 #include "common_options.hpp"
+#include "failure.hpp"
+#include "noun.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -12,7 +14,7 @@ namespace tool {
 
 void feed_command::add_options(CLI::App& command, const std::string& count_help) {
     add_noun(command, noun);
-    addresses.add_options(command);
+    addresses.add_options(command, "Bind by multicast, by which interface; all:TASK goes that way by itself");
     add_timeout(command, timeout, "5s");
     add_count(command, count, count_help);
     add_duration(command, "--duration", duration, "End after this time, with success (default: never)");
@@ -22,7 +24,23 @@ void feed_command::add_options(CLI::App& command, const std::string& count_help)
         ->check(CLI::Range(1, 65536).description(""));
 }
 
+bool feed_command::is_multicast() const {
+    return (addresses.has_group() && addresses.group().is_on()) || (noun.starts_with("all:") && !addresses.has_at());
+}
+
+void feed_command::check() const {
+    check_noun(noun);
+    if (addresses.has_group() && addresses.has_at()) {
+        throw usage_error("--multicast and --at: an update comes by the one or by the other");
+    }
+}
+
 cles::bind_options feed_command::options(const client& asker) const {
+    if (is_multicast()) {
+        cles::bind_options by_group;
+        by_group.multicast();
+        return by_group;
+    }
     const auto call = asker.options_for(noun, timeout);
     cles::bind_options out;
     out.at(call.at_).deadline(call.deadline_).every(every);

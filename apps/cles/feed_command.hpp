@@ -29,6 +29,10 @@ struct feed_command {
     std::uint64_t count = 0;
 
     void add_options(CLI::App& command, const std::string& count_help);
+    /// Whether the group is bound, and no link: `all:` where no address was given, and what --multicast asks for.
+    [[nodiscard]] bool is_multicast() const;
+    /// \throws usage_error where the options do not go together
+    void check() const;
     [[nodiscard]] cles::bind_options options(const client& asker) const;
     /// Has the client end when the duration is over, if one was given.
     void arm(client& asker) const;

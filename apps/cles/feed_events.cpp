@@ -3,12 +3,16 @@
 
 #include "diagnostics.hpp"
 
+#include <algorithm>
 #include <string>
 
 namespace tool {
 
 void note_event(std::string_view noun, const cles::feed_item<cles::json_text>& item) {
-    const std::string name{noun};
+    // Of `all:`, whose update it was that is missing.
+    const auto task = noun.substr(std::min(noun.find(':'), noun.size()));
+    const std::string name =
+        noun.starts_with("all:") && !item.publisher.empty() ? item.publisher + std::string{task} : std::string{noun};
     switch (item.kind) {
     case cles::feed_event::gap:
         note(name + ": gap: " + std::to_string(item.missed) + (item.missed == 1 ? " update" : " updates") + " missed");

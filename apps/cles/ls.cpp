@@ -113,7 +113,7 @@ asio::awaitable<void> show(client& asker, const ls_command& wanted) {
         printer{wanted.format, false}.print(to_json(nodes, wanted.tasks));
     }
     if (nodes.empty()) {
-        note("nobody has announced itself on " + wanted.addresses.multicast().interface +
+        note("nobody has announced itself on " + wanted.addresses.group().interface +
              "; --multicast says where else to listen");
     }
 }

@@ -1,20 +1,50 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "multicast_option.hpp"
 
+#include <cles/error.hpp>
+
+#include "failure.hpp"
+
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
-#include <string>
+#include <cstdlib>
 
 namespace tool {
+namespace {
 
-void add_multicast_option(CLI::App& command, cles::multicast_options& where) {
+cles::multicast_options read(const std::string& text, const std::string& whence) {
+    try {
+        return cles::parse_multicast(text);
+    } catch (const cles::error& e) {
+        throw usage_error(whence + ": " + e.message());
+    }
+}
+
+} // namespace
+
+void multicast_option::add_to(CLI::App& command, const std::string& help) {
     command
         .add_option_function<std::string>(
-            "-m,--multicast", [&where](const std::string& text) { where = cles::parse_multicast(text); },
-            "The interface by which nodes find each other, as in eth0, or off (default lo)")
-        ->type_name("IFACE[,GROUP[:PORT]]")
-        ->envname("CLES_MULTICAST");
+            "-m,--multicast",
+            [this](const std::string& text) {
+                read(text, "--multicast");
+                given_ = text;
+            },
+            help + " (default CLES_MULTICAST, or else lo)")
+        ->type_name("IFACE[,GROUP[:PORT]]|off");
+}
+
+cles::multicast_options multicast_option::where() const {
+    if (is_given()) {
+        return read(given_, "--multicast");
+    }
+    if (const char* wanted = std::getenv("CLES_MULTICAST"); wanted != nullptr && *wanted != '\0') {
+        return read(wanted, "CLES_MULTICAST");
+    }
+    cles::multicast_options otherwise{.interface = "lo"};
+    otherwise.required = false;
+    return otherwise;
 }
 
 } // namespace tool

@@ -3,16 +3,28 @@
 
 #include <cles/multicast.hpp>
 
+#include <string>
+
 namespace CLI {
 class App;
 }
 
 namespace tool {
 
-/// Programs take part on loopback unless something else is said.
-inline cles::multicast_options default_multicast() { return {.interface = "lo"}; }
+/// --multicast: by which interface the command takes part in multicast. Where it is not given, CLES_MULTICAST says so;
+/// where that is not set either, it is loopback, as far as that can be joined.
+class multicast_option {
+  public:
+    /// `help` says what the command does with it.
+    void add_to(CLI::App& command, const std::string& help);
 
-/// --multicast, and CLES_MULTICAST in the environment.
-void add_multicast_option(CLI::App& command, cles::multicast_options& where);
+    /// On the command line, and not in the environment.
+    [[nodiscard]] bool is_given() const noexcept { return !given_.empty(); }
+    /// \throws usage_error where it makes no sense
+    [[nodiscard]] cles::multicast_options where() const;
+
+  private:
+    std::string given_;
+};
 
 } // namespace tool

@@ -32,9 +32,9 @@ namespace {
 struct serve_command {
     std::string name = "car1";
     std::vector<std::string> listen;
-    cles::multicast_options multicast = default_multicast();
     bool insecure = false;
     std::vector<std::string> networks;
+    multicast_option multicast;
     double rate = 10;
     int busy_poll_us = 0;
     int real_time = 0;
@@ -52,9 +52,9 @@ cles::service_options options_of(const serve_command& wanted, const cles::log_si
             throw usage_error("--listen '" + where + "': nobody outside of this process could reach it");
         }
     }
-    options.multicast = wanted.multicast;
     options.insecure = wanted.insecure;
     options.networks = wanted.networks;
+    options.multicast = wanted.multicast.where();
     options.log = log;
     return options;
 }
@@ -92,7 +92,6 @@ void add_serve(CLI::App& app, context& shared) {
         ->type_name("URL")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    add_multicast_option(*command, wanted->multicast);
     command->add_option("--rate", wanted->rate, "Localizations published a second; 0: only on PULL (default 10)")
         ->type_name("HZ")
         ->check(CLI::Range(0.0, 1e6).description(""));
@@ -107,20 +106,23 @@ void add_serve(CLI::App& app, context& shared) {
         ->type_name("PRIO")
         ->check(CLI::Range(1, 99).description(""));
     command->add_flag("--insecure", wanted->insecure,
-                      "Allow listening beyond this host, where anybody may ask for anything");
+                      "Allow listening and multicast beyond this host, where anybody may ask for anything");
     command
         ->add_option("--network", wanted->networks,
                      "Hosts that may be sent as much by UDP as they ask for, as in 10.0.0.0/8; may be repeated")
         ->type_name("NETWORK")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    wanted->multicast.add_to(*command,
+                             "By which interface it is found by its name, and publishes to whoever binds by multicast");
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
                     "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop it.\n\n"
                     "Examples:\n"
                     "  cles serve\n"
                     "  cles serve --name car2 --listen tcp://127.0.0.1:0 --listen unix:///tmp/car2.sock --rate 50\n"
                     "  cles serve --listen tcp://0.0.0.0 --insecure\n"
-                    "  cles serve --listen tcp://127.0.0.1 --listen udp://127.0.0.1");
+                    "  cles serve --listen tcp://127.0.0.1 --listen udp://127.0.0.1\n"
+                    "  cles serve --multicast eth0 --insecure");
     command->callback([wanted, &shared] { shared.exit_code = serve(*wanted, shared.verbosity); });
 }
 

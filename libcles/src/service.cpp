@@ -6,6 +6,7 @@
 #include "protocol/parts.hpp"
 #include "shell/engine.hpp"
 #include "shell/feed_handle.hpp"
+#include "shell/group_feed_handle.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -127,6 +128,9 @@ std::shared_ptr<detail::feed_control> service::make_feed(std::string_view noun, 
     }
     std::string scratch;
     const std::string path{protocol::canonical_path(parts, scratch)};
+    if (options.multicast_ || (parts.target == "all" && options.at_.empty())) {
+        return shell::make_group_feed(engine_, parts, path, options);
+    }
     auto made =
         std::make_shared<shell::feed_handle>(engine_, std::string{parts.target}, path, options.every_.count() > 0);
     engine_->feeds().enter(made->machine(), made,

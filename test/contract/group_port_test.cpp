@@ -9,9 +9,15 @@
 #include <boost/system/system_error.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <array>
+#include <cerrno>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 BOOST_AUTO_TEST_SUITE(group_port)
 
@@ -103,6 +109,35 @@ BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_hears_hears_no_more, fixtu
     run_ready(io);
     BOOST_TEST(two.heard.size() == 1U);
     BOOST_TEST(two.port->send("into the void\n"));
+}
+
+BOOST_FIXTURE_TEST_CASE(datagrams_go_out_with_a_TTL_of_1, fixture) {
+    udp::socket sniffer{io, udp::v4()};
+    sniffer.set_option(asio::socket_base::reuse_address{true});
+    sniffer.bind({asio::ip::make_address_v4(where.group), where.port});
+    const auto by = cles::transport::find_interface("lo");
+    sniffer.set_option(asio::ip::multicast::join_group{asio::ip::make_address_v4(where.group), by.address});
+    const int on = 1;
+    BOOST_REQUIRE(::setsockopt(sniffer.native_handle(), IPPROTO_IP, IP_RECVTTL, &on, sizeof on) == 0);
+    sniffer.non_blocking(true);
+    member one{io, where};
+    one.port->send("x\n");
+
+    std::array<char, 64> data{};
+    alignas(cmsghdr) std::array<char, 64> control{};
+    iovec piece{.iov_base = data.data(), .iov_len = data.size()};
+    msghdr message{};
+    message.msg_iov = &piece;
+    message.msg_iovlen = 1;
+    message.msg_control = control.data();
+    message.msg_controllen = control.size();
+    run_until(io, [&] { return ::recvmsg(sniffer.native_handle(), &message, 0) == 2; });
+    const auto* first = CMSG_FIRSTHDR(&message);
+    BOOST_REQUIRE(first != nullptr);
+    BOOST_TEST(first->cmsg_type == IP_TTL);
+    int ttl = 0;
+    std::memcpy(&ttl, CMSG_DATA(first), sizeof ttl);
+    BOOST_TEST(ttl == 1);
 }
 
 BOOST_FIXTURE_TEST_CASE(an_interface_that_is_none_is_refused, fixture) {

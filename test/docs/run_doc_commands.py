@@ -15,7 +15,7 @@
 - "sh no-test: REASON" and "console no-test: REASON" are left out.
 
 The commands run from ROOT, with FOLDER (where `cles` is) in the path. So that runs do not meet, ports 253xx stand for free
-ones (the default 25370 too), /tmp for a fresh folder, and build/release for BUILD.
+ones (the default 25370 too, and the multicast group's), /tmp for a fresh folder, and build/release for BUILD.
 """
 
 import argparse
@@ -153,6 +153,12 @@ def agree(block: Block, expected: list[str], printed: list[str]) -> bool:
     return matches(expected, printed)
 
 
+def free_udp_port() -> int:
+    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
 def run_page(page: Path, root: Path, build: Path, path: Path) -> list[str]:
     problems: list[str] = []
     scratch = Path(tempfile.mkdtemp(prefix="cles-docs-"))
@@ -163,7 +169,7 @@ def run_page(page: Path, root: Path, build: Path, path: Path) -> list[str]:
         (programs / "nc").symlink_to(Path(__file__).resolve().parent / "netcat.py")
     inherited = {name: value for name, value in os.environ.items() if name != "CLES_AT"}
     environment = {**inherited, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "COLUMNS": "120",
-                   "CLES_MULTICAST": f"lo,239.255.25.37:{substitution.port_for('25370')}",
+                   "CLES_MULTICAST": f"lo,239.255.25.37:{free_udp_port()}",
                    "PATH": os.pathsep.join([str(path), str(programs), os.environ["PATH"]])}
     shell = Shell(root, environment, scratch)
     count = 0

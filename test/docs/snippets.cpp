@@ -30,11 +30,13 @@ bool only_look(const cles::access& asked) { return asked.verb == cles::verb::pul
 
 void a_service();
 void an_open_service();
+void a_service_in_a_group();
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
 asio::awaitable<void> asking(cles::service& car);
 asio::awaitable<void> finding(asio::io_context& io);
 asio::awaitable<void> errors(cles::service& car);
 asio::awaitable<void> feeds(cles::service& car, position here);
+asio::awaitable<void> feeds_of_all(cles::service& car);
 void blocking(cles::service& me);
 asio::awaitable<double> drive_to(position where);
 double pressure_of(const cles::request& asked);
@@ -52,6 +54,13 @@ void an_open_service() {
     asio::io_context io;
     cles::service open{io, {.name = "car1", .listen = {"tcp://0.0.0.0:0"}, .insecure = true}};
     cles::service fast{io, {.name = "car2", .listen = {"udp://127.0.0.1:0"}, .networks = {"10.0.0.0/8", "fd00::/8"}}};
+}
+
+void a_service_in_a_group() {
+    cles::service_options in_group{.name = "car3"};
+    in_group.multicast.interface = "lo"; // "eth0" needs `insecure`, as listening there does
+    asio::io_context io;
+    const cles::service car{io, in_group};
 }
 
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres) {
@@ -103,6 +112,13 @@ asio::awaitable<void> feeds(cles::service& car, position here) {
             slow_down(event.text);
         }
     }
+}
+
+asio::awaitable<void> feeds_of_all(cles::service& car) {
+    auto all = co_await car.async_bind<position>("all:position");
+    auto one = co_await car.async_bind<position>("car0:position", cles::bind_options{}.multicast());
+    const auto event = co_await all.async_next();
+    std::cout << event.publisher << " is at " << event.value.lat << '\n';
 }
 
 void blocking(cles::service& me) {

@@ -79,11 +79,11 @@ struct fixture {
     /// The next event that is there, or "(nothing)".
     std::string next() {
         wait w;
-        if (!feed.next(cles::core::feed_machine::event_ptr{&w})) {
-            feed.cancel();
+        if (!feed.mail().next(cles::core::feed_machine::event_ptr{&w})) {
+            feed.mail().cancel();
             return "(nothing)";
         }
-        feed.pump();
+        feed.mail().pump();
         return w.text;
     }
     void pass(std::chrono::milliseconds by) {
@@ -134,11 +134,11 @@ BOOST_AUTO_TEST_CASE(a_refusal_of_the_first_bind_closes_it) {
 BOOST_AUTO_TEST_CASE(an_event_goes_to_whoever_waits) {
     bound();
     wait w;
-    BOOST_TEST(!feed.next(cles::core::feed_machine::event_ptr{&w}));
-    BOOST_TEST(feed.has_waiter());
+    BOOST_TEST(!feed.mail().next(cles::core::feed_machine::event_ptr{&w}));
+    BOOST_TEST(feed.mail().has_waiter());
     update(1);
     BOOST_TEST(w.text == "update 1 {}");
-    BOOST_TEST(!feed.has_waiter());
+    BOOST_TEST(!feed.mail().has_waiter());
     BOOST_TEST(next() == "(nothing)");
 }
 
@@ -236,7 +236,7 @@ BOOST_AUTO_TEST_CASE(answers_that_come_too_late_change_nothing) {
 BOOST_AUTO_TEST_CASE(closing_unbinds_once_and_ends_the_wait) {
     bound();
     wait w;
-    feed.next(cles::core::feed_machine::event_ptr{&w});
+    feed.mail().next(cles::core::feed_machine::event_ptr{&w});
     feed.close(errc::cancelled);
     BOOST_TEST(w.text == "failed: the request was withdrawn");
     BOOST_TEST(feed.closed());
@@ -266,10 +266,10 @@ BOOST_AUTO_TEST_CASE(closing_while_it_pauses_ends_the_tries) {
 BOOST_AUTO_TEST_CASE(a_wait_can_be_cancelled_without_harm_to_the_feed) {
     bound();
     wait w;
-    feed.next(cles::core::feed_machine::event_ptr{&w});
-    feed.cancel();
+    feed.mail().next(cles::core::feed_machine::event_ptr{&w});
+    feed.mail().cancel();
     BOOST_TEST(w.text == "failed: the request was withdrawn");
-    feed.cancel();
+    feed.mail().cancel();
     update(1);
     BOOST_TEST(next() == "update 1 {}");
 }
@@ -278,13 +278,13 @@ BOOST_AUTO_TEST_CASE(an_event_that_is_there_is_delivered_by_the_pump_and_not_ins
     bound();
     update(1);
     wait w;
-    BOOST_TEST(feed.next(cles::core::feed_machine::event_ptr{&w}));
+    BOOST_TEST(feed.mail().next(cles::core::feed_machine::event_ptr{&w}));
     BOOST_TEST(w.text == "(waiting)");
     update(2); // keeps its place behind the first
     BOOST_TEST(w.text == "(waiting)");
-    feed.pump();
+    feed.mail().pump();
     BOOST_TEST(w.text == "update 1 {}");
-    feed.pump(); // nobody waits
+    feed.mail().pump(); // nobody waits
     BOOST_TEST(next() == "update 2 {}");
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/group_session.hpp"
+#include "support/group_recorder.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/data/monomorphic.hpp>
@@ -44,7 +45,8 @@ struct fixture {
 
     cles::test::test_node node;
     recording_presence presence;
-    cles::core::group_session session{*node.host, self};
+    cles::test::group_recorder out;
+    cles::core::group_session session{*node.host, self, out, 1};
 };
 
 } // namespace
@@ -112,6 +114,7 @@ const std::vector<std::string> unwanted{
     "UPDATE car2:cles/x seq=1 epoch=5f3a09c1 {}",
     "UPDATE car2:cles seq=1 epoch=5f3a09c1 {\"node\":}",
     "UPDATE car2:cles seq=1 epoch=5f3a09c1",
+    "BIND all:localization {}",
     "{}",
     "id=1 {}",
 };
@@ -126,6 +129,75 @@ BOOST_AUTO_TEST_CASE(a_datagram_over_1200_bytes_is_dropped) {
     const auto of = [&](std::size_t size) { return head + std::string(size - head.size() - 2, 'x') + "\"}"; };
     BOOST_TEST(drops(of(1201)));
     BOOST_TEST(!drops(of(1200)));
+}
+
+BOOST_AUTO_TEST_CASE(nothing_is_ever_answered_in_the_group) {
+    node.publish_now("speed", "1");
+    for (const auto* line : {"PULL car1:speed", "PULL self:cles", "BIND car1:nothing", "nonsense", "id=1 {}"}) {
+        hear(line);
+    }
+    BOOST_TEST(out.take().empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_BIND_of_another_node_is_neither_served_nor_counted) {
+    node.publish_now("speed", "1");
+    BOOST_TEST(!drops("BIND car2:speed"));
+    BOOST_TEST(node.counts().group_leases == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(BIND_of_all_and_of_this_node_are_served) {
+    node.publish_now("speed", "{}");
+    BOOST_TEST(!drops("BIND car1:speed"));
+    BOOST_TEST(out.take().size() == 1U);
+    hear("BIND all:speed", {.address = 0x7f000001, .port = 4002});
+    BOOST_TEST(node.counts().group_leases == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(the_access_rules_are_asked_as_for_links) {
+    std::vector<std::string> asked;
+    cles::test::test_node strict{{}, [&](const cles::access& a) {
+                                     asked.push_back(a.peer.transport + " " + a.peer.address + " " +
+                                                     std::string{to_string(a.verb)} + " " + std::string{a.path});
+                                     return a.task == "open";
+                                 }};
+    cles::core::group_session guarded{*strict.host, self, out, 1};
+    recording_presence told;
+    guarded.attend(&told);
+    for (const auto* line : {"BIND all:open", "BIND all:secret/x", "BIND all:cles"}) {
+        guarded.on_datagram(other, line, strict.clock.now());
+    }
+    BOOST_TEST(strict.counts().group_leases == 1U);
+    BOOST_TEST(strict.counts().group_dropped == 2U);
+    BOOST_TEST(told.told.empty());
+    BOOST_REQUIRE(asked.size() == 3U);
+    BOOST_TEST(asked[1] == "multicast udp://127.0.0.1:4001 BIND secret/x");
+}
+
+BOOST_AUTO_TEST_CASE(the_handler_for_BIND_may_refuse) {
+    node.on(cles::verb::bind, "speed", [](const cles::request& r, cles::json_writer&) {
+        if (!r.parameters().empty()) {
+            throw cles::error(cles::errc::bad_request, "speed takes no parameters");
+        }
+    });
+    BOOST_TEST(drops("BIND all:speed/x"));
+    BOOST_TEST(!drops("BIND all:speed/x lease=0"));
+    BOOST_TEST(!drops("BIND all:speed"));
+    BOOST_TEST(node.counts().group_leases == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(an_update_that_nobody_wants_is_counted) {
+    BOOST_TEST(!drops("UPDATE car2:speed seq=1 epoch=5f3a09c1 {}"));
+    BOOST_TEST(node.counts().updates_dropped == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(an_update_that_begins_like_a_failure_is_dropped) {
+    cles::core::group_feed feed{{}, "all", "speed"};
+    session.feeds().add(feed, node.clock.now());
+    hear(R"(UPDATE car2:speed seq=1 epoch=5f3a09c1 {"error":"failed"})");
+    BOOST_TEST(node.counts().updates_dropped == 1U);
+    hear("UPDATE car2:speed seq=2 epoch=5f3a09c1 {}");
+    BOOST_TEST(node.counts().updates_received == 1U);
+    session.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -59,6 +59,13 @@ class bind_options : public call_options {
         keep_ = updates;
         return *this;
     }
+    /// Binds by the multicast group instead of a link, so that one datagram of the publisher serves all who do; `all:`
+    /// goes that way by itself. Then `every` and `keep` have no effect, and nothing is answered: the feed begins with
+    /// the publisher's last value as an update, and does not tell where there is no publisher.
+    bind_options& multicast(bool wanted = true) {
+        multicast_ = wanted;
+        return *this;
+    }
     bind_options& deadline(std::chrono::milliseconds limit) {
         call_options::deadline(limit);
         return *this;
@@ -74,6 +81,7 @@ class bind_options : public call_options {
 
     std::chrono::milliseconds every_{0};
     std::uint32_t keep_ = 0;
+    bool multicast_ = false;
 };
 
 } // namespace cles

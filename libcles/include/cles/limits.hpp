@@ -24,6 +24,8 @@ struct limits {
     std::size_t binding_bytes = 4U << 20U;   ///< bytes of updates queued for a binding
     std::size_t remembered = 16U << 20U;     ///< bytes of requests by datagram and their replies, of all sources
     std::size_t peers = 1024;                ///< other nodes that are known because they announce themselves
+    std::size_t group_leases = 4096;         ///< bindings by multicast; of one source at most `bindings`
+    std::size_t publishers = 1024;           ///< whose updates of one noun a feed by multicast tells apart
     std::size_t feed = 1024;                 ///< updates that a feed holds for a caller who does not fetch them
     std::chrono::milliseconds stall{30'000}; ///< a link whose peer takes nothing for so long is closed
     std::chrono::milliseconds lease{10'000}; ///< what feeds ask for by datagram; they renew at a third of it

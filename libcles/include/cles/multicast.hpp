@@ -14,6 +14,8 @@ struct multicast_options {
     std::string interface {};            ///< its name: "eth0", "lo"; empty: no multicast
     std::string group = "239.255.25.37"; ///< an address from 224.0.0.0 to 239.255.255.255
     std::uint16_t port = 25370;          ///< not 0, since the others could not know it
+    /// False: where the group cannot be joined there, that is a warning in the log, and the service does without.
+    bool required = true;
 
     [[nodiscard]] bool is_on() const noexcept { return !interface.empty(); }
     bool operator==(const multicast_options&) const = default;

@@ -44,7 +44,7 @@ void bind_requests::serve(const protocol::request_line& r, time_point now) {
         return;
     }
     try {
-        ask_handler(r);
+        ask_bind_handler(node_, peer_, r);
         if (!bound_.has(path) && bound_.size() >= node_.bounds.bindings) {
             replies_.fail(r, errc::busy, node_.name + ": too many bindings on this link");
             return;
@@ -60,19 +60,18 @@ void bind_requests::serve(const protocol::request_line& r, time_point now) {
     }
 }
 
-// A handler for BIND says by an exception that it will not have this one.
-void bind_requests::ask_handler(const protocol::request_line& r) const {
-    const auto* h = node_.tasks.find(verb::bind, r.noun.task);
+void ask_bind_handler(const node& host, const identity& peer, const protocol::request_line& r) {
+    const auto* h = host.tasks.find(verb::bind, r.noun.task);
     if (h == nullptr || !h->plain) {
         return;
     }
     std::string decoded;
     const auto parameters = decode(r.noun, decoded);
     const cles::detail::request_data data{.verb = r.verb,
-                                          .node = node_.name,
+                                          .node = host.name,
                                           .task = r.noun.task,
                                           .parameters = {parameters.data(), parameters.size()},
-                                          .peer = &peer_,
+                                          .peer = &peer,
                                           .deadline = {}};
     std::string unused;
     json_writer w{unused};

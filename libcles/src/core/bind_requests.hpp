@@ -15,6 +15,9 @@
 
 namespace cles::core {
 
+/// Asks the handler for BIND of this noun, if there is one; it says by an exception that it will not have this one.
+void ask_bind_handler(const node& host, const identity& peer, const protocol::request_line& request);
+
 /// Serves BIND for one link, and holds what has come of it.
 class bind_requests {
   public:
@@ -28,8 +31,6 @@ class bind_requests {
     [[nodiscard]] bool empty() const noexcept { return bound_.empty(); }
 
   private:
-    void ask_handler(const protocol::request_line& request) const;
-
     node& node_;
     const identity& peer_;
     reply_writer& replies_;

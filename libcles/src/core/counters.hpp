@@ -38,6 +38,7 @@ struct counters {
     std::uint64_t links_lost = 0;
     std::uint64_t bytes_received = 0;
     std::uint64_t bytes_sent = 0;
+    std::uint64_t group_leases = 0; ///< that live now
     std::uint64_t links_open = 0;
     std::uint64_t handlers_running = 0;
 };

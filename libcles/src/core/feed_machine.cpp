@@ -7,8 +7,8 @@ namespace cles::core {
 
 feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
                            std::string path, bool thinned, std::uint32_t seed)
-    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines),
-      queue_(bounds.feed, bounds.binding_bytes), backoff_(seed), renewal_(*this, deadlines, ~seed) {}
+    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines), mail_(bounds),
+      backoff_(seed), renewal_(*this, deadlines, ~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);
@@ -98,43 +98,6 @@ void feed_machine::on_deadline(time_point) {
     }
 }
 
-bool feed_machine::next(event_ptr operation) {
-    waiter_ = std::move(operation);
-    return !queue_.empty();
-}
-
-void feed_machine::pump() {
-    if (waiter_ != nullptr && !queue_.empty()) {
-        auto* operation = waiter_.release();
-        queue_.pop([operation](const detail::raw_event& event) { operation->deliver(event); }); // checked when queued
-    }
-}
-
-bool feed_machine::on_event(const detail::raw_event& event) {
-    if (state_ == state::closed) {
-        return true;
-    }
-    if (waiter_ != nullptr && queue_.empty()) {
-        auto* operation = waiter_.release();
-        if (!operation->deliver(event)) {
-            waiter_.reset(operation);
-            return false;
-        }
-        return true;
-    }
-    if (!event.has_json()) {
-        return false;
-    }
-    queue_.push(event);
-    return true;
-}
-
-void feed_machine::cancel() {
-    if (auto* operation = waiter_.release()) {
-        operation->fail(errc::cancelled, "the wait was cancelled");
-    }
-}
-
 void feed_machine::close(errc why) { abandon().fail(why); }
 
 feed_machine::waiting feed_machine::abandon() {
@@ -144,7 +107,7 @@ feed_machine::waiting feed_machine::abandon() {
         renewal_.stop();
         host_.unbind(*this);
     }
-    return {.first = std::move(first_), .next = std::move(waiter_)};
+    return {.first = std::move(first_), .next = mail_.close()};
 }
 
 void feed_machine::waiting::fail(errc why) {

@@ -2,13 +2,12 @@
 #pragma once
 
 #include <cles/error.hpp>
-#include <cles/feed_event.hpp>
 #include <cles/limits.hpp>
 #include <cles/pending.hpp>
 
 #include "core/backoff.hpp"
 #include "core/deadlines.hpp"
-#include "core/feed_queue.hpp"
+#include "core/feed_mailbox.hpp"
 #include "core/renewal.hpp"
 #include "core/subscription.hpp"
 
@@ -45,7 +44,7 @@ class feed_host {
 /// A feed's life: it binds, tells what comes, and when the publisher is lost binds again after a pause.
 class feed_machine final : public subscription, private deadline, private renewal::keeper {
   public:
-    using event_ptr = std::unique_ptr<detail::pending_event, detail::discarding>;
+    using event_ptr = feed_mailbox::event_ptr;
 
     feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target, std::string path,
                  bool thinned, std::uint32_t seed);
@@ -61,11 +60,8 @@ class feed_machine final : public subscription, private deadline, private renewa
     void on_refused(boost::system::error_code why, std::string_view message, time_point now);
     void on_lost(std::string_view why, time_point now);
 
-    /// Waits for an event; the feed is open, and nobody else waits. True where one is there: `pump` delivers it, which
-    /// is for the caller to do later, since an operation must not end while it begins.
-    bool next(event_ptr operation);
-    void pump();
-    void cancel();
+    /// Where its events are fetched.
+    [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
     void close(errc why);
 
     /// Those who wait for a feed.
@@ -77,26 +73,24 @@ class feed_machine final : public subscription, private deadline, private renewa
     /// Closes it and leaves telling those who wait to the caller.
     [[nodiscard]] waiting abandon();
     [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
-    [[nodiscard]] bool has_waiter() const noexcept { return waiter_ != nullptr; }
 
   private:
     enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
 
-    bool on_event(const detail::raw_event& event) override;
+    bool on_event(const detail::raw_event& event) override { return mail_.put(event); }
     void on_deadline(time_point now) override;
     void renew(time_point until) override { host_.renew(*this, until); }
     void pause(time_point now);
 
     feed_host& host_;
     deadline_queue& deadlines_;
-    feed_queue queue_;
+    feed_mailbox mail_;
     backoff backoff_;
     renewal renewal_;
     time_point bound_at_{}; // when the BIND was sent that leases count from
     state state_ = state::fresh;
     bool was_bound_ = false;
     detail::pending_ptr first_;
-    event_ptr waiter_;
 };
 
 } // namespace cles::core

@@ -3,8 +3,12 @@
 
 #include <cles/json_reader.hpp>
 
+#include "core/bind_requests.hpp"
+#include "core/request_checks.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/line.hpp"
+
+#include <string>
 
 namespace cles::core {
 
@@ -42,19 +46,47 @@ bool group_session::serve(const group_source& from, std::string_view datagram, t
            on_bind(from, request, now);
 }
 
-bool group_session::on_bind(const group_source&, const protocol::request_line& bind, time_point now) {
+bool group_session::on_bind(const group_source& from, const protocol::request_line& bind, time_point now) {
     const auto& noun = bind.noun;
-    if (noun.task == "cles") {
-        if (!noun.parameters.empty()) {
-            return false;
-        }
-        const bool by_name = noun.target != "all";
-        if (presence_ != nullptr && (!by_name || noun.target == node_.name)) {
-            presence_->on_solicitation(by_name, now);
-        }
+    const bool solicits = noun.task == "cles";
+    if (solicits && !noun.parameters.empty()) {
+        return false;
+    }
+    const bool by_name = noun.target != "all";
+    if (by_name && noun.target != node_.name) { // another's
         return true;
     }
+    if (!permits(from, bind)) {
+        return false;
+    }
+    if (!solicits) {
+        return bindings_.bind(from, bind, now);
+    }
+    if (presence_ != nullptr) {
+        presence_->on_solicitation(by_name, now);
+    }
     return true;
+}
+
+// The access rules, and the handler for BIND where there is one.
+bool group_session::permits(const group_source& from, const protocol::request_line& bind) const {
+    const identity peer{.transport = "multicast",
+                        .address = "udp://" + host_text(from) + ":" + std::to_string(from.port),
+                        .name = {},
+                        .uid = {},
+                        .local = from.is_loopback()};
+    if (!allows(node_, peer, bind)) {
+        return false;
+    }
+    if (bind.unbinds()) {
+        return true;
+    }
+    try {
+        ask_bind_handler(node_, peer, bind);
+        return true;
+    } catch (...) { // there is nobody to tell
+        return false;
+    }
 }
 
 bool group_session::on_update(const group_source& from, const protocol::request_line& update, time_point now) {
@@ -67,6 +99,11 @@ bool group_session::on_update(const group_source& from, const protocol::request_
             presence_->on_announcement(from, update, now);
         }
         return true;
+    }
+    if (protocol::begins_with_error(update.body) || !feeds_.take(update)) {
+        ++node_.counts.updates_dropped;
+    } else {
+        ++node_.counts.updates_received;
     }
     return true;
 }

@@ -3,10 +3,14 @@
 
 #include <cles/limits.hpp>
 
+#include "core/group_bindings.hpp"
+#include "core/group_feeds.hpp"
+#include "core/group_output.hpp"
 #include "core/group_source.hpp"
 #include "core/node.hpp"
 #include "protocol/message.hpp"
 
+#include <cstdint>
 #include <string_view>
 
 namespace cles::core {
@@ -31,20 +35,29 @@ class group_presence {
 class group_session {
   public:
     /// `self`: where what this node sends comes from.
-    group_session(node& host, const group_source& self) : node_(host), self_(self) {}
+    group_session(node& host, const group_source& self, group_output& out, std::uint32_t seed)
+        : node_(host), self_(self), bindings_(host, out, seed), feeds_(host, out, ~seed) {}
 
     /// Who hears of the reserved task from now on; null: nobody. It must outlive this.
     void attend(group_presence* presence) noexcept { presence_ = presence; }
+
+    /// What others are bound to here.
+    [[nodiscard]] group_bindings& bindings() noexcept { return bindings_; }
+    /// What this node is bound to.
+    [[nodiscard]] group_feeds& feeds() noexcept { return feeds_; }
 
     void on_datagram(const group_source& from, std::string_view datagram, time_point now);
 
   private:
     bool serve(const group_source& from, std::string_view datagram, time_point now);
     bool on_bind(const group_source& from, const protocol::request_line& bind, time_point now);
+    [[nodiscard]] bool permits(const group_source& from, const protocol::request_line& bind) const;
     bool on_update(const group_source& from, const protocol::request_line& update, time_point now);
 
     node& node_;
     group_source self_;
+    group_bindings bindings_;
+    group_feeds feeds_;
     group_presence* presence_ = nullptr;
 };
 

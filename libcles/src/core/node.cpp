@@ -126,6 +126,7 @@ void write_metrics(json_writer& w, const node& n) {
     number("group_dropped", c.group_dropped);
     number("group_sent", c.group_sent);
     number("group_unsent", c.group_unsent);
+    number("group_leases", c.group_leases);
     number("links_open", c.links_open);
     number("links_accepted", c.links_accepted);
     number("links_refused", c.links_refused);

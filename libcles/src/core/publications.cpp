@@ -49,6 +49,9 @@ topic& publications::open(std::string_view path) {
     auto made = std::make_unique<topic>(shared_, std::string{path});
     auto& result = *made;
     topics_.emplace(std::string{path}, std::move(made));
+    if (opened_) {
+        opened_(result);
+    }
     return result;
 }
 

@@ -13,6 +13,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
@@ -32,6 +33,9 @@ class publications {
     /// Publishes a body of any kind now, or once every binder has room. True: now, and completing the operation is left
     /// to the caller; otherwise it is taken and completed later.
     bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation);
+
+    /// Who is told of each topic that is made from now on, before anything is published there; empty: nobody.
+    void on_opened(std::function<void(topic&)> told) { opened_ = std::move(told); }
 
     /// The topic, or null.
     [[nodiscard]] topic* find(std::string_view path) noexcept;
@@ -73,6 +77,7 @@ class publications {
     std::string publisher_;
     std::string epoch_;
     std::function<void()> wake_;
+    std::function<void(topic&)> opened_;
     map<std::unique_ptr<topic>> topics_;
     struct task_nouns {
         std::size_t count = 0;

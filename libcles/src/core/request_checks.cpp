@@ -41,7 +41,7 @@ bool passes(std::string_view via, std::string_view name) {
 namespace {
 
 // What the rules throw is their own fault, and no reason to let anybody in.
-bool allows(const node& n, const access& asked) {
+bool ask_rules(const node& n, const access& asked) {
     try {
         return n.authorise(asked);
     } catch (const std::exception& thrown) {
@@ -54,17 +54,22 @@ bool allows(const node& n, const access& asked) {
 
 } // namespace
 
+bool allows(const node& n, const identity& peer, const protocol::request_line& r) {
+    if (!n.authorise) {
+        return true;
+    }
+    std::string scratch;
+    const auto path = protocol::canonical_path(r.noun, scratch);
+    return ask_rules(n, {peer, r.verb, r.noun.task, path});
+}
+
 std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& r) {
     const auto object = [](errc code, std::string message) {
         return protocol::failure{.code = code, .message = std::move(message)};
     };
-    if (n.authorise) {
-        std::string scratch;
-        const auto path = protocol::canonical_path(r.noun, scratch);
-        if (!allows(n, {peer, r.verb, r.noun.task, path})) {
-            return object(errc::denied, n.name + " does not allow " + std::string{to_string(r.verb)} + " '" +
-                                            std::string{r.noun.task} + "'");
-        }
+    if (!allows(n, peer, r)) {
+        return object(errc::denied, n.name + " does not allow " + std::string{to_string(r.verb)} + " '" +
+                                        std::string{r.noun.task} + "'");
     }
     if ((r.noun.target != "self" && r.noun.target != n.name) || passes(r.via, n.name)) {
         return object(errc::no_target, n.name + " knows no way to '" + std::string{r.noun.target} + "'");

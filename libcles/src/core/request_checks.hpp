@@ -25,6 +25,9 @@ decoded_parameters decode(const protocol::noun_view& noun, std::string& storage)
 /// Whether `name` is in a comma-separated list.
 bool passes(std::string_view via, std::string_view name);
 
+/// Whether the access rules let this peer ask for this.
+bool allows(const node& n, const identity& peer, const protocol::request_line& request);
+
 /// What keeps a node from serving a request, whatever it asks for: access, target, body.
 std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& request);
 

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/subscription.hpp"
 
-#include <cles/json_reader.hpp>
-#include <cles/pending.hpp>
+#include "core/update_intake.hpp"
 
 #include <algorithm>
 
@@ -16,28 +15,7 @@ bool overlap(std::string_view a, std::string_view b) noexcept { return a == b ||
 } // namespace
 
 bool subscription::take(const protocol::request_line& update) {
-    const auto before = order_;
-    const auto verdict = order_.take(*update.epoch, *update.seq);
-    if (!verdict.news) {
-        return false;
-    }
-    detail::raw_event event{.body = update.body.empty() ? std::string_view{"{}"} : update.body,
-                            .publisher = update.noun.target,
-                            .seq = *update.seq};
-    if (verdict.missed != 0 && !thinned_) {
-        event.checked = event.has_json();
-        if (!event.checked) {
-            order_ = before;
-            return false;
-        }
-        on_event({.kind = feed_event::gap, .publisher = event.publisher, .seq = event.seq, .missed = verdict.missed});
-    }
-    // Once it has been handed on, this may be gone: whoever took it may have closed the feed.
-    if (on_event(event)) {
-        return true;
-    }
-    order_ = before; // a later update shows that this one is missing
-    return false;
+    return take_in(order_, update, thinned_, [this](const detail::raw_event& event) { return on_event(event); });
 }
 
 bool subscriptions::has(std::string_view target, std::string_view path) const {

@@ -62,16 +62,20 @@ void binding::drain_all() {
     }
 }
 
+bool binding::is_behind() const noexcept { return seen_ != source_.log_.last(); }
+
 void binding::on_deadline(time_point now) { drain(now); }
 
 std::string_view topic::last_body() const noexcept {
     if (seq() == 0) {
         return {};
     }
-    auto line = log_.lines(seq(), seq());
+    auto line = last_line();
     line.remove_suffix(1);
     return line.substr(last_body_at_);
 }
+
+std::string_view topic::last_line() const noexcept { return log_.lines(seq(), seq()); }
 
 void topic::commit(std::size_t body_at) {
     log_.commit();

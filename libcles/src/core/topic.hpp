@@ -49,6 +49,8 @@ class binding final : public deadline {
     void drain(time_point now);
     void set_terms(terms wanted) noexcept { terms_ = wanted; }
     [[nodiscard]] binder& target() const noexcept { return target_; }
+    /// There are updates that it has not been given.
+    [[nodiscard]] bool is_behind() const noexcept;
 
   private:
     friend topic;
@@ -79,6 +81,9 @@ class topic {
     [[nodiscard]] std::uint64_t seq() const noexcept { return log_.last(); }
     /// The body of the last update; empty before the first.
     [[nodiscard]] std::string_view last_body() const noexcept;
+
+    /// The last update with its LF; empty before the first.
+    [[nodiscard]] std::string_view last_line() const noexcept;
 
     /// Begins the next update: append the line to what is returned, then `commit` (saying where in the line the body
     /// begins) or `roll_back`.

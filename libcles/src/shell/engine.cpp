@@ -68,11 +68,22 @@ void engine::start(const std::vector<std::string>& listen_at) {
         listen(where);
     }
     if (multicast_.is_on()) {
+        join_group();
+    }
+    listeners_.open_local_doors();
+}
+
+void engine::join_group() {
+    try {
         group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
         group_->start();
         neighbours_->start(*group_, multicast_.interface);
+    } catch (const error& e) {
+        if (multicast_.required) {
+            throw;
+        }
+        say(log_level::warning, "no multicast: " + e.message());
     }
-    listeners_.open_local_doors();
 }
 
 // -- links ---------------------------------------------------------------------------------------------------------
@@ -283,11 +294,11 @@ void engine::stop() {
         }
     };
     feeds_.stop();
+    tell(node_->published.take_waiters());
     neighbours_->stop();
     if (group_) {
-        group_->close();
+        group_->stop();
     }
-    tell(node_->published.take_waiters());
     tell(routes_.stop());
     for (const auto& c : connections_.all()) {
         tell(c->session().asking().take_all());

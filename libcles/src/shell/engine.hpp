@@ -79,6 +79,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     [[nodiscard]] std::uint64_t draw_id() noexcept { return node_->next_id++; }
 
   private:
+    void join_group();
     void ask_for_turn();
     void turn();
     void open_noun(std::string_view noun);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/feed_handle.hpp"
 
+#include "shell/fetching.hpp"
+
 #include <boost/asio/post.hpp>
 
 #include <random>
@@ -48,20 +50,10 @@ feed_handle::~feed_handle() { host_->feeds().leave(machine_); }
 void feed_handle::start(detail::pending_ptr bound) { machine_.start(std::move(bound)); }
 
 void feed_handle::next(detail::event_ptr operation) {
-    if (machine_.closed() || machine_.has_waiter()) {
-        const auto code = make_error_code(machine_.closed() ? errc::stopped : errc::busy);
-        asio::post(host_->executor(), [operation = std::move(operation), code]() mutable {
-            operation.release()->fail(code, code == errc::busy ? "another async_next of this feed waits"
-                                                               : "the feed is closed");
-        });
-        return;
-    }
-    if (machine_.next(std::move(operation))) {
-        asio::post(host_->executor(), [self = shared_from_this()] { self->machine_.pump(); });
-    }
+    fetch_next(machine_.mail(), executor(), shared_from_this(), std::move(operation));
 }
 
-void feed_handle::cancel() { machine_.cancel(); }
+void feed_handle::cancel() { machine_.mail().cancel(); }
 
 void feed_handle::close() {
     machine_.close(errc::cancelled);

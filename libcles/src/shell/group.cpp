@@ -4,7 +4,11 @@
 #include "protocol/datagram.hpp"
 #include "shell/engine.hpp"
 
+#include <boost/asio/post.hpp>
+
+#include <random>
 #include <string>
+#include <utility>
 
 namespace cles::shell {
 namespace {
@@ -43,13 +47,23 @@ std::shared_ptr<transport::group_port> join(detail::engine& host, const multicas
 
 group::group(detail::engine& host, const multicast_options& where, bool insecure)
     : engine_(host), port_(join(host, where, insecure)), source_(source_of(port_->source())),
-      session_(host.node(), source_) {}
+      session_(host.node(), source_, *this, std::random_device{}()) {}
 
-group::~group() { close(); }
+group::~group() { port_->close(); }
 
 void group::start() { port_->start(*this); }
 
-void group::close() { port_->close(); }
+void group::stop() {
+    for (auto* feed : session_.feeds().remove_all()) {
+        if (auto waiting = feed->mail().close()) {
+            boost::asio::post(engine_.executor(), [waiting = std::move(waiting)]() mutable {
+                waiting.release()->fail(errc::stopped, "the service has been stopped");
+            });
+        }
+    }
+    session_.bindings().clear();
+    port_->close();
+}
 
 bool group::send(std::string_view line) {
     auto& counts = engine_.node().counts;
@@ -68,6 +82,10 @@ void group::on_datagram(const boost::asio::ip::udp::endpoint& from, std::string_
 
 void group::on_batch() { engine_.settle(); }
 
-void group::on_room() {}
+void group::on_room() {
+    const auto keep = engine_.shared_from_this();
+    session_.bindings().drain(engine_.now());
+    engine_.settle();
+}
 
 } // namespace cles::shell

@@ -3,6 +3,7 @@
 
 #include <cles/multicast.hpp>
 
+#include "core/group_output.hpp"
 #include "core/group_session.hpp"
 #include "core/group_source.hpp"
 #include "transport/group_port.hpp"
@@ -17,7 +18,7 @@ class engine;
 namespace cles::shell {
 
 /// A service's place in its multicast group.
-class group final : private transport::group_events {
+class group final : public core::group_output, private transport::group_events {
   public:
     /// Joins. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's code
     group(detail::engine& host, const multicast_options& where, bool insecure);
@@ -25,10 +26,11 @@ class group final : private transport::group_events {
 
     /// Begins to listen; to be called once.
     void start();
-    void close();
-    /// Sends a line, its LF included, to all nodes of the group. False where it is too large for a datagram, or too
-    /// much waits to be sent; it is counted then.
-    bool send(std::string_view line);
+    /// Says goodbye, leaves, and ends the feeds; repeating it does nothing.
+    void stop();
+    /// To all nodes of the group. What is not sent is counted.
+    bool send(std::string_view line) override;
+    [[nodiscard]] bool has_room() const override { return port_->unsent() == 0; }
     [[nodiscard]] core::group_session& session() noexcept { return session_; }
     /// Where what this node sends comes from.
     [[nodiscard]] const core::group_source& source() const noexcept { return source_; }

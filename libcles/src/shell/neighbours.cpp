@@ -22,8 +22,8 @@ void neighbours::start(group& through, std::string interface) {
     interface_ = std::move(interface);
     group_->session().attend(this);
     round_.expect();
-    boost::asio::post(engine_.executor(), [host = engine_.shared_from_this(), this] {
-        if (!host->stopped()) {
+    boost::asio::post(engine_.executor(), [weak = engine_.weak_from_this(), this] {
+        if (const auto host = weak.lock(); host && !host->stopped()) {
             begin();
         }
     });

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/feed_event.hpp>
+#include <cles/limits.hpp>
+#include <cles/pending.hpp>
+
+#include "core/feed_queue.hpp"
+
+#include <memory>
+
+namespace cles::core {
+
+/// Between what a feed hears and who fetches it: hands an event to whoever waits, or keeps it until somebody asks.
+class feed_mailbox {
+  public:
+    using event_ptr = std::unique_ptr<detail::pending_event, detail::discarding>;
+
+    explicit feed_mailbox(const limits& bounds) noexcept : queue_(bounds.feed, bounds.binding_bytes) {}
+
+    /// False where the event's body is no JSON. Nothing is kept once it is closed.
+    bool put(const detail::raw_event& event);
+    /// Waits for an event; it is open, and nobody else waits. True where one is there: `pump` delivers it, which is for
+    /// the caller to do later, since an operation must not end while it begins.
+    bool next(event_ptr operation);
+    void pump();
+    /// Withdraws who waits.
+    void cancel();
+    /// Takes who waits out; telling him is left to the caller.
+    [[nodiscard]] event_ptr close();
+    [[nodiscard]] bool closed() const noexcept { return closed_; }
+    [[nodiscard]] bool has_waiter() const noexcept { return waiter_ != nullptr; }
+
+  private:
+    feed_queue queue_;
+    event_ptr waiter_;
+    bool closed_ = false;
+};
+
+} // namespace cles::core

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/group_bindings.hpp"
+
+#include <cles/error.hpp>
+
+#include "protocol/datagram.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+// A node's own burst waits here, as far as the socket has no room; what a binder says of `keep` has no effect.
+constexpr binding::terms group_terms{.every = std::chrono::milliseconds{0}, .keep = 1024};
+
+} // namespace
+
+group_bindings::group_bindings(node& host, group_output& out, std::uint32_t seed)
+    : node_(host), out_(out), jitter_(seed), bound_(host.published, *this) {
+    node_.published.on_opened([this](topic& t) {
+        if (nouns_.contains(t.path())) {
+            attach(t);
+        }
+    });
+}
+
+group_bindings::~group_bindings() { clear(); }
+
+void group_bindings::clear() {
+    node_.published.on_opened({});
+    nouns_.clear();
+    of_source_.clear();
+    node_.counts.group_leases = 0;
+    bound_.clear();
+}
+
+bool group_bindings::has_room_for(const group_source& from) const {
+    const auto found = of_source_.find(from);
+    return node_.counts.group_leases < node_.bounds.group_leases &&
+           (found == of_source_.end() || found->second < node_.bounds.bindings);
+}
+
+bool group_bindings::bind(const group_source& from, const protocol::request_line& r, time_point now) {
+    std::string scratch;
+    const auto path = protocol::canonical_path(r.noun, scratch);
+    auto found = nouns_.find(path);
+    const bool known = found != nouns_.end() && found->second->leases.contains(from);
+    if (r.unbinds()) {
+        if (known) {
+            end(*found->second, from);
+        }
+        return true;
+    }
+    if (!known) {
+        if (!has_room_for(from)) {
+            return false;
+        }
+        if (found == nouns_.end()) {
+            found = nouns_.emplace(std::string{path}, std::make_unique<noun>(*this, std::string{path})).first;
+            if (auto* t = node_.published.find(path)) {
+                attach(*t);
+            }
+        }
+        found->second->leases.try_emplace(from, *found->second, from);
+        ++of_source_[from];
+        ++node_.counts.group_leases;
+    }
+    auto& n = *found->second;
+    node_.deadlines.arm(n.leases.at(from),
+                        now + std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)});
+    if (!known) {
+        repeat_soon(n, r.noun.target == "all", now);
+    }
+    return true;
+}
+
+void group_bindings::lease::on_deadline(time_point) {
+    ++of.owner.node_.counts.leases_expired;
+    of.owner.end(of, group_source{from}); // ends this
+}
+
+void group_bindings::end(noun& n, const group_source& from) {
+    if (const auto count = of_source_.find(from); --count->second == 0) {
+        of_source_.erase(count);
+    }
+    --node_.counts.group_leases;
+    n.leases.erase(from);
+    if (n.leases.empty()) {
+        // Out of the list first: publishers that waited for this binder go on, and may do anything.
+        const auto gone = nouns_.extract(n.path);
+        bound_.unbind(gone.key());
+    }
+}
+
+void group_bindings::attach(topic& t) { bound_.bind(t, group_terms); }
+
+// -- the last update, once more --------------------------------------------------------------------------------------
+
+void group_bindings::repeat_soon(noun& n, bool put_off, time_point now) {
+    const auto* t = node_.published.find(n.path);
+    if (t == nullptr || t->seq() == 0) {
+        return;
+    }
+    n.repeat_of = t->seq();
+    auto due = now + (put_off ? jitter_.quarter_of(4 * repeat_apart) : std::chrono::milliseconds{0});
+    if (n.repeated_at) {
+        due = std::max(due, *n.repeated_at + repeat_apart);
+    }
+    if (due <= now) {
+        node_.deadlines.disarm(n);
+        repeat(n, now);
+    } else if (!n.armed() || due < n.due()) {
+        node_.deadlines.arm(n, due);
+    }
+}
+
+void group_bindings::repeat(noun& n, time_point now) {
+    auto* t = node_.published.find(n.path);
+    if (t == nullptr || t->seq() != n.repeat_of) { // one that followed has gone out meanwhile, or will
+        return;
+    }
+    if (const auto* b = t->find(*this); b != nullptr && b->is_behind()) { // it has not even gone out once
+        bound_.drain(now);
+        return;
+    }
+    n.repeated_at = now;
+    put_updates(t->last_line());
+}
+
+void group_bindings::put_updates(std::string_view lines) {
+    while (!lines.empty()) {
+        const auto size = lines.find('\n') + 1; // updates are whole lines
+        if (const auto line = lines.substr(0, size); size > protocol::datagram_bytes) {
+            ++node_.counts.updates_too_large;
+            note_too_large(line);
+        } else {
+            out_.send(line);
+        }
+        lines.remove_prefix(size);
+    }
+}
+
+// Nobody else could tell the publisher; now and then is enough.
+void group_bindings::note_too_large(std::string_view line) {
+    constexpr std::chrono::seconds apart{10};
+    const auto now = node_.time.now();
+    if (noted_at_ && now - *noted_at_ < apart) {
+        return;
+    }
+    noted_at_ = now;
+    node_.say(log_level::warning, std::string{wire_name(errc::too_large)} + ": " +
+                                      std::string{line.substr(0, line.find(" seq="))} + " has " +
+                                      std::to_string(line.size()) + " bytes, and by multicast at most " +
+                                      std::to_string(protocol::datagram_bytes) + " are sent");
+}
+
+} // namespace cles::core

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "core/feed_mailbox.hpp"
+#include "core/update_order.hpp"
+#include "protocol/request_line.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+/// A feed that is bound by the multicast group: to one node's noun, or to that of all who publish it. What is new, old
+/// or missing is told for each publisher apart. Where there are more of them than it tells apart, the one that has been
+/// silent for longest is forgotten.
+class group_feed {
+  public:
+    /// `target`: a node's name, or "all".
+    group_feed(const limits& bounds, std::string target, std::string path)
+        : target_(std::move(target)), path_(std::move(path)), most_publishers_(bounds.publishers), mail_(bounds) {}
+    group_feed(const group_feed&) = delete;
+    group_feed& operator=(const group_feed&) = delete;
+
+    [[nodiscard]] const std::string& target() const noexcept { return target_; }
+    [[nodiscard]] const std::string& path() const noexcept { return path_; }
+    [[nodiscard]] bool wants(std::string_view node) const noexcept { return target_ == "all" || target_ == node; }
+    /// Hands an update on that it wants. False where it is old or repeated, or its body is no JSON.
+    bool take(const protocol::request_line& update);
+    [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
+    [[nodiscard]] std::size_t publishers() const noexcept { return publishers_.size(); }
+
+  private:
+    struct source {
+        update_order order;
+        std::uint64_t heard = 0; // when, counted in updates
+    };
+    source& known(std::string_view name);
+
+    std::string target_;
+    std::string path_;
+    std::size_t most_publishers_;
+    feed_mailbox mail_;
+    std::map<std::string, source, std::less<>> publishers_;
+    std::uint64_t heard_ = 0;
+};
+
+} // namespace cles::core

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <string_view>
+
+namespace cles::core {
+
+/// What a node sends to its multicast group.
+class group_output {
+  public:
+    group_output() = default;
+    group_output(const group_output&) = delete;
+    group_output& operator=(const group_output&) = delete;
+    /// Sends a line, its LF included, as one datagram. False where it was not sent: it is too large, or too much waits.
+    virtual bool send(std::string_view line) = 0;
+    /// Nothing waits; if something does, `group_bindings::drain` is called once it has been sent.
+    [[nodiscard]] virtual bool has_room() const = 0;
+
+  protected:
+    ~group_output() = default;
+};
+
+} // namespace cles::core

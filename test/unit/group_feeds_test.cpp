@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: BSL-1.0
+// Docs/protocol.md, "Multicast", from the binder's side.
+#include "core/group_feeds.hpp"
+#include "support/group_recorder.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace std::chrono_literals;
+using namespace cles::test;
+using cles::core::group_feed;
+
+cles::limits few_publishers() {
+    cles::limits bounds;
+    bounds.publishers = 2;
+    return bounds;
+}
+
+/// One wait for an event; it lives on the stack of its test.
+struct wait final : cles::detail::pending_event {
+    bool deliver(const cles::detail::raw_event& event) override {
+        text = event.kind == cles::feed_event::gap ? "gap of " + std::to_string(event.missed)
+                                                   : std::to_string(event.seq) + " " + std::string{event.body};
+        text = std::string{event.publisher} + " " + text;
+        return true;
+    }
+    void fail(boost::system::error_code code, std::string_view) override { text = code.message(); }
+    void discard() noexcept override {}
+    std::string text;
+};
+
+struct fixture {
+    /// Takes an update in; says whether anybody had use for it.
+    bool hear(const std::string& line) {
+        cles::protocol::request_line r;
+        cles::protocol::malformed_request why;
+        BOOST_REQUIRE(cles::protocol::parse_request(line, r, why));
+        return feeds.take(r);
+    }
+    bool hear(const std::string& publisher, std::uint64_t seq, const std::string& epoch = "00000001") {
+        return hear("UPDATE " + publisher + ":speed seq=" + std::to_string(seq) + " epoch=" + epoch + " {}");
+    }
+    /// The events of a feed, as "car1 1 {}", "car1 gap of 2".
+    static std::vector<std::string> events(group_feed& feed) {
+        std::vector<std::string> all;
+        for (;;) {
+            wait w;
+            if (!feed.mail().next(cles::core::feed_mailbox::event_ptr{&w})) {
+                feed.mail().cancel();
+                return all;
+            }
+            feed.mail().pump();
+            all.push_back(w.text);
+        }
+    }
+    void add(group_feed& feed) { feeds.add(feed, node.clock.now()); }
+
+    test_node node;
+    group_recorder out;
+    cles::core::group_feeds feeds{*node.host, out, 3};
+    group_feed all{node.host->bounds, "all", "speed"};
+    group_feed one{node.host->bounds, "car1", "speed"};
+};
+
+using lines = std::vector<std::string>;
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(group_feeds, fixture)
+
+BOOST_AUTO_TEST_CASE(the_first_feed_of_a_noun_binds_and_the_last_unbinds) {
+    group_feed second{node.host->bounds, "all", "speed"};
+    add(all);
+    add(second);
+    BOOST_TEST((out.take() == lines{"BIND all:speed lease=10000"}));
+    feeds.remove(all);
+    BOOST_TEST(out.take().empty());
+    feeds.remove(second);
+    BOOST_TEST((out.take() == lines{"BIND all:speed lease=0"}));
+    feeds.remove(second);
+    BOOST_TEST(out.take().empty());
+    node.pass(60s);
+    BOOST_TEST(out.take().empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_binding_is_renewed_at_a_third_of_its_lease_jittered) {
+    add(all);
+    out.take();
+    std::vector<std::chrono::milliseconds> pauses;
+    auto pause = 0ms;
+    while (pauses.size() < 20) {
+        node.pass(1ms);
+        pause += 1ms;
+        if (const auto sent = out.take(); !sent.empty()) {
+            BOOST_TEST((sent == lines{"BIND all:speed lease=10000"}));
+            pauses.push_back(pause);
+            pause = 0ms;
+        }
+        BOOST_REQUIRE(pause.count() <= 3333);
+    }
+    const auto [least, most] = std::minmax_element(pauses.begin(), pauses.end());
+    BOOST_TEST(least->count() >= 2500 - 1);
+    BOOST_TEST((*most - *least).count() > 100);
+    feeds.remove(all);
+}
+
+BOOST_AUTO_TEST_CASE(an_update_goes_to_every_feed_that_wants_it) {
+    group_feed other{node.host->bounds, "car2", "speed"};
+    group_feed elsewhere{node.host->bounds, "all", "speed/fast"};
+    for (auto* feed : {&all, &one, &other, &elsewhere}) {
+        add(*feed);
+    }
+    BOOST_TEST(hear("car1", 1));
+    BOOST_TEST((events(all) == lines{"car1 1 {}"}));
+    BOOST_TEST((events(one) == lines{"car1 1 {}"}));
+    BOOST_TEST(events(other).empty());
+    BOOST_TEST(events(elsewhere).empty());
+    BOOST_TEST(!hear("UPDATE car1:slowness seq=1 epoch=00000001 {}"));
+    static_cast<void>(feeds.remove_all());
+}
+
+BOOST_AUTO_TEST_CASE(order_is_told_for_each_publisher_apart) {
+    add(all);
+    BOOST_TEST(hear("car1", 5));
+    BOOST_TEST(hear("car2", 1));
+    BOOST_TEST(hear("car1", 8));
+    BOOST_TEST(!hear("car1", 8));
+    BOOST_TEST(!hear("car1", 6));
+    BOOST_TEST(hear("car2", 2));
+    BOOST_TEST((events(all) == lines{"car1 5 {}", "car2 1 {}", "car1 gap of 2", "car1 8 {}", "car2 2 {}"}));
+    BOOST_TEST(hear("car1", 1, "00000002")); // restarted
+    BOOST_TEST(!hear("car1", 9, "00000001"));
+    BOOST_TEST((events(all) == lines{"car1 1 {}"}));
+    feeds.remove(all);
+}
+
+BOOST_AUTO_TEST_CASE(a_body_that_is_no_JSON_shows_as_a_gap) {
+    add(all);
+    hear("car1", 1);
+    BOOST_TEST(!hear("UPDATE car1:speed seq=2 epoch=00000001 {\"v\":}"));
+    hear("car1", 3);
+    BOOST_TEST((events(all) == lines{"car1 1 {}", "car1 gap of 1", "car1 3 {}"}));
+    feeds.remove(all);
+}
+
+BOOST_AUTO_TEST_CASE(the_publishers_that_are_told_apart_are_bounded) {
+    group_feed small{few_publishers(), "all", "speed"};
+    add(small);
+    hear("car1", 5);
+    hear("car2", 5);
+    hear("car1", 6);
+    hear("car3", 5); // car2 has been silent for longest
+    BOOST_TEST(small.publishers() == 2U);
+    BOOST_TEST(!hear("car1", 6));
+    BOOST_TEST(hear("car2", 5));
+    BOOST_TEST(small.publishers() == 2U);
+    feeds.remove(small);
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_of_one_node_that_ends_leaves_the_lease_to_one_of_all) {
+    add(all);
+    add(one);
+    out.take();
+    feeds.remove(one);
+    BOOST_TEST(out.take().empty());
+    feeds.remove(all);
+    BOOST_TEST((out.take() == lines{"BIND all:speed lease=0"}));
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_of_all_that_ends_has_those_of_single_nodes_bind_again) {
+    add(all);
+    add(one);
+    out.take();
+    feeds.remove(all);
+    BOOST_TEST((out.take() == lines{"BIND all:speed lease=0", "BIND car1:speed lease=10000"}));
+    feeds.remove(one);
+    BOOST_TEST((out.take() == lines{"BIND car1:speed lease=0"}));
+}
+
+BOOST_AUTO_TEST_CASE(feeds_may_end_and_begin_while_an_update_is_handed_out) {
+    group_feed last{node.host->bounds, "all", "speed"};
+    group_feed late{node.host->bounds, "all", "speed"};
+    struct meddler final : cles::detail::pending_event {
+        bool deliver(const cles::detail::raw_event&) override {
+            f->feeds.remove(f->all);
+            f->feeds.remove(f->one);
+            f->add(*fresh);
+            return true;
+        }
+        void fail(boost::system::error_code, std::string_view) override {}
+        void discard() noexcept override {}
+        fixture* f = nullptr;
+        group_feed* fresh = nullptr;
+    } meddling;
+    meddling.f = this;
+    meddling.fresh = &late;
+    for (auto* feed : {&all, &one, &last}) {
+        add(*feed);
+    }
+    BOOST_TEST(!all.mail().next(cles::core::feed_mailbox::event_ptr{&meddling}));
+    BOOST_TEST(hear("car1", 1));
+    BOOST_TEST(events(one).empty());
+    BOOST_TEST((events(last) == lines{"car1 1 {}"}));
+    BOOST_TEST(events(late).empty());
+    BOOST_TEST(hear("car1", 2));
+    BOOST_TEST((events(late) == lines{"car1 2 {}"}));
+    BOOST_TEST((feeds.remove_all() == std::vector<group_feed*>{&last, &late}));
+    BOOST_TEST(!hear("car1", 3));
+}
+
+BOOST_AUTO_TEST_SUITE_END()
