@@ -19,12 +19,6 @@ using namespace std::chrono_literals;
 using namespace cles::test;
 using cles::core::group_feed;
 
-cles::limits few_publishers() {
-    cles::limits bounds;
-    bounds.publishers = 2;
-    return bounds;
-}
-
 /// One wait for an event; it lives on the stack of its test.
 struct wait final : cles::detail::pending_event {
     bool deliver(const cles::detail::raw_event& event) override {
@@ -126,44 +120,6 @@ BOOST_AUTO_TEST_CASE(an_update_goes_to_every_feed_that_wants_it) {
     BOOST_TEST(events(elsewhere).empty());
     BOOST_TEST(!hear("UPDATE car1:slowness seq=1 epoch=00000001 {}"));
     static_cast<void>(feeds.remove_all());
-}
-
-BOOST_AUTO_TEST_CASE(order_is_told_for_each_publisher_apart) {
-    add(all);
-    BOOST_TEST(hear("car1", 5));
-    BOOST_TEST(hear("car2", 1));
-    BOOST_TEST(hear("car1", 8));
-    BOOST_TEST(!hear("car1", 8));
-    BOOST_TEST(!hear("car1", 6));
-    BOOST_TEST(hear("car2", 2));
-    BOOST_TEST((events(all) == lines{"car1 5 {}", "car2 1 {}", "car1 gap of 2", "car1 8 {}", "car2 2 {}"}));
-    BOOST_TEST(hear("car1", 1, "00000002")); // restarted
-    BOOST_TEST(!hear("car1", 9, "00000001"));
-    BOOST_TEST((events(all) == lines{"car1 1 {}"}));
-    feeds.remove(all);
-}
-
-BOOST_AUTO_TEST_CASE(a_body_that_is_no_JSON_shows_as_a_gap) {
-    add(all);
-    hear("car1", 1);
-    BOOST_TEST(!hear("UPDATE car1:speed seq=2 epoch=00000001 {\"v\":}"));
-    hear("car1", 3);
-    BOOST_TEST((events(all) == lines{"car1 1 {}", "car1 gap of 1", "car1 3 {}"}));
-    feeds.remove(all);
-}
-
-BOOST_AUTO_TEST_CASE(the_publishers_that_are_told_apart_are_bounded) {
-    group_feed small{few_publishers(), "all", "speed"};
-    add(small);
-    hear("car1", 5);
-    hear("car2", 5);
-    hear("car1", 6);
-    hear("car3", 5); // car2 has been silent for longest
-    BOOST_TEST(small.publishers() == 2U);
-    BOOST_TEST(!hear("car1", 6));
-    BOOST_TEST(hear("car2", 5));
-    BOOST_TEST(small.publishers() == 2U);
-    feeds.remove(small);
 }
 
 BOOST_AUTO_TEST_CASE(a_feed_of_one_node_that_ends_leaves_the_lease_to_one_of_all) {
