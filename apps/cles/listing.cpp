@@ -129,6 +129,7 @@ void listed_node::learn(std::string_view description) {
 
 std::vector<listed_node> listed(const std::vector<cles::peer>& peers) {
     std::vector<listed_node> nodes;
+    nodes.reserve(peers.size());
     for (const auto& p : peers) {
         nodes.push_back({.node = p.node,
                          .state = std::string{to_string(p.state)},
