@@ -13,7 +13,7 @@ namespace cles {
 
 /// Who is at the other end of a link, as far as the transport can tell. Known from the link's first line on.
 struct identity {
-    std::string transport;            ///< "tcp", "udp", "unix", "inproc"
+    std::string transport;            ///< "tcp", "udp", "unix", "inproc", "multicast"
     std::string address;              ///< as a URL; of a Unix socket's client, the socket that it came in by
     std::string name;                 ///< the node's proven name; empty where the transport proves none
     std::optional<std::uint32_t> uid; ///< of the process, where the kernel tells (Unix sockets)
