@@ -25,12 +25,14 @@ void check_url(const std::string& text) {
 
 } // namespace
 
-void address_book::add_options(CLI::App& command) {
+void address_book::add_options(CLI::App& command, const std::string& multicast_help) {
     auto* at = command.add_option("-a,--at", at_,
-                                  "Where the node is (default CLES_AT, or else " + std::string{default_url} + ")");
+                                  "Where the node is (default CLES_AT; else it is found by its name, and self is " +
+                                      std::string{default_url} + ")");
     at->type_name("URL");
     auto* peer = command.add_option("-p,--peer", peers_, "Where a node of that name is; may be repeated");
     peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    multicast_.add_to(command, multicast_help);
 }
 
 std::string address_book::at() const {
@@ -72,6 +74,9 @@ std::string address_book::url_for(std::string_view node) const {
     if (where.empty() && !peers_.empty()) {
         throw cles::error(cles::errc::no_target,
                           "no --peer is called '" + std::string{node} + "', and there is no --at");
+    }
+    if (finds_by_name() && node != "self" && node != "any" && node != "all") {
+        return {};
     }
     return where.empty() ? std::string{default_url} : where;
 }

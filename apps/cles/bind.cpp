@@ -6,7 +6,6 @@
 #include "context.hpp"
 #include "feed_command.hpp"
 #include "feed_events.hpp"
-#include "noun.hpp"
 #include "printer.hpp"
 
 #include <CLI/App.hpp>
@@ -70,8 +69,8 @@ void add_bind(CLI::App& app, context& shared) {
                     "  cles bind car1:localization --multicast eth0\n"
                     "  cles bind car1:localization -o json | jq -c '[.lat,.lon]'");
     command->callback([wanted, &shared] {
-        check_noun(wanted->feed.noun);
-        client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.group()};
+        wanted->feed.check();
+        client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.is_multicast()};
         wanted->feed.arm(asker);
         shared.exit_code = asker.run(follow(asker, *wanted));
     });

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "client.hpp"
 
+#include "diagnostics.hpp"
 #include "exit_code.hpp"
 #include "failure.hpp"
 #include "logging.hpp"
@@ -24,23 +25,34 @@ namespace asio = boost::asio;
 
 namespace {
 
-cles::service_options options_of(const address_book& addresses, int verbosity,
-                                 const cles::multicast_options& multicast) {
+cles::service_options options_of(const address_book& addresses, int verbosity, bool in_group) {
     addresses.check();
     cles::service_options options;
     options.name = "cles-" + std::to_string(::getpid());
     options.peers = addresses.peers();
-    options.log = log_of_client(verbosity);
-    options.multicast = multicast;
+    if (in_group || addresses.finds_by_name()) {
+        options.multicast = addresses.group();
+    }
     options.insecure = true; // nothing is served here
+    options.log = log_of_client(verbosity);
     return options;
+}
+
+bool is_no_target(const std::exception_ptr& thrown) {
+    try {
+        std::rethrow_exception(thrown);
+    } catch (const cles::error& e) {
+        return e.code() == cles::errc::no_target;
+    } catch (...) {
+        return false;
+    }
 }
 
 } // namespace
 
-client::client(const address_book& addresses, int verbosity, const cles::multicast_options& multicast)
+client::client(const address_book& addresses, int verbosity, bool in_group)
     : addresses_(addresses), signals_(io_, SIGINT, SIGTERM), end_timer_(io_), output_timer_(io_), sleep_timer_(io_),
-      node_(io_, options_of(addresses, verbosity, multicast)) {}
+      node_(io_, options_of(addresses, verbosity, in_group)) {}
 
 cles::call_options client::options_for(std::string_view noun, std::optional<std::chrono::milliseconds> limit) const {
     cles::call_options options;
@@ -86,7 +98,26 @@ int client::run(asio::awaitable<void> work) {
     if (early_) {
         return *early_;
     }
-    return thrown ? report_failure(thrown) : exit_code::success;
+    if (!thrown) {
+        return exit_code::success;
+    }
+    const auto code = report_failure(thrown);
+    if (code == exit_code::not_found && addresses_.finds_by_name() && is_no_target(thrown)) {
+        note("cles ls shows who is there; --at URL or --peer NAME=URL says where else to ask");
+    }
+    return code;
+}
+
+std::string client::where_is(std::string_view node) const {
+    auto url = addresses_.where_is(node);
+    if (url.empty()) {
+        for (const auto& other : node_.peers()) {
+            if (other.node == node && other.state != cles::peer_state::clash && !other.endpoints.empty()) {
+                url = other.endpoints.front();
+            }
+        }
+    }
+    return url;
 }
 
 void client::end_early(int code) {

@@ -23,8 +23,8 @@ namespace tool {
 /// when nobody reads its output any more; a request in flight is then withdrawn.
 class client {
   public:
-    /// `multicast`: where it takes part; nowhere, if nothing is said.
-    client(const address_book& addresses, int verbosity, const cles::multicast_options& multicast = {});
+    /// `in_group`: it takes part in multicast, even where nothing is to be found by its name.
+    client(const address_book& addresses, int verbosity, bool in_group = false);
 
     cles::service& node() noexcept { return node_; }
     boost::asio::io_context& context() noexcept { return io_; }
@@ -32,6 +32,9 @@ class client {
     /// Where and for how long to ask for this noun; no limit: the protocol's default.
     [[nodiscard]] cles::call_options options_for(std::string_view noun,
                                                  std::optional<std::chrono::milliseconds> limit) const;
+
+    /// The URL at which that node is asked, once it has answered.
+    [[nodiscard]] std::string where_is(std::string_view node) const;
 
     /// Ends the work, with success, when so much time has gone.
     void end_after(std::chrono::milliseconds span);

@@ -18,6 +18,7 @@ void add_update(CLI::App& app, context& shared);
 void add_ping(CLI::App& app, context& shared);
 void add_hz(CLI::App& app, context& shared);
 void add_info(CLI::App& app, context& shared);
+void add_ls(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);
 
 } // namespace tool

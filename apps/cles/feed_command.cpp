@@ -4,6 +4,7 @@
 #include "client.hpp"
 #include "common_options.hpp"
 #include "failure.hpp"
+#include "noun.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -13,8 +14,7 @@ namespace tool {
 
 void feed_command::add_options(CLI::App& command, const std::string& count_help) {
     add_noun(command, noun);
-    addresses.add_options(command);
-    multicast.add_to(command, "Bind by multicast, by which interface; all:TASK goes that way by itself");
+    addresses.add_options(command, "Bind by multicast, by which interface; all:TASK goes that way by itself");
     add_timeout(command, timeout, "5s");
     add_count(command, count, count_help);
     add_duration(command, "--duration", duration, "End after this time, with success (default: never)");
@@ -25,14 +25,14 @@ void feed_command::add_options(CLI::App& command, const std::string& count_help)
 }
 
 bool feed_command::is_multicast() const {
-    return (multicast.is_given() && multicast.where().is_on()) || (noun.starts_with("all:") && !addresses.has_at());
+    return (addresses.has_group() && addresses.group().is_on()) || (noun.starts_with("all:") && !addresses.has_at());
 }
 
-cles::multicast_options feed_command::group() const {
-    if (multicast.is_given() && addresses.has_at()) {
+void feed_command::check() const {
+    check_noun(noun);
+    if (addresses.has_group() && addresses.has_at()) {
         throw usage_error("--multicast and --at: an update comes by the one or by the other");
     }
-    return is_multicast() ? multicast.where() : cles::multicast_options{};
 }
 
 cles::bind_options feed_command::options(const client& asker) const {

@@ -4,7 +4,6 @@
 #include <cles/call_options.hpp>
 
 #include "address.hpp"
-#include "multicast_option.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -22,7 +21,6 @@ class client;
 /// What commands have in common that bind: to what, where, and for how long.
 struct feed_command {
     address_book addresses{};
-    multicast_option multicast{};
     std::string noun{};
     std::optional<std::chrono::milliseconds> timeout{};
     std::chrono::milliseconds every{0};
@@ -33,8 +31,8 @@ struct feed_command {
     void add_options(CLI::App& command, const std::string& count_help);
     /// Whether the group is bound, and no link: `all:` where no address was given, and what --multicast asks for.
     [[nodiscard]] bool is_multicast() const;
-    /// Where the client that binds takes part in multicast.
-    [[nodiscard]] cles::multicast_options group() const;
+    /// \throws usage_error where the options do not go together
+    void check() const;
     [[nodiscard]] cles::bind_options options(const client& asker) const;
     /// Has the client end when the duration is over, if one was given.
     void arm(client& asker) const;

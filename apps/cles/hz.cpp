@@ -4,7 +4,6 @@
 #include "context.hpp"
 #include "feed_command.hpp"
 #include "feed_events.hpp"
-#include "noun.hpp"
 #include "output.hpp"
 #include "statistics.hpp"
 
@@ -188,8 +187,8 @@ void add_hz(CLI::App& app, context& shared) {
                     "  cles hz car1:localization\n"
                     "  cles hz car1:localization --duration 10s -o json | tail -1 | jq .rate");
     command->callback([wanted, &shared] {
-        check_noun(wanted->feed.noun);
-        client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.group()};
+        wanted->feed.check();
+        client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.is_multicast()};
         wanted->feed.arm(asker);
         rate_meter meter{asker, *wanted};
         shared.exit_code = asker.run(meter.run());

@@ -21,17 +21,17 @@ namespace {
 
 constexpr auto about = "Talks to the nodes of a CLES network: five verbs, and what helps to look at them.";
 
-constexpr auto footer = "Data goes to stdout, everything else to stderr. CLES_AT is the default of --at, "
-                        "CLES_MULTICAST of --multicast; NO_COLOR turns "
-                        "colours off.\n\n"
-                        "Exit codes: 0 ok, 1 local failure, 2 usage, 3 no such target or task, 4 deadline,\n"
-                        "5 remote error, 6 busy, 130 interrupted.\n\n"
-                        "Examples:\n"
-                        "  cles serve                      # in one terminal\n"
-                        "  cles info                       # in another\n"
-                        "  cles pull car1:localization\n"
-                        "  cles bind car1:localization\n"
-                        "  cles delegate car1:sleep/3000";
+constexpr auto footer =
+    "Data goes to stdout, everything else to stderr. CLES_AT is the default of --at, CLES_MULTICAST that of "
+    "--multicast; NO_COLOR turns colours off.\n\n"
+    "Exit codes: 0 ok, 1 local failure, 2 usage, 3 no such target or task, 4 deadline,\n"
+    "5 remote error, 6 busy, 130 interrupted.\n\n"
+    "Examples:\n"
+    "  cles serve                      # in one terminal\n"
+    "  cles ls                         # in another\n"
+    "  cles pull car1:localization\n"
+    "  cles bind car1:localization\n"
+    "  cles delegate car1:sleep/3000";
 
 int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
     try {
@@ -68,6 +68,7 @@ int main(int argc, char** argv) {
         tool::add_ping(app, shared);
         tool::add_hz(app, shared);
         tool::add_info(app, shared);
+        tool::add_ls(app, shared);
         tool::add_serve(app, shared);
 #ifdef CLES_WITH_BENCH
         tool::add_bench(app, shared.exit_code);

@@ -26,7 +26,7 @@ cles::multicast_options read(const std::string& text, const std::string& whence)
 void multicast_option::add_to(CLI::App& command, const std::string& help) {
     command
         .add_option_function<std::string>(
-            "--multicast",
+            "-m,--multicast",
             [this](const std::string& text) {
                 read(text, "--multicast");
                 given_ = text;

@@ -83,8 +83,8 @@ class pinger {
         const auto first = co_await asker_.node().async_pull<self_description>(wanted_.noun, options_);
         node_ = printable(first.node);
         if (!wanted_.json) {
-            write_output("PING " + node_ + " (" + wanted_.addresses.where_is(target_of(wanted_.noun)) + "): PULL " +
-                         wanted_.noun + (first.version ? ", version " + printable(*first.version) : "") + "\n");
+            write_output("PING " + node_ + " (" + asker_.where_is(target_of(wanted_.noun)) + "): PULL " + wanted_.noun +
+                         (first.version ? ", version " + printable(*first.version) : "") + "\n");
         }
         std::exception_ptr ended;
         try {

@@ -65,7 +65,9 @@ const asio::any_io_executor& service::get_executor() const noexcept { return eng
 
 std::string service::listen(std::string_view url) { return engine_->listen(url); }
 
-void service::set_peer(std::string_view name, std::string_view url) { engine_->set_peer(name, url); }
+void service::set_peer(std::string_view name, std::string_view url) { engine_->routes().set_peer(name, url); }
+
+std::vector<peer> service::peers() const { return engine_->node().others.list(engine_->now()); }
 
 void service::stop() { engine_->stop(); }
 

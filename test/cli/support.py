@@ -24,7 +24,7 @@ def environment(**more):
     """The environment for a command, free of what the tester's own may hold."""
     env = {k: v for k, v in os.environ.items() if k not in ("CLES_AT", "NO_COLOR")}
     env["TERM"] = "xterm"
-    env["CLES_MULTICAST"] = "off"
+    env["CLES_MULTICAST"] = "off"  # but where a test is about it
     env.update(more)
     return env
 

@@ -7,7 +7,7 @@ import unittest
 
 from support import cles, environment
 
-COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "serve")
+COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "ls", "serve")
 
 
 class Usage(unittest.TestCase):

@@ -11,6 +11,7 @@
 - In "console any-numbers" blocks the numbers in what is printed, and the width of gaps, are examples.
 - A command that ends in ` &` goes on in the background; the next one waits until it has printed what the page says, or
   anything; its log, on stderr, is left out. It is stopped at the end of its page.
+- Nodes find each other in a group of the page's own.
 - "sh no-test: REASON" and "console no-test: REASON" are left out.
 
 The commands run from ROOT, with FOLDER (where `cles` is) in the path. So that runs do not meet, ports 253xx stand for free
@@ -166,8 +167,8 @@ def run_page(page: Path, root: Path, build: Path, path: Path) -> list[str]:
     programs.mkdir()
     if not shutil.which("nc"):
         (programs / "nc").symlink_to(Path(__file__).resolve().parent / "netcat.py")
-    environment = {**os.environ, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "COLUMNS": "120",
-                   "CLES_AT": f"tcp://127.0.0.1:{substitution.port_for('25370')}",
+    inherited = {name: value for name, value in os.environ.items() if name != "CLES_AT"}
+    environment = {**inherited, "LC_ALL": "C.UTF-8", "NO_COLOR": "1", "COLUMNS": "120",
                    "CLES_MULTICAST": f"lo,239.255.25.37:{free_udp_port()}",
                    "PATH": os.pathsep.join([str(path), str(programs), os.environ["PATH"]])}
     shell = Shell(root, environment, scratch)

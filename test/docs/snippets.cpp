@@ -33,6 +33,7 @@ void an_open_service();
 void a_service_in_a_group();
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
 asio::awaitable<void> asking(cles::service& car);
+asio::awaitable<void> finding(asio::io_context& io);
 asio::awaitable<void> errors(cles::service& car);
 asio::awaitable<void> feeds(cles::service& car, position here);
 asio::awaitable<void> feeds_of_all(cles::service& car);
@@ -79,6 +80,15 @@ asio::awaitable<void> asking(cles::service& car) {
     const auto answer = co_await car.async_request("PULL car0:tyre/2"); // JSON, as text
     co_await car.async_push("car0:brake", 0.8, cles::call_options{}.urgent());
     std::cout << metres << answer.text;
+}
+
+asio::awaitable<void> finding(asio::io_context& io) {
+    cles::service radar{io, {.name = "radar", .listen = {"tcp://127.0.0.1:0"}, .multicast = {.interface = "lo"}}};
+    const auto speed = co_await radar.async_pull<double>("car0:speed"); // wherever car0 is
+    for (const auto& other : radar.peers()) {
+        std::cout << other.node << ' ' << to_string(other.state) << '\n';
+    }
+    std::cout << speed;
 }
 
 asio::awaitable<void> errors(cles::service& car) {

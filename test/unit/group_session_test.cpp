@@ -20,7 +20,9 @@ constexpr group_source other{.address = 0x7f000001, .port = 4001};
 
 class recording_presence final : public cles::core::group_presence {
   public:
-    void on_solicitation(cles::time_point) override { told.emplace_back("solicited"); }
+    void on_solicitation(bool by_name, cles::time_point) override {
+        told.emplace_back(by_name ? "solicited by name" : "solicited");
+    }
     void on_announcement(const group_source& from, const cles::protocol::request_line& update,
                          cles::time_point) override {
         told.push_back(std::to_string(from.port) + " " + std::string{update.noun.target} + " " +
@@ -72,6 +74,14 @@ BOOST_AUTO_TEST_CASE(a_solicitation_is_handed_on) {
     BOOST_TEST(presence.told[0] == "solicited");
 }
 
+BOOST_AUTO_TEST_CASE(one_by_name_is_for_the_node_of_that_name_alone) {
+    hear("BIND " + node.host->name + ":cles");
+    hear("BIND another:cles");
+    BOOST_REQUIRE(presence.told.size() == 1U);
+    BOOST_TEST(presence.told[0] == "solicited by name");
+    BOOST_TEST(node.counts().group_dropped == 0U);
+}
+
 BOOST_AUTO_TEST_CASE(what_the_node_itself_has_sent_is_left_alone) {
     hear("BIND all:cles", self);
     hear("nonsense", self);
@@ -96,7 +106,7 @@ const std::vector<std::string> unwanted{
     "BIND self:localization",
     "BIND any:localization",
     "BIND all:cles/peers",
-    "BIND car1:cles",
+    "BIND car1:cles/peers",
     "BIND all:localization\nBIND all:speed",
     "BIND all:cles\n\n",
     "BIND all:cles {}",

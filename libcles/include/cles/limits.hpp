@@ -23,6 +23,7 @@ struct limits {
     std::size_t waiting = 1U << 20U;         ///< bytes of requests that wait for their turn before a link is not read
     std::size_t binding_bytes = 4U << 20U;   ///< bytes of updates queued for a binding
     std::size_t remembered = 16U << 20U;     ///< bytes of requests by datagram and their replies, of all sources
+    std::size_t peers = 1024;                ///< other nodes that are known because they announce themselves
     std::size_t group_leases = 4096;         ///< bindings by multicast; of one source at most `bindings`
     std::size_t publishers = 1024;           ///< whose updates of one noun a feed by multicast tells apart
     std::size_t feed = 1024;                 ///< updates that a feed holds for a caller who does not fetch them

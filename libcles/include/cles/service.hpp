@@ -8,6 +8,7 @@
 #include <cles/limits.hpp>
 #include <cles/log.hpp>
 #include <cles/multicast.hpp>
+#include <cles/peer.hpp>
 #include <cles/pending.hpp>
 #include <cles/registrar.hpp>
 #include <cles/reply_operation.hpp>
@@ -103,6 +104,9 @@ class service : public registrar {
     std::string listen(std::string_view url);
     /// Says where a node is. An empty URL forgets it.
     void set_peer(std::string_view name, std::string_view url);
+    /// The other nodes that announce themselves to the multicast group, by name. Requests to them need no URL; what
+    /// `service_options::peers` and `set_peer` say goes first.
+    [[nodiscard]] std::vector<peer> peers() const;
     /// Ends everything: listeners, links, feeds; operations fail with `stopped`, handlers that still run are told to
     /// stop. Answers already given are sent first where the peer takes them at once. Repeating it does nothing.
     void stop();

@@ -23,6 +23,10 @@ struct counters {
     std::uint64_t updates_too_large = 0; ///< not sent by datagram
     std::uint64_t updates_received = 0;  ///< and handed to a feed
     std::uint64_t updates_dropped = 0;   ///< unwanted, repeated or malformed
+    std::uint64_t announcements_sent = 0;
+    std::uint64_t announcements_received = 0; ///< of others, and taken
+    std::uint64_t announcements_dropped = 0;  ///< malformed or old
+    std::uint64_t peers_refused = 0;          ///< announcements of nodes past the limit
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to strangers who would have got too much
     std::uint64_t group_received = 0;     ///< datagrams of the multicast group, other than its own

@@ -49,10 +49,11 @@ bool group_session::serve(const group_source& from, std::string_view datagram, t
 bool group_session::on_bind(const group_source& from, const protocol::request_line& bind, time_point now) {
     const auto& noun = bind.noun;
     const bool solicits = noun.task == "cles";
-    if (solicits && (noun.target != "all" || !noun.parameters.empty())) {
+    if (solicits && !noun.parameters.empty()) {
         return false;
     }
-    if (noun.target != "all" && noun.target != node_.name) { // another's
+    const bool by_name = noun.target != "all";
+    if (by_name && noun.target != node_.name) { // another's
         return true;
     }
     if (!permits(from, bind)) {
@@ -62,7 +63,7 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
         return bindings_.bind(from, bind, now);
     }
     if (presence_ != nullptr) {
-        presence_->on_solicitation(now);
+        presence_->on_solicitation(by_name, now);
     }
     return true;
 }

@@ -21,8 +21,8 @@ class group_presence {
     group_presence() = default;
     group_presence(const group_presence&) = delete;
     group_presence& operator=(const group_presence&) = delete;
-    /// `BIND all:cles`: somebody asks who is there.
-    virtual void on_solicitation(time_point now) = 0;
+    /// `BIND all:cles`, or `BIND car1:cles` to this node of that name: somebody asks who is there.
+    virtual void on_solicitation(bool by_name, time_point now) = 0;
     /// `UPDATE car1:cles seq= epoch= {...}` of another node, its body valid JSON; views are valid for the call.
     virtual void on_announcement(const group_source& from, const protocol::request_line& update, time_point now) = 0;
 

@@ -32,6 +32,19 @@ void write_task(json_writer& w, std::string_view verb, std::string_view task, co
     w.end_object();
 }
 
+std::int64_t milliseconds_since(time_point then, time_point now) {
+    return std::chrono::duration_cast<std::chrono::milliseconds>(now - then).count();
+}
+
+} // namespace
+
+node::node(node_setup setup, const core::clock& source, std::function<void()> wake)
+    : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
+      bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)), time(source),
+      started(source.now()), others(name, setup.epoch, deadlines, bounds.peers),
+      published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)),
+      remembered{.limit = bounds.remembered} {}
+
 void write_tasks(json_writer& w, const node& n) {
     w.begin_array();
     for (const auto& [task, handlers] : n.tasks.tasks()) {
@@ -50,18 +63,6 @@ void write_tasks(json_writer& w, const node& n) {
     }
     w.end_array();
 }
-
-std::int64_t milliseconds_since(time_point then, time_point now) {
-    return std::chrono::duration_cast<std::chrono::milliseconds>(now - then).count();
-}
-
-} // namespace
-
-node::node(node_setup setup, const core::clock& source, std::function<void()> wake)
-    : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
-      bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)), time(source),
-      started(source.now()), published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)),
-      remembered{.limit = bounds.remembered} {}
 
 void write_description(json_writer& w, const node& n) {
     w.begin_object();
@@ -114,6 +115,11 @@ void write_metrics(json_writer& w, const node& n) {
     number("updates_too_large", c.updates_too_large);
     number("updates_received", c.updates_received);
     number("updates_dropped", c.updates_dropped);
+    number("announcements_sent", c.announcements_sent);
+    number("announcements_received", c.announcements_received);
+    number("announcements_dropped", c.announcements_dropped);
+    number("peers_known", n.others.size());
+    number("peers_refused", c.peers_refused);
     number("leases_expired", c.leases_expired);
     number("datagrams_withheld", c.datagrams_withheld);
     number("group_received", c.group_received);

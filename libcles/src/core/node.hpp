@@ -11,6 +11,7 @@
 #include "core/deadlines.hpp"
 #include "core/dedup.hpp"
 #include "core/latency_histogram.hpp"
+#include "core/presence.hpp"
 #include "core/publications.hpp"
 #include "core/reflection_limit.hpp"
 #include "core/registry.hpp"
@@ -50,6 +51,7 @@ struct node {
     std::vector<std::string> endpoints;
     registry tasks;
     deadline_queue deadlines;
+    presence others;
     counters counts;
     latency_histogram handler_time; ///< of all handlers that answer later, and of a sample of the others
     publications published;
@@ -64,6 +66,8 @@ struct node {
     }
 };
 
+/// What it offers: the value of `tasks` in the reply to `PULL self:cles`.
+void write_tasks(json_writer& w, const node& n);
 /// Writes the reply to `PULL self:cles`.
 void write_description(json_writer& w, const node& n);
 /// Writes the reply to `PULL self:cles/metrics`.

@@ -11,6 +11,8 @@ void serve_reserved(node& host, reply_writer& replies, const protocol::request_l
         replies.write(r, [&](json_writer& w) { write_description(w, host); });
     } else if (r.verb == verb::pull && parameters.size() == 1 && parameters[0] == "metrics") {
         replies.write(r, [&](json_writer& w) { write_metrics(w, host); });
+    } else if (r.verb == verb::pull && parameters.size() == 1 && parameters[0] == "peers") {
+        replies.write(r, [&](json_writer& w) { write_peers(w, host.others, host.time.now()); });
     } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
         replies.fail(r, errc::bad_request, host.name + ": cancel needs an id from 1 to 2^63-1");
     } else {

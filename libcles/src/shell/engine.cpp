@@ -4,7 +4,6 @@
 #include "core/call.hpp"
 #include "protocol/message.hpp"
 #include "shell/service_call.hpp"
-#include "transport/inproc.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -19,7 +18,6 @@ namespace {
 
 // How many turns of the executor updates may wait for more to come, so that one write carries them all.
 constexpr int most_turns_put_off = 64;
-constexpr std::size_t routes_before_tidying = 64;
 
 core::node_setup setup_of(service_options& options) {
     std::random_device source;
@@ -51,9 +49,10 @@ engine::engine(asio::any_io_executor executor, service_options options)
       multicast_(options.multicast) {
     check_node_name(options.name);
     for (const auto& [name, where] : options.peers) {
-        set_peer(name, where);
+        routes_.set_peer(name, where);
     }
     node_ = std::make_shared<core::node>(setup_of(options), clock_, [this] { ask_for_turn(); });
+    neighbours_ = std::make_unique<shell::neighbours>(*this, std::random_device{}());
 }
 
 engine::~engine() = default;
@@ -78,6 +77,7 @@ void engine::join_group() {
     try {
         group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
         group_->start();
+        neighbours_->start(*group_, multicast_.interface);
     } catch (const error& e) {
         if (multicast_.required) {
             throw;
@@ -91,15 +91,14 @@ void engine::join_group() {
 std::string engine::listen(std::string_view where) {
     auto local = listeners_.listen(where, insecure_);
     node_->endpoints.push_back(local);
+    neighbours_->changed();
     say(log_level::debug, node_->name + " listens on " + local);
     return local;
 }
 
 void engine::forget(shell::connection& c, std::uint64_t received, std::uint64_t sent) {
     if (connections_.forget(c, received, sent)) {
-        for (auto& [where, r] : routes_) {
-            r->drop(c);
-        }
+        routes_.drop(c);
     }
 }
 
@@ -157,77 +156,6 @@ void engine::turn() {
 
 // -- asking --------------------------------------------------------------------------------------------------------
 
-void engine::set_peer(std::string_view name, std::string_view where) {
-    if (!protocol::is_name(name) || protocol::is_reserved_target(name)) {
-        throw error(errc::invalid_name, protocol::quoted(name) + " is not a node's name");
-    }
-    if (!where.empty()) {
-        const auto address = parse_url(where);
-        if (find_transport(address.scheme) == nullptr) {
-            throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
-        }
-    }
-    directory_.set(name, where);
-    recent_route_ = nullptr;
-}
-
-shell::route* engine::route_to(std::string_view target, std::string_view at, bool urgent,
-                               boost::system::error_code& code, std::string& why) {
-    if (!at.empty() || urgent) {
-        return find_route(target, at, urgent, code, why);
-    }
-    if (recent_route_ == nullptr || recent_target_ != target) {
-        recent_route_ = find_route(target, at, false, code, why);
-        recent_target_ = target;
-    }
-    return recent_route_;
-}
-
-shell::route* engine::find_route(std::string_view target, std::string_view at, bool urgent,
-                                 boost::system::error_code& code, std::string& why) {
-    std::string address{at};
-    if (address.empty() && (target == "self" || target == node_->name)) {
-        address = "inproc://" + listeners_.self_door();
-    } else if (address.empty()) {
-        address = directory_.find(target);
-    }
-    if (address.empty() && transport::is_open(listeners_.shared_door(target))) {
-        address = "inproc://" + listeners_.shared_door(target);
-    }
-    const auto key = urgent ? address + " urgent" : address;
-    if (const auto found = routes_.find(key); found != routes_.end()) {
-        return found->second.get();
-    }
-    try {
-        if (address.empty()) {
-            throw error(errc::no_target,
-                        protocol::is_reserved_target(target)
-                            ? "'" + std::string{target} + "' needs a node that routes"
-                            : node_->name + " knows no way to '" + std::string{target} + "': give its URL");
-        }
-        const auto where = parse_url(address);
-        if (find_transport(where.scheme) == nullptr) {
-            throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + address + "'");
-        }
-        if (routes_.size() >= routes_before_tidying) { // to many a node of the past
-            std::erase_if(routes_, [](const auto& entry) { return entry.second->idle(); });
-            recent_route_ = nullptr;
-        }
-        auto made = std::make_shared<shell::route>(shared_from_this(), where);
-        return routes_.emplace(key, std::move(made)).first->second.get();
-    } catch (const error& e) {
-        code = e.code();
-        why = e.message();
-        return nullptr;
-    }
-}
-
-void engine::forget_waiting(const core::feed_machine& feed) {
-    for (const auto& [where, r] : routes_) {
-        r->forget(feed);
-    }
-}
-
 void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message) {
     asio::post(executor_, [operation = std::move(operation), code, message = std::move(message)]() mutable {
         operation.release()->fail(code, message);
@@ -246,7 +174,7 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
         fail_later(std::move(operation), code, std::move(why));
         return 0;
     }
-    auto* r = route_to(noun.target, options.at_, options.urgent_, code, why);
+    auto* r = routes_.to(noun.target, options.at_, options.urgent_, code, why);
     if (r == nullptr) {
         fail_later(std::move(operation), code, std::move(why));
         return 0;
@@ -272,12 +200,9 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
 
 void engine::cancel(std::uint64_t ticket) {
     const auto keep = shared_from_this();
-    for (const auto& [where, r] : routes_) {
-        if (r->cancel(ticket)) {
-            return;
-        }
+    if (!routes_.cancel(ticket)) {
+        connections_.cancel(ticket);
     }
-    connections_.cancel(ticket);
 }
 
 // -- serving and publishing ----------------------------------------------------------------------------------------
@@ -297,6 +222,14 @@ void engine::add(registration task) {
         };
     }
     node_->tasks.add(task.verb, task.task, std::move(entry));
+    neighbours_->changed();
+}
+
+void engine::open_noun(std::string_view noun) {
+    check_path(noun);
+    if (!node_->published.knows(noun.substr(0, noun.find('/')))) {
+        neighbours_->changed();
+    }
 }
 
 void engine::check_path(std::string_view noun) const {
@@ -320,7 +253,7 @@ void engine::publish(std::string_view noun, const std::function<void(json_writer
         return;
     }
     if (node_->published.find(noun) == nullptr) {
-        check_path(noun);
+        open_noun(noun);
     }
     node_->published.publish(noun, write);
 }
@@ -332,7 +265,7 @@ void engine::publish_when_room(std::string_view noun, std::string_view json, pen
     }
     try {
         if (node_->published.find(noun) == nullptr) {
-            check_path(noun);
+            open_noun(noun);
         }
         if (node_->published.publish_when_room(noun, json, operation)) {
             asio::post(executor_, [operation = std::move(operation)]() mutable { operation.release()->offer("{}"); });
@@ -363,13 +296,11 @@ void engine::stop() {
     };
     feeds_.stop();
     tell(node_->published.take_waiters());
+    neighbours_->stop();
     if (group_) {
         group_->stop();
     }
-    recent_route_ = nullptr;
-    for (auto routes = std::exchange(routes_, {}); const auto& [where, r] : routes) {
-        tell(r->stop());
-    }
+    tell(routes_.stop());
     for (const auto& c : connections_.all()) {
         tell(c->session().asking().take_all());
         c->flush();

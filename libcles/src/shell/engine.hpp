@@ -5,7 +5,6 @@
 #include <cles/link.hpp>
 #include <cles/service.hpp>
 
-#include "core/directory.hpp"
 #include "core/feed_machine.hpp"
 #include "core/node.hpp"
 #include "protocol/grammar.hpp"
@@ -15,14 +14,14 @@
 #include "shell/feed_links.hpp"
 #include "shell/group.hpp"
 #include "shell/listeners.hpp"
+#include "shell/neighbours.hpp"
 #include "shell/networks.hpp"
-#include "shell/route.hpp"
+#include "shell/routes.hpp"
 #include "shell/steady_clock.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -39,7 +38,6 @@ class engine final : public std::enable_shared_from_this<engine> {
     /// Begins; to be called once, when the engine is owned.
     void start(const std::vector<std::string>& listen_at);
     std::string listen(std::string_view where);
-    void set_peer(std::string_view name, std::string_view where);
     void stop();
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
@@ -55,6 +53,9 @@ class engine final : public std::enable_shared_from_this<engine> {
     [[nodiscard]] std::string stranger(const identity& peer) const;
     void say(log_level level, std::string_view text) const { node_->say(level, text); }
     [[nodiscard]] shell::connections& connections() noexcept { return connections_; }
+    [[nodiscard]] shell::listeners& listeners() noexcept { return listeners_; }
+    [[nodiscard]] shell::routes& routes() noexcept { return routes_; }
+    [[nodiscard]] shell::neighbours& neighbours() noexcept { return *neighbours_; }
     /// The multicast group; null where it is off.
     [[nodiscard]] shell::group* group() noexcept { return group_.get(); }
     /// A connection has ended.
@@ -75,19 +76,13 @@ class engine final : public std::enable_shared_from_this<engine> {
 
     // For the feeds.
     [[nodiscard]] shell::feed_links& feeds() noexcept { return feeds_; }
-    /// The route for a target, or null with the reason in `code` and `why`. What is urgent has links of its own.
-    shell::route* route_to(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
-                           std::string& why);
     [[nodiscard]] std::uint64_t draw_id() noexcept { return node_->next_id++; }
-    /// A feed no longer waits for a link.
-    void forget_waiting(const core::feed_machine& feed);
 
   private:
     void join_group();
     void ask_for_turn();
     void turn();
-    shell::route* find_route(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
-                             std::string& why);
+    void open_noun(std::string_view noun);
     void check_path(std::string_view noun) const;
 
     boost::asio::any_io_executor executor_;
@@ -97,14 +92,12 @@ class engine final : public std::enable_shared_from_this<engine> {
     bool insecure_;
     shell::networks networks_;
     multicast_options multicast_;
-    core::directory directory_;
+    shell::routes routes_{*this};
     shell::listeners listeners_{*this};
     shell::connections connections_{*this};
-    std::map<std::string, std::shared_ptr<shell::route>, std::less<>> routes_;
-    std::string recent_target_; // most requests go where the one before went
-    shell::route* recent_route_ = nullptr;
     shell::feed_links feeds_{*this};
     std::unique_ptr<shell::group> group_;
+    std::unique_ptr<shell::neighbours> neighbours_;
     std::vector<std::shared_ptr<shell::connection>> to_flush_;
     std::vector<std::shared_ptr<shell::connection>> flushing_;
     std::uint64_t published_at_last_turn_ = 0;

@@ -123,22 +123,23 @@ void feed_links::bind(core::feed_machine& feed) {
     }
     boost::system::error_code code;
     std::string why;
-    auto* r = engine_.route_to(feed.target(), found->second.terms.at, false, code, why);
+    auto* r = engine_.routes().to(feed.target(), found->second.terms.at, false, code, why);
     if (r == nullptr) {
         refuse_later(feed, code, why);
         return;
     }
-    r->connect(feed, [host = engine_.shared_from_this(), handle = found->second.handle.lock(), &feed,
-                      address = r->address()](const std::shared_ptr<connection>& c, boost::system::error_code failed) {
-        if (feed.closed()) {
-            return;
-        }
-        if (c) {
-            host->feeds().send_bind(feed, c);
-        } else {
-            feed.on_refused(failed, "cannot connect to " + address + ": " + failed.message(), host->now());
-        }
-    });
+    r->connect(feed,
+               [host = engine_.shared_from_this(), handle = found->second.handle.lock(), &feed](
+                   const std::shared_ptr<connection>& c, boost::system::error_code failed, std::string_view message) {
+                   if (feed.closed()) {
+                       return;
+                   }
+                   if (c) {
+                       host->feeds().send_bind(feed, c);
+                   } else {
+                       feed.on_refused(failed, message, host->now());
+                   }
+               });
     engine_.settle();
 }
 
@@ -201,7 +202,7 @@ void feed_links::unbind(core::feed_machine& feed) {
     if (found == feeds_.end()) {
         return;
     }
-    engine_.forget_waiting(feed);
+    engine_.routes().forget(feed);
     const auto c = found->second.on.lock();
     const auto now = engine_.now();
     detach(feed);

@@ -10,7 +10,9 @@
 namespace cles::shell {
 
 route::route(std::shared_ptr<detail::engine> host, url where)
-    : engine_(std::move(host)), where_(std::move(where)), address_(to_string(where_)) {}
+    : engine_(std::move(host)), where_(std::move(where)), address_(to_string(*where_)) {}
+
+route::route(std::shared_ptr<detail::engine> host, std::string_view node) : engine_(std::move(host)), address_(node) {}
 
 std::shared_ptr<connection> route::usable() const {
     for (const auto& c : links_) {
@@ -70,10 +72,9 @@ void route::waiting::on_deadline(time_point) {
     held.release()->fail(errc::deadline, message);
 }
 
-void route::connect(core::feed_machine& feed,
-                    std::function<void(const std::shared_ptr<connection>&, boost::system::error_code)> ready) {
+void route::connect(core::feed_machine& feed, ready_function ready) {
     if (const auto c = free_for(feed)) {
-        ready(c, {});
+        ready(c, {}, {});
         return;
     }
     binders_.push_back({&feed, std::move(ready)});
@@ -89,11 +90,11 @@ void route::drop(const connection& c) {
 }
 
 void route::dial() {
-    if (give_up_) {
+    if (give_up_ || !where_) {
         return;
     }
-    auto* carrier = find_transport(where_.scheme);
-    give_up_ = carrier->dial(engine_->executor(), where_, engine_->bounds(),
+    auto* carrier = find_transport(where_->scheme);
+    give_up_ = carrier->dial(engine_->executor(), *where_, engine_->bounds(),
                              [weak = weak_from_this()](boost::system::error_code code, link_ptr made) {
                                  if (const auto self = weak.lock()) {
                                      self->on_dialled(code, std::move(made));
@@ -107,7 +108,7 @@ void route::on_dialled(boost::system::error_code code, link_ptr made) {
     const auto keep = shared_from_this();
     give_up_ = nullptr;
     if (code) {
-        fail_waiting(code);
+        fail(code, "cannot connect to " + address_ + ": " + code.message());
     } else {
         const auto c = engine_->connections().adopt(std::move(made), connection::origin::dialled);
         links_.push_back(c);
@@ -127,7 +128,7 @@ void route::serve_waiting(const std::shared_ptr<connection>& c) {
     for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {
         auto& next = binders.front();
         if (const auto free = free_for(*next.feed)) {
-            next.ready(free, {});
+            next.ready(free, {}, {});
         } else {
             binders_.push_back(std::move(next));
         }
@@ -137,8 +138,20 @@ void route::serve_waiting(const std::shared_ptr<connection>& c) {
     }
 }
 
-void route::fail_waiting(boost::system::error_code code) {
-    const auto message = "cannot connect to " + address_ + ": " + code.message();
+void route::hand_over(route& way) {
+    const auto now = engine_->now();
+    for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
+        auto& w = *requests.front();
+        engine_->deadlines().disarm(w);
+        way.send({.verb = w.verb, .noun = w.noun, .body = w.body, .id = w.id, .begun = now, .deadline = w.deadline},
+                 std::move(w.operation), std::move(w.progress));
+    }
+    for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {
+        way.connect(*binders.front().feed, std::move(binders.front().ready));
+    }
+}
+
+void route::fail(boost::system::error_code code, std::string_view message) {
     auto requests = std::exchange(requests_, {});
     auto binders = std::exchange(binders_, {});
     for (const auto& w : requests) {
@@ -148,7 +161,7 @@ void route::fail_waiting(boost::system::error_code code) {
         w->operation.release()->fail(code, message);
     }
     for (const auto& b : binders) {
-        b.ready(nullptr, code);
+        b.ready(nullptr, code, message);
     }
 }
 

@@ -12,7 +12,9 @@
 #include <functional>
 #include <list>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace cles::core {
@@ -25,6 +27,8 @@ namespace cles::shell {
 class route : public std::enable_shared_from_this<route> {
   public:
     route(std::shared_ptr<detail::engine> host, url where);
+    /// To a node of which nobody has heard yet: holds what is to go there until `hand_over` or `fail`.
+    route(std::shared_ptr<detail::engine> host, std::string_view node);
 
     struct request {
         cles::verb verb = verb::pull;
@@ -35,15 +39,20 @@ class route : public std::enable_shared_from_this<route> {
         time_point begun{};
         time_point deadline{};
     };
+    /// With a link, or null and why there is none, in words too.
+    using ready_function =
+        std::function<void(const std::shared_ptr<connection>&, boost::system::error_code, std::string_view)>;
     /// Sends a request on a link that is there, or as soon as one has been made.
     void send(const request& r, detail::pending_ptr operation, core::outbound::progress_function progress);
     /// Withdraws a request that waits here for its link. False where there is none of that id.
     bool cancel(std::uint64_t id);
-    /// Finds the feed a link on which its noun is not bound yet; `ready` is called with it, or with null and why there
-    /// is none. Not called any more after `forget`.
-    void connect(core::feed_machine& feed,
-                 std::function<void(const std::shared_ptr<connection>&, boost::system::error_code)> ready);
+    /// Finds the feed a link on which its noun is not bound yet, and calls `ready`; not any more after `forget`.
+    void connect(core::feed_machine& feed, ready_function ready);
     void forget(const core::feed_machine& feed);
+    /// Sends what waits here by another route.
+    void hand_over(route& way);
+    /// Tells all that wait that there is no link.
+    void fail(boost::system::error_code code, std::string_view message);
     /// A link has been lost or can no longer be used.
     void drop(const connection& c);
     /// Gives up, and takes out the requests that wait.
@@ -72,7 +81,7 @@ class route : public std::enable_shared_from_this<route> {
     };
     struct binder {
         core::feed_machine* feed;
-        std::function<void(const std::shared_ptr<connection>&, boost::system::error_code)> ready;
+        ready_function ready;
     };
 
     [[nodiscard]] std::shared_ptr<connection> usable() const;
@@ -80,10 +89,9 @@ class route : public std::enable_shared_from_this<route> {
     void dial();
     void on_dialled(boost::system::error_code code, link_ptr made);
     void serve_waiting(const std::shared_ptr<connection>& c);
-    void fail_waiting(boost::system::error_code code);
 
     std::shared_ptr<detail::engine> engine_;
-    url where_;
+    std::optional<url> where_; // nothing: not known yet
     std::string address_;
     std::vector<std::shared_ptr<connection>> links_;
     std::list<std::unique_ptr<waiting>> requests_;

@@ -71,7 +71,7 @@ class output final : public core::group_output {
 
 class listener final : public core::group_presence {
   public:
-    void on_solicitation(time_point) override {}
+    void on_solicitation(bool, time_point) override {}
     void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point) override {
         require(from.port != 0, "a node does not hear itself");
         require(is_valid_json(update.body, 8), "an announcement is JSON", update.text);

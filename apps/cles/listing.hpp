@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/peer.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace tool {
+
+/// A node as `cles ls` shows it.
+struct listed_node {
+    std::string node;
+    std::string state;
+    std::optional<std::int64_t> age_ms; ///< nothing: it has just answered itself
+    std::vector<std::string> endpoints;
+    std::string epoch;
+    cles::node_load load{};
+    std::string tasks{}; ///< what it offers, as JSON; empty where it has not been asked or has not answered
+    std::string error{}; ///< why not
+
+    /// Takes its tasks from its answer to PULL self:cles.
+    void learn(std::string_view description);
+};
+
+std::vector<listed_node> listed(const std::vector<cles::peer>& peers);
+/// From a node's answers to PULL self:cles and self:cles/peers. \throws cles::error with `conversion`
+std::vector<listed_node> listed(std::string_view itself, std::string_view others);
+
+/// For people; `tasks`: with what they offer.
+std::string to_table(const std::vector<listed_node>& nodes, bool tasks);
+/// As the reply to PULL self:cles/peers, and with `tasks` for each `tasks` as in PULL self:cles, or `failure`, why
+/// there are none.
+std::string to_json(const std::vector<listed_node>& nodes, bool tasks);
+
+} // namespace tool

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/announcement.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "protocol/datagram.hpp"
+#include "protocol/grammar.hpp"
+
+#include <algorithm>
+#include <limits>
+
+namespace cles::core {
+namespace {
+
+constexpr std::size_t depth = 8; // of what later versions may add
+
+bool read_endpoints(json_reader& r, std::vector<std::string>& out) {
+    out.clear();
+    if (!r.begin_array()) {
+        return false;
+    }
+    while (r.next_element()) {
+        std::string_view url;
+        if (!r.read(url)) {
+            return false;
+        }
+        if (out.size() < most_endpoints && !url.empty() && url.size() <= longest_endpoint) {
+            out.emplace_back(url);
+        }
+    }
+    return r.ok();
+}
+
+bool read_count(json_reader& r, std::uint32_t& out) {
+    std::uint64_t wide = 0;
+    if (!r.read(wide)) {
+        return false;
+    }
+    out = static_cast<std::uint32_t>(std::min<std::uint64_t>(wide, std::numeric_limits<std::uint32_t>::max()));
+    return true;
+}
+
+bool read_load(json_reader& r, node_load& out) {
+    out = {};
+    if (!r.begin_object()) {
+        return false;
+    }
+    std::string_view key;
+    while (r.next_key(key)) {
+        const bool good = key == "queued"    ? read_count(r, out.queued)
+                          : key == "running" ? read_count(r, out.running)
+                          : key == "workers" ? read_count(r, out.workers)
+                                             : r.skip();
+        if (!good) {
+            return false;
+        }
+    }
+    return r.ok();
+}
+
+bool read_interval(json_reader& r, std::chrono::milliseconds& out) {
+    std::uint64_t ms = 0;
+    if (!r.read(ms)) {
+        return false;
+    }
+    const auto longest = static_cast<std::uint64_t>(longest_interval.count());
+    out = std::max(shortest_interval, std::chrono::milliseconds{std::min(ms, longest)});
+    return true;
+}
+
+bool read_digest(json_reader& r, std::string& out) {
+    if (!r.read(out)) {
+        return false;
+    }
+    return out.size() <= longest_digest || r.fail("the digest has more than 64 bytes");
+}
+
+bool read_member(json_reader& r, std::string_view key, announcement& out) {
+    if (key == "node") {
+        return r.read(out.node);
+    }
+    if (key == "endpoints") {
+        return read_endpoints(r, out.endpoints);
+    }
+    if (key == "load") {
+        return read_load(r, out.load);
+    }
+    if (key == "interval_ms") {
+        return read_interval(r, out.interval);
+    }
+    if (key == "tasks") {
+        return read_digest(r, out.tasks);
+    }
+    if (key == "leaving") {
+        return r.read(out.leaving);
+    }
+    return r.skip();
+}
+
+bool read_members(json_reader& r, announcement& out) {
+    if (!r.begin_object()) {
+        return false;
+    }
+    std::string_view key;
+    while (r.next_key(key)) {
+        const std::string name{key};
+        if (!read_member(r, name, out)) {
+            r.inside_member(name);
+            return false;
+        }
+    }
+    return r.ok() && r.at_end();
+}
+
+void append_body(std::string& out, const announcement& said, std::size_t endpoints) {
+    json_writer w{out};
+    w.begin_object();
+    w.plain_key("node");
+    w.value(std::string_view{said.node});
+    w.plain_key("endpoints");
+    w.begin_array();
+    for (std::size_t i = 0; i < endpoints; ++i) {
+        w.value(std::string_view{said.endpoints[i]});
+    }
+    w.end_array();
+    w.plain_key("load");
+    write_load(w, said.load);
+    w.plain_key("interval_ms");
+    w.value(std::int64_t{said.interval.count()});
+    w.plain_key("tasks");
+    w.value(std::string_view{said.tasks});
+    if (said.leaving) {
+        w.plain_key("leaving");
+        w.value(true);
+    }
+    w.end_object();
+}
+
+} // namespace
+
+void write_load(json_writer& w, const node_load& load) {
+    w.begin_object();
+    w.plain_key("queued");
+    w.value(std::uint64_t{load.queued});
+    w.plain_key("running");
+    w.value(std::uint64_t{load.running});
+    w.plain_key("workers");
+    w.value(std::uint64_t{load.workers});
+    w.end_object();
+}
+
+bool read_announcement(const protocol::request_line& update, announcement& out, std::string& why) {
+    out = {};
+    const auto& noun = update.noun;
+    if (update.verb != verb::update || !update.is_update() || noun.path != "cles" ||
+        protocol::is_reserved_target(noun.target)) {
+        why = "an announcement is an update of a node's own task 'cles'";
+        return false;
+    }
+    out.node = noun.target;
+    json_reader reader{update.body.empty() ? std::string_view{"{}"} : update.body, depth};
+    if (!read_members(reader, out)) {
+        why = reader.error();
+        return false;
+    }
+    if (out.node != noun.target) {
+        why = "the node announced is not the one of the noun";
+        return false;
+    }
+    return true;
+}
+
+void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch) {
+    const auto start = out.size();
+    for (auto endpoints = std::min(said.endpoints.size(), most_endpoints);; --endpoints) {
+        protocol::append_update_head(out, said.node, "cles", seq, epoch);
+        append_body(out, said, endpoints);
+        out.push_back('\n');
+        if (out.size() - start <= protocol::datagram_bytes || endpoints == 0) {
+            return;
+        }
+        out.resize(start);
+    }
+}
+
+std::string digest_of_tasks(std::string_view json) {
+    constexpr std::uint64_t basis = 0xcbf29ce484222325; // Fowler, Noll, Vo
+    constexpr std::uint64_t prime = 0x100000001b3;
+    auto hash = basis;
+    for (const auto c : json) {
+        hash = (hash ^ static_cast<unsigned char>(c)) * prime;
+    }
+    std::string text(16, '0');
+    for (std::size_t i = text.size(); i-- > 0; hash >>= 4U) {
+        text[i] = "0123456789abcdef"[hash & 0xFU];
+    }
+    return text;
+}
+
+} // namespace cles::core

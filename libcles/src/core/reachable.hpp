@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "core/group_source.hpp"
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// Where a node can be asked, of the endpoints that it announced, the best one first.
+///
+/// An address that is unspecified stands for where the announcement came from. Left out is what is of no use or no good
+/// here: `inproc`; Unix sockets and loopback addresses, unless the announcement came by loopback and so from this host;
+/// and what is no IP address, since whoever says where he is must not have names looked up.
+///
+/// Streams come before datagrams: `tcp`, then `unix` (whose permissions may keep others out), then `udp`, then schemes
+/// that are not known here. Among equals an address that the announcement came from goes first, then the node's order.
+std::vector<std::string> reachable_endpoints(const std::vector<std::string>& announced, const group_source& from);
+
+} // namespace cles::core

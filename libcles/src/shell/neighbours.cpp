@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/neighbours.hpp"
+
+#include "shell/engine.hpp"
+#include "shell/group.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <utility>
+
+namespace cles::shell {
+
+neighbours::neighbours(detail::engine& host, std::uint32_t seed)
+    : engine_(host), announcer_(*this, host.deadlines(), seed), round_(*this, host.deadlines()) {
+    host.node().others.watch(this);
+}
+
+neighbours::~neighbours() { engine_.node().others.watch(nullptr); }
+
+void neighbours::start(group& through, std::string interface) {
+    group_ = &through;
+    interface_ = std::move(interface);
+    group_->session().attend(this);
+    round_.expect();
+    boost::asio::post(engine_.executor(), [weak = engine_.weak_from_this(), this] {
+        if (const auto host = weak.lock(); host && !host->stopped()) {
+            begin();
+        }
+    });
+}
+
+void neighbours::begin() {
+    const auto now = engine_.now();
+    group_->send("BIND all:cles\n");
+    round_.begin(now);
+    announcer_.start(now);
+    engine_.settle();
+}
+
+void neighbours::ask_for(std::string_view node) {
+    if (group_ != nullptr) {
+        group_->send("BIND " + std::string{node} + ":cles\n");
+    }
+}
+
+void neighbours::changed() {
+    if (group_ != nullptr) {
+        announcer_.hurry(engine_.now());
+        engine_.settle();
+    }
+}
+
+void neighbours::stop() {
+    engine_.node().others.watch(nullptr);
+    announcer_.stop();
+    round_.stop();
+    if (group_ != nullptr) {
+        if (seq_ != 0) {
+            announce(core::announcer::shortest, true);
+        }
+        group_->session().attend(nullptr);
+        group_ = nullptr;
+    }
+}
+
+// -- what this node says -------------------------------------------------------------------------------------------
+
+void neighbours::announce(std::chrono::milliseconds interval) {
+    if (!engine_.node().endpoints.empty()) { // else nobody could ask it for anything
+        announce(interval, false);
+    }
+}
+
+void neighbours::announce(std::chrono::milliseconds interval, bool leaving) {
+    auto& node = engine_.node();
+    std::string tasks;
+    json_writer w{tasks};
+    write_tasks(w, node);
+    const core::announcement said{.node = node.name,
+                                  .endpoints = endpoints_to_tell(),
+                                  .load = {.running = static_cast<std::uint32_t>(node.counts.handlers_running)},
+                                  .interval = interval,
+                                  .tasks = core::digest_of_tasks(tasks),
+                                  .leaving = leaving};
+    std::string line;
+    append_announcement(line, said, ++seq_, node.epoch);
+    if (group_->send(line)) {
+        ++node.counts.announcements_sent;
+    }
+}
+
+// What others in the group can use: on loopback all but what stays in this process, elsewhere what other hosts reach.
+std::vector<std::string> neighbours::endpoints_to_tell() const {
+    std::vector<std::string> result;
+    const bool loopback = group_->source().is_loopback();
+    for (const auto& endpoint : engine_.node().endpoints) {
+        auto where = parse_url(endpoint);
+        if (where.scheme == "inproc") {
+            continue;
+        }
+        if (where.host == "::") { // which takes IPv6 alone, so that it is not where the announcement comes from
+            if (!loopback) {
+                continue;
+            }
+            where.host = "::1";
+        }
+        const auto* carrier = find_transport(where.scheme);
+        if (loopback || (carrier != nullptr && carrier->is_exposed(where))) {
+            result.push_back(to_string(where));
+        }
+    }
+    return result;
+}
+
+std::size_t neighbours::others() const { return engine_.node().others.size(); }
+
+void neighbours::on_solicitation(bool by_name, time_point now) {
+    if (by_name) {
+        announcer_.hurry(now); // nobody else answers
+    } else {
+        announcer_.solicited(now);
+    }
+}
+
+// -- what others say -----------------------------------------------------------------------------------------------
+
+void neighbours::on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) {
+    auto& counts = engine_.node().counts;
+    core::announcement said;
+    std::string why;
+    if (!read_announcement(update, said, why)) {
+        ++counts.announcements_dropped;
+        engine_.say(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
+        return;
+    }
+    switch (engine_.node().others.hear(said, *update.epoch, *update.seq, from, now)) {
+    case core::presence::verdict::taken: ++counts.announcements_received; break;
+    case core::presence::verdict::old: ++counts.announcements_dropped; break;
+    case core::presence::verdict::refused: ++counts.peers_refused; break;
+    case core::presence::verdict::own: break;
+    }
+}
+
+void neighbours::on_peer(std::string_view node, core::presence::change what, std::string_view where) {
+    const std::string name{node};
+    const auto place =
+        where.empty() ? std::string{", at no address that can be used from here"} : ", at " + std::string{where};
+    switch (what) {
+    case core::presence::change::appeared: engine_.say(log_level::info, name + " is there" + place); break;
+    case core::presence::change::moved: engine_.say(log_level::info, name + " is elsewhere now" + place); break;
+    case core::presence::change::silent: engine_.say(log_level::debug, name + " is not heard any more"); break;
+    case core::presence::change::returned: engine_.say(log_level::debug, name + " is heard again"); break;
+    case core::presence::change::left: engine_.say(log_level::info, name + " has left"); break;
+    case core::presence::change::gone: engine_.say(log_level::info, name + " is gone"); break;
+    case core::presence::change::clash:
+        engine_.say(log_level::warning,
+                    name == engine_.node().name
+                        ? "another node calls itself '" + name + "' too, on " + std::string{where}
+                        : "there is a second '" + name + "', on " + std::string{where} + ", and it is not asked");
+        return;
+    }
+    engine_.routes().on_whereabouts(name);
+}
+
+void neighbours::on_round_over() { engine_.routes().on_round_over(); }
+
+std::optional<std::string_view> neighbours::find(std::string_view node) const noexcept {
+    return engine_.node().others.find(node);
+}
+
+std::string neighbours::why_unknown() const {
+    return group_ == nullptr ? std::string{} : "nobody of that name has announced itself on " + interface_ + "; ";
+}
+
+} // namespace cles::shell

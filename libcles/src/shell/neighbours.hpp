@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "core/announcer.hpp"
+#include "core/first_round.hpp"
+#include "core/group_session.hpp"
+#include "core/presence.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::detail {
+class engine;
+} // namespace cles::detail
+
+namespace cles::shell {
+
+class group;
+
+/// The other nodes of the multicast group: hears who they are, and tells them of this one. Without a group there are
+/// none.
+class neighbours final : private core::group_presence,
+                         private core::presence::watcher,
+                         private core::announcer::voice,
+                         private core::first_round::listener {
+  public:
+    neighbours(detail::engine& host, std::uint32_t seed);
+    neighbours(const neighbours&) = delete;
+    neighbours& operator=(const neighbours&) = delete;
+    ~neighbours();
+
+    /// The group is there; what is said to it follows when the executor runs.
+    void start(group& through, std::string interface);
+    /// This node offers something else than before, or elsewhere.
+    void changed();
+    /// Says farewell.
+    void stop();
+
+    /// As `presence::find`.
+    [[nodiscard]] std::optional<std::string_view> find(std::string_view node) const noexcept;
+    /// Asks the node of that name where it is.
+    void ask_for(std::string_view node);
+    /// Whether a name that is not known may be heard any moment.
+    [[nodiscard]] bool expects_more() const noexcept { return !round_.over(); }
+    /// Why a name is not known, as the first part of a sentence; empty without a group.
+    [[nodiscard]] std::string why_unknown() const;
+
+  private:
+    void begin();
+    void announce(std::chrono::milliseconds interval) override;
+    void announce(std::chrono::milliseconds interval, bool leaving);
+    [[nodiscard]] std::size_t others() const override;
+    void on_round_over() override;
+    void on_solicitation(bool by_name, time_point now) override;
+    void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) override;
+    void on_peer(std::string_view node, core::presence::change what, std::string_view where) override;
+    [[nodiscard]] std::vector<std::string> endpoints_to_tell() const;
+
+    detail::engine& engine_;
+    core::announcer announcer_;
+    core::first_round round_;
+    group* group_ = nullptr;
+    std::string interface_;
+    std::uint64_t seq_ = 0;
+};
+
+} // namespace cles::shell

@@ -1,0 +1,99 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Nodes on two hosts find each other by name, over a cable that is nobody else's."""
+
+import json
+import re
+import subprocess
+import unittest
+
+from support import CLES, PATIENCE, environment, read_line, wait_until
+from two_hosts import Hosts
+
+
+class TwoHosts(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.hosts = Hosts()
+        cls.addClassCleanup(cls.hosts.close)
+
+    def start(self, host, *arguments):
+        process = subprocess.Popen([*self.hosts.inside(host), CLES, *arguments], stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                   env=environment(CLES_MULTICAST="v0" if host == self.hosts.near else "v1"))
+        self.addCleanup(process.stderr.close)
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        return process
+
+    def serve(self, host, name, *listen):
+        process = self.start(host, "serve", "--name", name, "--insecure", *[f"--listen={url}" for url in listen])
+        said = [read_line(process) for _ in listen]
+        return process, [re.search(r":(\d+)$", line).group(1) for line in said if "tcp" in line]
+
+    def run_at(self, host, *arguments):
+        process = self.start(host, *arguments)
+        out, err = process.communicate(timeout=PATIENCE)
+        return process.returncode, out, err
+
+    def peers_of(self, host):
+        code, out, err = self.run_at(host, "ls", "-o", "json")
+        self.assertEqual(code, 0, err)
+        return json.loads(out)["peers"]
+
+    def states_known_to(self, node):
+        code, out, err = self.run_at(self.hosts.near, "pull", f"{node}:cles/peers", "-o", "json")
+        self.assertEqual(code, 0, err)
+        return {p["node"]: p["state"] for p in json.loads(out)["peers"]}
+
+    def test_a_name_reaches_the_other_host(self):
+        _, (port,) = self.serve(self.hosts.near, "car1", "tcp://0.0.0.0:0")
+        code, out, err = self.run_at(self.hosts.far, "pull", "car1:localization", "-o", "json")
+        self.assertEqual((code, err), (0, ""))
+        self.assertIn("velocity", json.loads(out))
+        self.assertEqual([(p["node"], p["endpoints"]) for p in self.peers_of(self.hosts.far)],
+                         [("car1", [f"tcp://10.77.0.1:{port}"])])
+        code, out, err = self.run_at(self.hosts.far, "bind", "car1:localization", "-n", "3", "-o", "raw")
+        self.assertEqual((code, len(out.splitlines()), err), (0, 3, ""))
+
+    def test_what_others_cannot_reach_is_not_announced(self):
+        _, ports = self.serve(self.hosts.near, "car2", "tcp://127.0.0.1:0", "tcp://10.77.0.1:0", "unix://@car2")
+        self.assertEqual([p["endpoints"] for p in self.peers_of(self.hosts.far)], [[f"tcp://10.77.0.1:{ports[1]}"]])
+
+    def test_one_that_nobody_can_reach_is_there_all_the_same(self):
+        self.serve(self.hosts.near, "car3", "tcp://127.0.0.1:0")
+        self.assertEqual([(p["node"], p["endpoints"]) for p in self.peers_of(self.hosts.far)], [("car3", [])])
+        code, out, err = self.run_at(self.hosts.far, "pull", "car3:echo")
+        self.assertEqual((code, out), (3, ""))
+        self.assertIn("it is there, but at no address that can be used from here", err)
+
+    def test_one_that_dies_is_suspect_and_another_run_of_it_found_again(self):
+        self.serve(self.hosts.near, "watcher", "tcp://0.0.0.0:0")
+        first, _ = self.serve(self.hosts.far, "car4", "tcp://0.0.0.0:0")
+        wait_until(lambda: self.states_known_to("watcher") == {"car4": "live"}, "car4 is heard")
+        first.kill()
+        wait_until(lambda: self.states_known_to("watcher") == {"car4": "suspect"}, "car4 is suspect")
+        _, (port,) = self.serve(self.hosts.far, "car4", "tcp://0.0.0.0:0")
+        wait_until(lambda: self.states_known_to("watcher") == {"car4": "live"}, "car4 is heard again")
+        code, out, err = self.run_at(self.hosts.near, "pull", "car4:cles", "-o", "json")
+        self.assertEqual((code, err), (0, ""))
+        self.assertEqual(json.loads(out)["endpoints"], [f"tcp://0.0.0.0:{port}"])
+
+    def test_two_of_one_name_on_two_hosts_are_reported(self):
+        near, _ = self.serve(self.hosts.near, "car5", "tcp://0.0.0.0:0")
+        far, _ = self.serve(self.hosts.far, "car5", "tcp://0.0.0.0:0")
+        for process, other in ((near, "10.77.0.2"), (far, "10.77.0.1")):
+            while line := read_line(process, process.stderr):
+                if f"another node calls itself 'car5' too, on {other}" in line:
+                    break
+            self.assertTrue(line, "it was not said")
+
+    def test_beyond_loopback_it_has_to_be_asked_for(self):
+        code, _, err = self.run_at(self.hosts.near, "serve", "--listen", "tcp://127.0.0.1:0")
+        self.assertEqual(code, 2)
+        self.assertIn("insecure", err)
+
+
+if __name__ == "__main__":
+    unittest.main()

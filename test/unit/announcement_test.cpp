@@ -1,0 +1,171 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/announcement.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/message.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <string>
+#include <string_view>
+
+namespace {
+
+using namespace std::chrono_literals;
+using statement = cles::core::announcement;
+
+struct reading {
+    bool good = false;
+    statement said;
+    std::string why;
+};
+
+reading read(std::string_view line) {
+    cles::protocol::request_line update;
+    cles::protocol::malformed_request wrong;
+    BOOST_REQUIRE_MESSAGE(cles::protocol::parse_request(line, update, wrong), wrong.why);
+    reading r;
+    r.good = read_announcement(update, r.said, r.why);
+    return r;
+}
+
+reading read_body(std::string_view body) { return read("UPDATE car1:cles seq=1 epoch=5f3a09c1 " + std::string{body}); }
+
+std::string written(const statement& said, std::uint64_t seq = 17) {
+    std::string out;
+    append_announcement(out, said, seq, "5f3a09c1");
+    return out;
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(announcement)
+
+BOOST_AUTO_TEST_CASE(it_is_written_as_the_protocol_says) {
+    const statement said{.node = "car1",
+                         .endpoints = {"tcp://0.0.0.0:25370", "udp://10.0.0.7:25370"},
+                         .load = {.queued = 3, .running = 2, .workers = 4},
+                         .interval = 1500ms,
+                         .tasks = "cbf29ce484222325"};
+    BOOST_TEST(written(said) ==
+               "UPDATE car1:cles seq=17 epoch=5f3a09c1 {\"node\":\"car1\",\"endpoints\":[\"tcp://0.0.0.0:25370\","
+               "\"udp://10.0.0.7:25370\"],\"load\":{\"queued\":3,\"running\":2,\"workers\":4},\"interval_ms\":1500,"
+               "\"tasks\":\"cbf29ce484222325\"}\n");
+}
+
+BOOST_AUTO_TEST_CASE(a_leave_says_so) {
+    const statement said{.node = "car1", .leaving = true};
+    BOOST_TEST(written(said).ends_with(",\"tasks\":\"\",\"leaving\":true}\n"));
+}
+
+BOOST_AUTO_TEST_CASE(what_is_written_is_what_is_read) {
+    statement said{.node = "car1",
+                   .endpoints = {"tcp://0.0.0.0:25370", "unix:///run/car1.sock"},
+                   .load = {.queued = 3, .running = 2, .workers = 4},
+                   .interval = 1500ms,
+                   .tasks = "cbf29ce484222325",
+                   .leaving = true};
+    auto line = written(said);
+    line.pop_back();
+    const auto r = read(line);
+    BOOST_TEST(r.good);
+    BOOST_TEST(r.said.node == "car1");
+    BOOST_TEST(r.said.endpoints == said.endpoints, boost::test_tools::per_element());
+    BOOST_TEST((r.said.load == said.load));
+    BOOST_TEST((r.said.interval == 1500ms));
+    BOOST_TEST(r.said.tasks == "cbf29ce484222325");
+    BOOST_TEST(r.said.leaving);
+}
+
+BOOST_AUTO_TEST_CASE(it_fits_a_datagram_whatever_it_has_to_say) {
+    statement said{.node = std::string(64, 'n'), .tasks = std::string(16, 'f')};
+    for (int i = 0; i < 40; ++i) {
+        said.endpoints.push_back("unix:///" + std::string(90, 'a') + std::to_string(i));
+    }
+    auto line = written(said, 9'223'372'036'854'775'807U);
+    BOOST_TEST(line.size() <= cles::protocol::datagram_bytes);
+    BOOST_TEST(line.size() > cles::protocol::datagram_bytes - 120);
+    line.pop_back();
+    const auto r = read(line);
+    BOOST_TEST(r.good);
+    BOOST_REQUIRE(!r.said.endpoints.empty());
+    BOOST_TEST(r.said.endpoints.front() == said.endpoints.front()); // the last are left out
+}
+
+BOOST_AUTO_TEST_CASE(what_is_not_known_is_passed_over) {
+    const auto r = read_body(R"({"colour":"red","load":{"queued":1,"mood":[{}]},"node":"car1","gossip":{"a":[1]}})");
+    BOOST_TEST(r.good);
+    BOOST_TEST(r.said.load.queued == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_missing_has_a_default) {
+    const auto r = read_body("{}");
+    BOOST_TEST(r.good);
+    BOOST_TEST(r.said.node == "car1");
+    BOOST_TEST(r.said.endpoints.empty());
+    BOOST_TEST((r.said.interval == 1s));
+    BOOST_TEST((r.said.load == cles::node_load{}));
+    BOOST_TEST(!r.said.leaving);
+}
+
+BOOST_AUTO_TEST_CASE(a_value_of_another_type_is_named) {
+    const std::pair<const char*, const char*> wrong[] = {
+        {R"({"node":1})", "node"},
+        {R"({"endpoints":"tcp://10.0.0.1:1"})", "endpoints"},
+        {R"({"endpoints":[1]})", "endpoints"},
+        {R"({"load":[]})", "load"},
+        {R"({"load":{"queued":-1}})", "load"},
+        {R"({"load":{"running":1.5}})", "load"},
+        {R"({"interval_ms":"1000"})", "interval_ms"},
+        {R"({"interval_ms":-1})", "interval_ms"},
+        {R"({"tasks":7})", "tasks"},
+        {R"({"leaving":"yes"})", "leaving"},
+        {R"([])", "object"},
+        {R"({"node":"car1"} {})", ""},
+        {R"({"node":"car1")", ""},
+        {R"({"x":[[[[[[[[1]]]]]]]]})", "deep"},
+    };
+    for (const auto& [body, says] : wrong) {
+        const auto r = read_body(body);
+        BOOST_TEST(!r.good, body);
+        BOOST_TEST(r.why.find(says) != std::string::npos, r.why);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(it_speaks_for_nobody_else) {
+    BOOST_TEST(!read_body(R"({"node":"car2"})").good);
+    for (const auto* noun : {"self:cles", "any:cles", "all:cles", "car1:cles/x", "car1:speed"}) {
+        BOOST_TEST(!read("UPDATE " + std::string{noun} + " seq=1 epoch=5f3a09c1 {}").good, noun);
+    }
+    BOOST_TEST(!read("UPDATE car1:cles {}").good); // a request, and no update
+    BOOST_TEST(!read("PUSH car1:cles {}").good);
+}
+
+BOOST_AUTO_TEST_CASE(endpoints_are_bounded_in_number_and_length) {
+    std::string body = R"({"endpoints":[")" + std::string(129, 'x') + R"(","")";
+    for (int i = 0; i < 100; ++i) {
+        body += ",\"tcp://10.0.0." + std::to_string(i) + ":1\"";
+    }
+    const auto r = read_body(body + "]}");
+    BOOST_TEST(r.good);
+    BOOST_TEST(r.said.endpoints.size() == 16U);
+    BOOST_TEST(r.said.endpoints.front() == "tcp://10.0.0.0:1");
+}
+
+BOOST_AUTO_TEST_CASE(interval_load_and_digest_are_bounded) {
+    BOOST_TEST((read_body(R"({"interval_ms":0})").said.interval == 250ms));
+    BOOST_TEST((read_body(R"({"interval_ms":18446744073709551615})").said.interval == 60s));
+    BOOST_TEST(read_body(R"({"load":{"queued":18446744073709551615}})").said.load.queued == 4'294'967'295U);
+    BOOST_TEST(read_body(R"({"tasks":")" + std::string(64, 'f') + "\"}").good);
+    BOOST_TEST(!read_body(R"({"tasks":")" + std::string(65, 'f') + "\"}").good);
+}
+
+BOOST_AUTO_TEST_CASE(the_digest_tells_lists_of_tasks_apart_and_is_always_the_same) {
+    using cles::core::digest_of_tasks;
+    BOOST_TEST(digest_of_tasks("") == "cbf29ce484222325");
+    BOOST_TEST(digest_of_tasks("a") == "af63dc4c8601ec8c"); // as FNV's authors have it
+    BOOST_TEST(digest_of_tasks("foobar") == "85944171f73967e8");
+    BOOST_TEST(digest_of_tasks("[]") != digest_of_tasks("[{}]"));
+}
+
+BOOST_AUTO_TEST_SUITE_END()
