@@ -329,6 +329,24 @@ BOOST_AUTO_TEST_CASE(a_lost_publisher_is_reported_when_the_lease_is_over_and_bou
     BOOST_TEST(feed.items.back().value.text == "{\"value\":3}");
 }
 
+BOOST_AUTO_TEST_CASE(a_lost_publisher_is_bound_again_though_its_last_value_is_too_large_for_the_answer) {
+    nodes n{carrier::udp4, {.lease = 300ms}};
+    impaired_path path{n.io, n.url(), {}, 1};
+    n.tower->set_peer("car1", path.url());
+    feed_log feed;
+    feed.bind(*n.tower, "car1:place");
+    run_until(n.io, [&] { return feed.bound; });
+    path.set({.loss = 1});
+    run_until(n.io, [&] { return feed.count(feed_event::lost) == 1; });
+    n.car->update("place", std::string(1300, 'x'));
+    path.set({});
+    run_until(n.io, [&] { return feed.count(feed_event::rebound) == 1; });
+    n.car->update("place", 3);
+    run_until(n.io, [&] { return feed.count(feed_event::update) == 1; });
+    BOOST_TEST(feed.items.back().value.text == "{\"value\":3}");
+    BOOST_TEST(feed.count(feed_event::current) == 0U);
+}
+
 BOOST_AUTO_TEST_CASE(a_publisher_that_was_restarted_is_bound_again_by_the_renewal) {
     nodes n{carrier::udp4, {.lease = 200ms}};
     feed_log feed;

@@ -363,6 +363,21 @@ BOOST_AUTO_TEST_CASE(a_last_value_too_large_for_the_renewals_answer_is_no_loss) 
     BOOST_TEST(host.renewals == 2);
 }
 
+BOOST_AUTO_TEST_CASE(a_last_value_too_large_for_the_answer_is_no_refusal_of_a_bind_again) {
+    begin();
+    BOOST_TEST(!feed.is_bound_without_value(errc::too_large)); // the caller is told to use TCP
+    feed.on_bound("{}");
+    lose();
+    BOOST_TEST(next() == "lost the link was lost");
+    pass(1s);
+    BOOST_TEST(host.binds == 2);
+    BOOST_TEST(!feed.is_bound_without_value(errc::busy));
+    BOOST_REQUIRE(feed.is_bound_without_value(errc::too_large));
+    feed.on_bound("{}");
+    BOOST_TEST(next() == "rebound");
+    BOOST_TEST(!feed.is_bound_without_value(errc::too_large)); // it no longer asks
+}
+
 BOOST_AUTO_TEST_CASE(an_answer_to_a_renewal_of_an_earlier_binding_says_nothing) {
     bound();
     const auto asked = clock.now();

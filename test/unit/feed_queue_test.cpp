@@ -97,6 +97,19 @@ BOOST_AUTO_TEST_CASE(gaps_that_were_queued_are_added_up_when_what_followed_them_
     BOOST_TEST(pop_all(queue) == "gap 12, car1 13 {}, car1 14 {}"); // 1, 2 to 11, 12
 }
 
+BOOST_AUTO_TEST_CASE(a_value_as_it_stood_at_the_bind_is_shed_without_a_gap) {
+    cles::core::feed_queue queue{2, 1000};
+    queue.push({.kind = feed_event::current});
+    push_update(queue, 8);
+    push_update(queue, 9);
+    BOOST_TEST(pop_all(queue) == "car1 8 {}, car1 9 {}"); // no update has been missed
+    queue.push({.kind = feed_event::current});
+    push_update(queue, 10);
+    push_update(queue, 11);
+    push_update(queue, 12);
+    BOOST_TEST(pop_all(queue) == "gap 1, car1 11 {}, car1 12 {}");
+}
+
 BOOST_AUTO_TEST_CASE(it_stays_bounded_whatever_comes) {
     cles::core::feed_queue queue{8, 1000};
     std::uint64_t seq = 0;

@@ -61,6 +61,16 @@ BOOST_AUTO_TEST_CASE(the_4097th_request_in_flight_on_a_link_is_busy) {
     BOOST_TEST(link.kind("PULL car1:speed") == "ok");
 }
 
+BOOST_AUTO_TEST_CASE(an_unbind_is_served_however_much_is_in_flight) {
+    fixture small{cles::limits{.in_flight = 1}};
+    BOOST_TEST(small.link.kind("BIND car1:pose id=1") == "id=1 ok");
+    small.link.ask("DELEGATE car1:work id=2");
+    BOOST_TEST(small.link.kind("BIND car1:pose/left id=3") == "id=3 busy");
+    BOOST_TEST(small.link.kind("BIND car1:pose id=4 lease=0") ==
+               "id=4 ok"); // a feed closes once, and does not ask again
+    BOOST_TEST(small.link.session().serving().bindings() == 0U);
+}
+
 BOOST_AUTO_TEST_CASE(requests_that_wait_for_their_turn_count_as_in_flight_and_are_refused_in_their_order) {
     fixture small{cles::limits{.in_flight = 3}};
     auto& to = small.link;

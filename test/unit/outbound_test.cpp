@@ -55,6 +55,27 @@ BOOST_AUTO_TEST_CASE(a_request_goes_out_with_its_id_and_is_answered_by_it) {
     BOOST_TEST(dropped() == 0U);
 }
 
+BOOST_AUTO_TEST_CASE(a_request_over_the_limit_on_a_line_is_not_sent) {
+    const std::string head = "PUSH car2:speed id=1 ";
+    const std::string body(node.host->bounds.line - head.size(), '1');
+    const auto push = [&](std::uint64_t id, std::string_view with) {
+        auto [operation, result] = cles::test::record();
+        const auto now = node.clock.now();
+        link.session().asking().send({.verb = verb::push, .noun = "car2:speed", .id = id, .body = with}, now + 5s, now,
+                                     std::move(operation));
+        return result;
+    };
+    const auto just_fits = push(1, body);
+    BOOST_TEST(link.take().size() == node.host->bounds.line + 1);
+    const auto too_long = push(2, body + "1");
+    BOOST_TEST(!too_long->ended); // not while it begins
+    node.pass(0ms);
+    BOOST_TEST((too_long->code == errc::too_large));
+    BOOST_TEST(link.take().empty()); // else the peer would end the link, and withdraw the other one
+    link.ask("id=1 {}");
+    BOOST_TEST(just_fits->text == "{}");
+}
+
 BOOST_AUTO_TEST_CASE(a_deadline_other_than_the_default_is_told_to_the_peer) {
     send(1, verb::pull, 1500ms);
     send(2, verb::delegate, 5s);

@@ -58,6 +58,11 @@ class feed_machine final : public subscription, private deadline, private renewa
     void on_renewed(time_point asked);
     void on_renewal_refused(time_point asked, boost::system::error_code why, std::string_view message, time_point now);
     void on_refused(boost::system::error_code why, std::string_view message, time_point now);
+    /// Whether an error that answers its BIND is no refusal: the publisher has bound it again, only its last value does
+    /// not fit the answer. `on_bound` is then to be called, without that value.
+    [[nodiscard]] bool is_bound_without_value(boost::system::error_code why) const noexcept {
+        return state_ == state::binding && was_bound_ && why == errc::too_large;
+    }
     void on_lost(std::string_view why, time_point now);
 
     /// Where its events are fetched.

@@ -14,7 +14,8 @@ void feed_queue::forget(const entry& e) noexcept {
     }
 }
 
-// A gap that stands before the value goes with it: one gap tells of both.
+// A gap that stands before the value goes with it: one gap tells of both. A value as it stood at the BIND is no update,
+// and none is missed with it: what the publisher has sent since stands behind it.
 void feed_queue::shed_oldest_value() {
     for (auto e = entries_.begin(); e != entries_.end();) {
         if (is_news(*e)) {
@@ -22,7 +23,7 @@ void feed_queue::shed_oldest_value() {
             continue;
         }
         const bool found = is_value(*e);
-        shed_ += found ? 1 : e->missed;
+        shed_ += e->kind == feed_event::update ? 1 : e->missed;
         forget(*e);
         e = entries_.erase(e);
         if (found) {

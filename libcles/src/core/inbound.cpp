@@ -88,7 +88,9 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
         }
         return;
     }
-    if (in_flight() >= node_->bounds.in_flight) {
+    // An unbind takes no room and makes some: refused, it would leave a binding that nobody wants.
+    const bool unbinds = r.verb == verb::bind && r.unbinds();
+    if (in_flight() >= node_->bounds.in_flight && !unbinds) {
         replies_.fail(r, busy(node_->name + ": too many requests are in flight on this link"));
         return;
     }

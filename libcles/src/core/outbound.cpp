@@ -30,8 +30,14 @@ void outbound::send(protocol::request_text request, time_point deadline, time_po
     protocol::append_request(out, request);
     e->operation = std::move(operation);
     e->progress = std::move(progress);
-    if (is_datagram()) {
-        keep_copies(*e, line, deadline, now);
+    if (out.size() - line > longest()) {
+        e->too_large = true;
+        out.resize(line);
+        node_.deadlines.arm(*e, now); // fails when the caller has gone on: no operation ends while it begins
+    } else if (is_datagram()) {
+        e->copies.emplace(out.substr(line), now, deadline,
+                          static_cast<std::uint32_t>((e->id + first_id_) * 2654435761U));
+        node_.deadlines.arm(*e, e->copies->next());
     } else {
         node_.deadlines.arm(*e, deadline);
     }
@@ -40,23 +46,14 @@ void outbound::send(protocol::request_text request, time_point deadline, time_po
     out_.wake();
 }
 
-// A request that is too large fails when the caller has gone on: no operation ends while it begins.
-void outbound::keep_copies(entry& e, std::size_t line, time_point deadline, time_point now) {
-    auto& out = out_.output();
-    if (out.size() - line > out_.datagram()) {
-        e.too_large = true;
-        out.resize(line);
-        node_.deadlines.arm(e, now);
-        return;
-    }
-    e.copies.emplace(out.substr(line), now, deadline, static_cast<std::uint32_t>((e.id + first_id_) * 2654435761U));
-    node_.deadlines.arm(e, e.copies->next());
-}
+// On a stream too: the peer would end the link over it, and withdraw what others ask for there.
+std::size_t outbound::longest() const noexcept { return is_datagram() ? out_.datagram() : node_.bounds.line + 1; }
 
 void outbound::on_due(entry& e, time_point now) {
     if (e.too_large) {
         fail(e.id, errc::too_large,
-             "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP");
+             is_datagram() ? "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP"
+                           : "a request has at most " + std::to_string(node_.bounds.line) + " bytes");
     } else if (e.copies && !e.copies->over(now)) {
         out_.output().append(e.copies->again(now));
         ++node_.counts.requests_resent;

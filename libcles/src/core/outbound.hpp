@@ -66,7 +66,8 @@ class outbound {
     };
 
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
-    void keep_copies(entry& e, std::size_t line, time_point deadline, time_point now);
+    /// What a request may have, with its LF.
+    [[nodiscard]] std::size_t longest() const noexcept;
     void on_due(entry& e, time_point now);
     void go_on(std::unique_ptr<entry> e, time_point due);
     std::unique_ptr<entry> take(std::uint64_t id);

@@ -30,10 +30,7 @@ class bind_reply final : public detail::pending {
         const auto host = host_.lock();
         const auto alive = handle_.lock();
         if (host && alive) {
-            feed_.on_bound(json);
-            if (asked_) {
-                feed_.on_leased(*asked_, host->bounds().lease);
-            }
+            bound(*host, json);
         }
         return verdict::completed;
     }
@@ -42,8 +39,13 @@ class bind_reply final : public detail::pending {
         const std::unique_ptr<bind_reply> self{this};
         const auto host = host_.lock();
         const auto alive = handle_.lock();
-        if (host && alive && !feed_.closed()) {
-            const std::string text{message};
+        if (!host || !alive || feed_.closed()) {
+            return;
+        }
+        const std::string text{message};
+        if (feed_.is_bound_without_value(code)) {
+            bound(*host, "{}");
+        } else {
             if (code == errc::deadline) { // the publisher may still answer, and would send updates for ever
                 host->feeds().unbind(feed_);
             } else {
@@ -55,6 +57,13 @@ class bind_reply final : public detail::pending {
     void discard() noexcept override { delete this; }
 
   private:
+    void bound(const detail::engine& host, std::string_view last) {
+        feed_.on_bound(last);
+        if (asked_) {
+            feed_.on_leased(*asked_, host.bounds().lease);
+        }
+    }
+
     std::weak_ptr<detail::engine> host_;
     std::weak_ptr<detail::feed_control> handle_;
     core::feed_machine& feed_;

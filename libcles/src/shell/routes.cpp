@@ -15,8 +15,8 @@ constexpr std::size_t routes_before_tidying = 64;
 
 // Among the routes, in the place of a URL: what waits for a node of which nobody has heard yet.
 constexpr std::string_view unheard = "unheard:";
-// Behind a URL, which has no spaces: the links for what is urgent.
-constexpr std::string_view apart = " urgent";
+// Behind a URL, in which no zero stands: the links for what is urgent.
+constexpr std::string_view apart{"\0urgent", 7};
 
 } // namespace
 

@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "simulation/agenda.hpp"
+#include "simulation/dice.hpp"
+#include "simulation/place.hpp"
+#include "simulation/planted.hpp"
+#include "simulation/witness.hpp"
+
+#include <chrono>
+#include <compare>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace cles::simulation {
+
+class stream_half;
+class datagram_port;
+
+/// An address and port.
+struct endpoint {
+    unsigned host = 0;
+    unsigned port = 0;
+
+    auto operator<=>(const endpoint&) const = default;
+};
+std::string to_string(const endpoint& where);
+
+inline constexpr unsigned stream_door = 1;   ///< where nodes listen
+inline constexpr unsigned datagram_door = 2; ///< likewise
+
+/// What the network does to what crosses it. Of a thousand datagrams so many.
+struct weather {
+    unsigned lost = 0;
+    unsigned doubled = 0;
+    unsigned late = 0; ///< much later than others, and so overtaken
+    std::chrono::microseconds least{100};
+    std::chrono::microseconds spread{200};
+};
+
+/// The network between the hosts: carries streams and datagrams, each in its own way, and is cut and mended.
+class network {
+  public:
+    network(agenda& time, witness& watcher, std::uint64_t seed, planted fault)
+        : time_(time), watcher_(watcher), seed_(seed), fault_(fault) {}
+    network(const network&) = delete;
+    network& operator=(const network&) = delete;
+
+    void set(const weather& now) noexcept { weather_ = now; }
+    /// Two hosts do not reach each other: datagrams are lost, streams wait.
+    void part(unsigned a, unsigned b, time_point until);
+    /// Nothing is in the way any more.
+    void calm();
+    [[nodiscard]] bool reaches(unsigned a, unsigned b) const;
+    /// When bytes of a stream that leave now are there, if nothing went before them.
+    time_point arrival(unsigned from, unsigned to);
+    /// Each direction has a chance of its own, so that less of what happens is changed by what else happens.
+    [[nodiscard]] dice& chance_between(unsigned from, unsigned to);
+    [[nodiscard]] planted fault() const noexcept { return fault_; }
+    [[nodiscard]] witness& watcher() noexcept { return watcher_; }
+    [[nodiscard]] agenda& time() noexcept { return time_; }
+    /// A port of the host that nobody has.
+    unsigned free_port(unsigned host);
+
+    using on_link = std::function<void(link_ptr)>;
+    using on_dialled = std::function<void(boost::system::error_code, std::shared_ptr<stream_half>)>;
+    void listen(endpoint where, const std::shared_ptr<place>& at, const limits& bounds, on_link arrived);
+    /// `done` is called at the place that dials, later.
+    void dial(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, on_dialled done);
+    /// Resets one of the streams of a host, if it has one.
+    void cut(unsigned host, unsigned which);
+
+    void open(const endpoint& where, const std::shared_ptr<datagram_port>& port) { ports_[where] = port; }
+    void send(const endpoint& from, const endpoint& to, std::string_view datagram);
+    /// Nobody listens at the host any more.
+    void close_doors(unsigned host);
+
+    /// What has crossed, for those who want to know how much was simulated.
+    [[nodiscard]] std::uint64_t datagrams() const noexcept { return datagrams_; }
+    std::uint64_t stream_bytes = 0;
+
+  private:
+    struct door {
+        std::weak_ptr<place> at;
+        limits bounds;
+        on_link arrived;
+    };
+
+    void deliver(const endpoint& from, const endpoint& to, const std::string& datagram,
+                 std::chrono::microseconds after);
+    void join(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, const on_dialled& done);
+
+    agenda& time_;
+    witness& watcher_;
+    std::uint64_t seed_;
+    std::map<std::pair<unsigned, unsigned>, dice> chances_;
+    planted fault_;
+    weather weather_;
+    std::map<std::pair<unsigned, unsigned>, time_point> parted_;
+    std::map<endpoint, door> doors_;
+    std::map<endpoint, std::weak_ptr<datagram_port>> ports_;
+    std::vector<std::pair<std::weak_ptr<stream_half>, std::pair<unsigned, unsigned>>> streams_;
+    std::uint64_t datagrams_ = 0;
+};
+
+} // namespace cles::simulation

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSL-1.0
+// That the simulation sees what it is there to see: a fault is planted in the harness for each rule, and has to be
+// found in few seeds, as a breach of that rule and of no other.
+#include "simulation/planted.hpp"
+#include "simulation/seeds.hpp"
+#include "simulation/simulate.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+
+namespace sim = cles::simulation;
+
+namespace {
+
+/// The first seed at which this fault breaks that rule alone; 0 where none does.
+std::uint64_t found_by(sim::planted fault, sim::rule broken) {
+    for (std::uint64_t seed = 1; seed <= sim::seeds_for_planted; ++seed) {
+        const auto p = sim::make_plan(seed, sim::steps_of_a_seed);
+        const auto r = broken == sim::rule::same_trace ? sim::simulate_twice(p, fault) : sim::simulate(p, fault);
+        const bool alone = std::all_of(r.violations.begin(), r.violations.end(),
+                                       [broken](const sim::violation& v) { return v.broken == broken; });
+        if (!r.violations.empty() && alone) {
+            return seed;
+        }
+    }
+    return 0;
+}
+
+void finds(sim::planted fault, sim::rule broken) {
+    const auto seed = found_by(fault, broken);
+    BOOST_TEST_REQUIRE(seed != 0U, std::string{to_string(fault)} + " was not found");
+    BOOST_TEST(sim::simulate(sim::make_plan(seed, sim::steps_of_a_seed)).violations.empty());
+    BOOST_TEST_MESSAGE(std::string{to_string(fault)} + " is found by seed " + std::to_string(seed));
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(planted)
+
+BOOST_AUTO_TEST_CASE(a_stream_that_repeats_a_push) { finds(sim::planted::stream_repeats, sim::rule::effects_once); }
+BOOST_AUTO_TEST_CASE(a_copy_from_another_port) { finds(sim::planted::source_swapped, sim::rule::effects_once); }
+BOOST_AUTO_TEST_CASE(a_timer_that_is_late) { finds(sim::planted::timer_late, sim::rule::ends_in_time); }
+BOOST_AUTO_TEST_CASE(replies_in_another_order) { finds(sim::planted::replies_swapped, sim::rule::reply_order); }
+BOOST_AUTO_TEST_CASE(an_update_that_comes_twice) { finds(sim::planted::update_repeated, sim::rule::update_order); }
+BOOST_AUTO_TEST_CASE(a_gap_that_is_not_told) { finds(sim::planted::gap_hidden, sim::rule::gaps_told); }
+BOOST_AUTO_TEST_CASE(replies_that_bear_each_others_ids) {
+    finds(sim::planted::ids_exchanged, sim::rule::replies_match);
+}
+BOOST_AUTO_TEST_CASE(a_datagram_that_is_too_long) { finds(sim::planted::datagram_long, sim::rule::well_formed); }
+BOOST_AUTO_TEST_CASE(a_link_that_is_never_full) { finds(sim::planted::never_full, sim::rule::bounded); }
+BOOST_AUTO_TEST_CASE(a_handler_that_is_kept) { finds(sim::planted::call_kept, sim::rule::at_rest); }
+BOOST_AUTO_TEST_CASE(a_source_that_is_kept) { finds(sim::planted::source_kept, sim::rule::at_rest); }
+BOOST_AUTO_TEST_CASE(a_way_that_stays_closed) { finds(sim::planted::partition_stays, sim::rule::asks_succeed); }
+BOOST_AUTO_TEST_CASE(a_feed_that_is_not_bound_again) {
+    finds(sim::planted::rebind_forgotten, sim::rule::feeds_receive);
+}
+BOOST_AUTO_TEST_CASE(chance_from_elsewhere) { finds(sim::planted::chance_leaks, sim::rule::same_trace); }
+
+BOOST_AUTO_TEST_SUITE_END()

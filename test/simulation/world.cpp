@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/world.hpp"
+
+#include "simulation/asking.hpp"
+#include "simulation/following.hpp"
+#include "simulation/talking.hpp"
+#include "simulation/trouble.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::simulation {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr seconds memory_of_datagrams{75}; // and some more: then what was remembered is forgotten
+constexpr seconds probing{10};
+constexpr seconds quiet{300};
+
+limits small_limits() {
+    limits bounds;
+    bounds.line = 2048;
+    bounds.links = 64;
+    bounds.in_flight = 24;
+    bounds.bindings = 8;
+    bounds.running = 40;
+    bounds.unread = 8192;
+    bounds.waiting = 4096;
+    bounds.binding_bytes = 16384;
+    bounds.remembered = 40'000;
+    bounds.feed = 16;
+    bounds.stall = seconds{5};
+    bounds.lease = seconds{3};
+    bounds.connect = seconds{2};
+    return bounds;
+}
+
+// What must never be: something that outlives a world.
+std::uint64_t leak(planted fault) {
+    static std::uint64_t leaked = 0;
+    return fault == planted::chance_leaks ? ++leaked : 0;
+}
+
+} // namespace
+
+bool report::broke(rule which) const noexcept {
+    return std::any_of(violations.begin(), violations.end(), [which](const auto& v) { return v.broken == which; });
+}
+
+world::world(const plan& what, planted fault, witness::reader reader)
+    : plan_(what), fault_(fault), chance_(what.seed + leak(fault)), net_(time_, watcher_, chance_.next(), fault),
+      nodes_(what.hosts), runs_(what.hosts) {
+    watcher_.read_by(std::move(reader));
+    parts_.push_back(std::make_unique<asking>(*this));
+    parts_.push_back(std::make_unique<following>(*this));
+    parts_.push_back(std::make_unique<talking>(*this));
+    parts_.push_back(std::make_unique<trouble>(*this));
+}
+
+world::~world() {
+    time_.clear();
+    for (auto& n : nodes_) {
+        if (n) {
+            for (const auto& p : parts_) {
+                p->on_crash(*n);
+            }
+            n->crash();
+            n.reset();
+        }
+    }
+}
+
+void world::start(unsigned host) {
+    const auto run = ++runs_[host];
+    core::node_setup setup{.name = name_of(host),
+                           .epoch = static_cast<std::uint32_t>(chance_.next()),
+                           .first_datagram_id = (chance_.next() & 0xFFFFFFFFU) << 20U,
+                           .bounds = plan_.small_limits ? small_limits() : limits{}};
+    nodes_[host] = std::make_shared<node_run>(net_, host, run, std::move(setup));
+    auto& n = *nodes_[host];
+    watcher_.saw(n.name(), "starts", n.node()->epoch);
+    for (const auto& p : parts_) {
+        p->on_start(n);
+    }
+    n.start(plan_.strangers);
+}
+
+void world::crash(unsigned host, milliseconds down) {
+    if (node(host) == nullptr) {
+        return;
+    }
+    const auto gone = nodes_[host];
+    for (const auto& p : parts_) {
+        p->on_crash(*gone);
+    }
+    gone->crash();
+    collect(*gone);
+    nodes_[host].reset();
+    time_.at(time_.now() + down, [this, host] {
+        if (node(host) == nullptr) {
+            start(host);
+        }
+    });
+}
+
+void world::collect(node_run& n) {
+    for (const auto count : n.node()->counts.requests) {
+        report_.requests += count;
+    }
+    report_.updates += n.node()->counts.updates_received;
+}
+
+void world::end_trouble() {
+    watcher_.saw("world", "the trouble is over");
+    net_.calm();
+    for (unsigned host = 0; host < hosts(); ++host) {
+        if (node(host) == nullptr) {
+            start(host);
+        }
+        node(host)->thaw();
+    }
+}
+
+report world::live() {
+    for (unsigned host = 0; host < hosts(); ++host) {
+        start(host);
+    }
+    time_.watch([this] {
+        if (const auto& n = nodes_[time_.steps() / 64 % nodes_.size()]) {
+            n->check_bounds();
+        }
+    });
+    const auto begun = time_.now();
+    auto last = begun;
+    for (const auto& a : plan_.actions) {
+        last = std::max(last, begun + milliseconds{a.at_ms});
+        time_.at(begun + milliseconds{a.at_ms}, [this, &a] {
+            for (const auto& p : parts_) {
+                p->perform(a);
+            }
+        });
+    }
+    time_.run_until(last + milliseconds{1});
+    report_.node_seconds = std::chrono::duration<double>(time_.now() - begun).count() * hosts();
+    end_trouble();
+    pass(memory_of_datagrams);
+    for (const auto& p : parts_) {
+        p->probe();
+    }
+    pass(probing);
+    for (const auto& p : parts_) {
+        p->judge_probe();
+    }
+    for (const auto& p : parts_) {
+        p->wind_down();
+    }
+    pass(quiet);
+    for (const auto& p : parts_) {
+        p->judge_rest();
+    }
+    for (const auto& n : nodes_) {
+        n->check_rest();
+        collect(*n);
+    }
+    report_.violations = watcher_.violations();
+    report_.hash = watcher_.hash();
+    report_.steps = time_.steps();
+    report_.datagrams = net_.datagrams();
+    report_.stream_bytes = net_.stream_bytes;
+    return report_;
+}
+
+} // namespace cles::simulation

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "simulation/agenda.hpp"
+#include "simulation/dice.hpp"
+#include "simulation/network.hpp"
+#include "simulation/node_run.hpp"
+#include "simulation/part.hpp"
+#include "simulation/plan.hpp"
+#include "simulation/planted.hpp"
+#include "simulation/witness.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::simulation {
+
+/// What came of a plan.
+struct report {
+    std::vector<violation> violations;
+    std::uint64_t hash = 0; ///< of all that happened
+    std::uint64_t steps = 0;
+    std::uint64_t datagrams = 0;
+    std::uint64_t stream_bytes = 0;
+    std::uint64_t requests = 0; ///< that nodes served
+    std::uint64_t updates = 0;  ///< that feeds got
+    double node_seconds = 0;    ///< simulated while something was planned
+
+    [[nodiscard]] bool broke(rule which) const noexcept;
+};
+
+/// Nodes, what they do to each other, the network between them, and time. Lives through one plan.
+class world {
+  public:
+    explicit world(const plan& what, planted fault = planted::none, witness::reader reader = {});
+    ~world();
+
+    report live();
+
+    // For the parts.
+    [[nodiscard]] agenda& time() noexcept { return time_; }
+    [[nodiscard]] network& net() noexcept { return net_; }
+    [[nodiscard]] witness& watcher() noexcept { return watcher_; }
+    [[nodiscard]] planted fault() const noexcept { return fault_; }
+    [[nodiscard]] unsigned hosts() const noexcept { return plan_.hosts; }
+    [[nodiscard]] static std::string name_of(unsigned host) { return "n" + std::to_string(host); }
+    /// The node that runs there; null while none does.
+    [[nodiscard]] node_run* node(unsigned host) noexcept { return host < nodes_.size() ? nodes_[host].get() : nullptr; }
+    /// How many runs have begun there.
+    [[nodiscard]] unsigned runs(unsigned host) const noexcept { return runs_[host]; }
+    void crash(unsigned host, std::chrono::milliseconds down);
+
+  private:
+    void start(unsigned host);
+    void end_trouble();
+    void pass(std::chrono::milliseconds time) { time_.run_until(time_.now() + time); }
+    void collect(node_run& n);
+
+    const plan& plan_;
+    planted fault_;
+    agenda time_;
+    witness watcher_{time_};
+    dice chance_;
+    network net_;
+    std::vector<std::shared_ptr<node_run>> nodes_;
+    std::vector<unsigned> runs_;
+    std::vector<std::unique_ptr<part>> parts_;
+    report report_;
+};
+
+} // namespace cles::simulation
