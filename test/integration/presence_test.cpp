@@ -260,7 +260,7 @@ BOOST_FIXTURE_TEST_CASE(without_multicast_nobody_is_known, fixture) {
     BOOST_TEST(pulled(alone, "self:cles/peers").text == R"({"peers":[]})");
 }
 
-BOOST_FIXTURE_TEST_CASE(a_new_task_changes_the_digest_and_is_told_before_the_next_interval, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_new_task_changes_the_digest_that_is_announced, fixture) {
     const auto car1 = serving("car1");
     cles::service asker{here, in_group("asker")};
     until([&] { return knows(asker, "car1"); });

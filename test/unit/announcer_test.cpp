@@ -86,7 +86,7 @@ BOOST_AUTO_TEST_CASE(the_interval_has_an_end) {
     BOOST_TEST((interval == 60s));
 }
 
-BOOST_AUTO_TEST_CASE(a_change_or_a_call_by_name_does_not_wait) {
+BOOST_AUTO_TEST_CASE(a_call_by_name_does_not_wait) {
     begin();
     pass(500ms);
     node.hurry(clock.now());
@@ -95,7 +95,7 @@ BOOST_AUTO_TEST_CASE(a_change_or_a_call_by_name_does_not_wait) {
     BOOST_TEST((last_gap() == 500ms));
 }
 
-BOOST_AUTO_TEST_CASE(many_changes_are_told_together_with_a_pause_before) {
+BOOST_AUTO_TEST_CASE(many_calls_are_answered_together_with_a_pause_before) {
     begin();
     pass(10ms);
     for (int i = 0; i < 200; ++i) { // for 200 ms

@@ -13,7 +13,8 @@
 namespace cles::core {
 
 /// When a node announces itself to its group (docs/protocol.md, "Presence"): in intervals, a little sooner each time so
-/// that many do not do it in step; soon where something has changed or somebody asks, but with a pause between any two.
+/// that many do not do it in step; soon where somebody asks, but with a pause between any two. What has changed waits
+/// for the next one, so that what a node hears stays level.
 class announcer final : private deadline {
   public:
     class voice {
@@ -41,7 +42,7 @@ class announcer final : private deadline {
 
     /// Begins; before that nothing else has an effect.
     void start(time_point now);
-    /// What it would say is another thing now, or somebody asks for this node alone: no time is lost.
+    /// Somebody asks for this node alone: no time is lost.
     void hurry(time_point now);
     /// Somebody wants to know who is there.
     void solicited(time_point now);

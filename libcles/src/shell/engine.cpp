@@ -91,7 +91,6 @@ void engine::join_group() {
 std::string engine::listen(std::string_view where) {
     auto local = listeners_.listen(where, insecure_);
     node_->endpoints.push_back(local);
-    neighbours_->changed();
     say(log_level::debug, node_->name + " listens on " + local);
     return local;
 }
@@ -222,14 +221,6 @@ void engine::add(registration task) {
         };
     }
     node_->tasks.add(task.verb, task.task, std::move(entry));
-    neighbours_->changed();
-}
-
-void engine::open_noun(std::string_view noun) {
-    check_path(noun);
-    if (!node_->published.knows(noun.substr(0, noun.find('/')))) {
-        neighbours_->changed();
-    }
 }
 
 void engine::check_path(std::string_view noun) const {
@@ -253,7 +244,7 @@ void engine::publish(std::string_view noun, const std::function<void(json_writer
         return;
     }
     if (node_->published.find(noun) == nullptr) {
-        open_noun(noun);
+        check_path(noun);
     }
     node_->published.publish(noun, write);
 }
@@ -265,7 +256,7 @@ void engine::publish_when_room(std::string_view noun, std::string_view json, pen
     }
     try {
         if (node_->published.find(noun) == nullptr) {
-            open_noun(noun);
+            check_path(noun);
         }
         if (node_->published.publish_when_room(noun, json, operation)) {
             asio::post(executor_, [operation = std::move(operation)]() mutable { operation.release()->offer("{}"); });

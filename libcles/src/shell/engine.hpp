@@ -82,7 +82,6 @@ class engine final : public std::enable_shared_from_this<engine> {
     void join_group();
     void ask_for_turn();
     void turn();
-    void open_noun(std::string_view noun);
     void check_path(std::string_view noun) const;
 
     boost::asio::any_io_executor executor_;

@@ -43,13 +43,6 @@ void neighbours::ask_for(std::string_view node) {
     }
 }
 
-void neighbours::changed() {
-    if (group_ != nullptr) {
-        announcer_.hurry(engine_.now());
-        engine_.settle();
-    }
-}
-
 void neighbours::stop() {
     engine_.node().others.watch(nullptr);
     announcer_.stop();

@@ -36,8 +36,6 @@ class neighbours final : private core::group_presence,
 
     /// The group is there; what is said to it follows when the executor runs.
     void start(group& through, std::string interface);
-    /// This node offers something else than before, or elsewhere.
-    void changed();
     /// Says farewell.
     void stop();
 
