@@ -22,24 +22,28 @@ published_mark mark_of(std::string_view json) {
     return {.number = number_after(json, "{\"n\":"), .run = static_cast<unsigned>(number_after(json, "\"run\":"))};
 }
 
-/// The end of the first BIND.
+/// The end of the first BIND. The follower's machine holds it, and so it does not hold the follower.
 class follower::first_answer final : public detail::pending {
   public:
-    explicit first_answer(std::shared_ptr<follower> owner) : owner_(std::move(owner)) {}
+    explicit first_answer(std::weak_ptr<follower> owner) : owner_(std::move(owner)) {}
     verdict offer(std::string_view) override {
         const std::unique_ptr<first_answer> self{this};
-        owner_->bound_ = true;
-        owner_->node_.later({}, [owner = owner_] { owner->fetch(); });
+        if (const auto owner = owner_.lock()) {
+            owner->bound_ = true;
+            owner->node_.later({}, [owner] { owner->fetch(); });
+        }
         return verdict::completed;
     }
     void fail(boost::system::error_code, std::string_view why) override {
         const std::unique_ptr<first_answer> self{this};
-        owner_->node_.watcher().saw(owner_->name(), "was refused", why);
+        if (const auto owner = owner_.lock()) {
+            owner->node_.watcher().saw(owner->name(), "was refused", why);
+        }
     }
     void discard() noexcept override { delete this; }
 
   private:
-    std::shared_ptr<follower> owner_;
+    std::weak_ptr<follower> owner_;
 };
 
 /// One wait for an event.
@@ -73,7 +77,7 @@ std::string follower::name() const { return node_.name() + " feed " + std::to_st
 
 void follower::start() {
     node_.feeds().enter(machine_, weak_from_this(), terms_);
-    machine_.start(detail::pending_ptr{new first_answer{shared_from_this()}});
+    machine_.start(detail::pending_ptr{new first_answer{weak_from_this()}});
 }
 
 void follower::hold(std::chrono::milliseconds time) {

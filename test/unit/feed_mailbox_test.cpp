@@ -28,8 +28,8 @@ struct wait final : cles::detail::pending_event {
 };
 
 struct fixture {
+    wait w; // goes last: who waits is discarded
     cles::core::feed_mailbox mail{cles::limits{}};
-    wait w;
 };
 
 } // namespace
