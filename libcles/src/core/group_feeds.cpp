@@ -117,6 +117,7 @@ bool group_feeds::take(const protocol::request_line& update) {
     bool taken = false;
     {
         const holding on{handing_out_};
+        // NOLINTNEXTLINE(modernize-loop-convert): what is added meanwhile may move the others
         for (std::size_t i = 0, end = feeds.size(); i < end; ++i) {
             if (auto* feed = feeds[i]; feed != nullptr && feed->wants(update.noun.target)) {
                 taken = feed->take(update) || taken;

@@ -15,6 +15,7 @@ struct group_source {
     std::uint32_t address = 0; ///< 127.0.0.1 is 0x7f000001
     std::uint16_t port = 0;
 
+    // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the zero that comes of it for a pointer
     auto operator<=>(const group_source&) const = default;
     [[nodiscard]] bool is_loopback() const noexcept { return address >> 24U == 127; }
 };
