@@ -31,11 +31,27 @@ class datagram_batch {
     /// \pre not empty
     datagram take() noexcept;
 
+    /// Fetches and hands over to `each` what is there, for one turn; what `each` throws passes through. Ends where the
+    /// socket is closed meanwhile.
+    template <class F>
+    void hand_over(boost::asio::ip::udp::socket& socket, F&& each) {
+        int turn = fetches_per_turn;
+        bool more = true;
+        while (socket.is_open() && (!empty() || (more && turn-- > 0))) {
+            if (empty()) {
+                more = fetch(socket);
+            } else {
+                each(take());
+            }
+        }
+    }
+
     /// Fetches what is there, without waiting. True where there may be more: as many came as there is room for, or the
     /// network told of something else. \pre empty
     bool fetch(boost::asio::ip::udp::socket& socket) noexcept;
 
   private:
+    static constexpr int fetches_per_turn = 16;  // then others have theirs
     static constexpr std::size_t longest = 1280; // more than one may have, so that what is longer shows
 
     std::array<std::array<char, longest>, most> texts_;

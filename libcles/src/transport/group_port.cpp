@@ -17,8 +17,6 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr int fetches_per_turn = 16;
-
 template <class T>
 void set_ip_option(asio::ip::udp::socket& socket, int option, const T& value) {
     if (::setsockopt(socket.native_handle(), IPPROTO_IP, option, &value, sizeof value) != 0) {
@@ -81,20 +79,12 @@ void group_port::receive() {
 }
 
 void group_port::hand_over() {
-    int turn = fetches_per_turn;
-    bool more = true;
-    while (owner_ != nullptr && (!arrived_.empty() || (more && turn-- > 0))) {
-        if (arrived_.empty()) {
-            more = arrived_.fetch(shared_);
-            continue;
-        }
-        const auto next = arrived_.take();
-        try {
-            owner_->on_datagram(next.from, next.text);
-        } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
-            asio::post(shared_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
-            throw;
-        }
+    try {
+        arrived_.hand_over(shared_,
+                           [this](const datagram_batch::datagram& one) { owner_->on_datagram(one.from, one.text); });
+    } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+        asio::post(shared_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+        throw;
     }
     if (owner_ != nullptr) {
         owner_->on_batch();

@@ -16,8 +16,6 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr int fetches_per_turn = 16;
-
 bool is_empty(std::string_view datagram) { return datagram.empty() || datagram == "\n" || datagram == "\r\n"; }
 
 } // namespace
@@ -98,19 +96,11 @@ void udp_port::receive() {
 
 // Until all is handed over it counts as receiving: a link that starts meanwhile must not begin to wait.
 void udp_port::hand_over() {
-    int turn = fetches_per_turn;
-    bool more = true;
-    while (socket_.is_open() && (!arrived_.empty() || (more && turn-- > 0))) {
-        if (arrived_.empty()) { // what the network tells of something sent before is nobody's business
-            more = arrived_.fetch(socket_);
-            continue;
-        }
-        try {
-            hand_over(arrived_.take());
-        } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
-            asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
-            throw;
-        }
+    try {
+        arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) { hand_over(one); });
+    } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+        throw;
     }
     receiving_ = false;
     receive();
