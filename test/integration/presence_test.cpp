@@ -6,6 +6,7 @@
 #include "support/feed_log.hpp"
 #include "support/group_address.hpp"
 #include "support/run_until.hpp"
+#include "support/scripted_peer.hpp"
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/buffer.hpp>
@@ -225,6 +226,16 @@ BOOST_FIXTURE_TEST_CASE(a_name_that_is_configured_meanwhile_is_waited_for_no_mor
     asker.set_peer("other", silent.endpoints().front());
     until([&] { return answer->ended; });
     BOOST_TEST(answer->text == R"({"value":"silent"})");
+}
+
+BOOST_FIXTURE_TEST_CASE(what_is_urgent_stays_so_while_it_waits_for_a_name, fixture) {
+    cles::test::scripted_listener listener{here};
+    cles::service asker{here, in_group("asker")};
+    asker.async_pull("other:who", cles::call_options{}.urgent(),
+                     [](boost::system::error_code, const cles::json_text&) {});
+    asker.set_peer("other", listener.url());
+    const auto line = listener.accept().line();
+    BOOST_TEST(line.find(" urgent=yes") != std::string::npos, line);
 }
 
 BOOST_FIXTURE_TEST_CASE(nodes_know_each_other_and_say_whom_they_know, fixture) {

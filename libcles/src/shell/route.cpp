@@ -8,6 +8,15 @@
 #include <utility>
 
 namespace cles::shell {
+namespace {
+
+void put(connection& c, const route::request& r, detail::pending_ptr operation,
+         core::outbound::progress_function progress) {
+    c.session().asking().send({.verb = r.verb, .noun = r.noun, .id = r.id, .urgent = r.urgent, .body = r.body},
+                              r.deadline, r.begun, std::move(operation), std::move(progress));
+}
+
+} // namespace
 
 route::route(std::shared_ptr<detail::engine> host, url where)
     : engine_(std::move(host)), where_(std::move(where)), address_(to_string(*where_)) {}
@@ -34,8 +43,7 @@ std::shared_ptr<connection> route::free_for(const core::feed_machine& feed) cons
 
 void route::send(const request& r, detail::pending_ptr operation, core::outbound::progress_function progress) {
     if (const auto c = usable()) {
-        c->session().asking().send({.verb = r.verb, .noun = r.noun, .id = r.id, .urgent = r.urgent, .body = r.body},
-                                   r.deadline, r.begun, std::move(operation), std::move(progress));
+        put(*c, r, std::move(operation), std::move(progress));
         return;
     }
     auto w = std::make_unique<waiting>(*this);
@@ -122,8 +130,7 @@ void route::serve_waiting(const std::shared_ptr<connection>& c) {
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
         engine_->deadlines().disarm(w);
-        c->session().asking().send({.verb = w.verb, .noun = w.noun, .id = w.id, .urgent = w.urgent, .body = w.body},
-                                   w.deadline, now, std::move(w.operation), std::move(w.progress));
+        put(*c, w.asked(now), std::move(w.operation), std::move(w.progress));
     }
     for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {
         auto& next = binders.front();
@@ -143,8 +150,7 @@ void route::hand_over(route& way) {
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
         engine_->deadlines().disarm(w);
-        way.send({.verb = w.verb, .noun = w.noun, .body = w.body, .id = w.id, .begun = now, .deadline = w.deadline},
-                 std::move(w.operation), std::move(w.progress));
+        way.send(w.asked(now), std::move(w.operation), std::move(w.progress));
     }
     for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {
         way.connect(*binders.front().feed, std::move(binders.front().ready));

@@ -68,6 +68,16 @@ class route : public std::enable_shared_from_this<route> {
     struct waiting final : core::deadline {
         explicit waiting(route& r) : owner(r) {}
         void on_deadline(time_point now) override;
+        /// The request, to be sent now; it views what is held here.
+        [[nodiscard]] request asked(time_point now) const {
+            return {.verb = verb,
+                    .noun = noun,
+                    .body = body,
+                    .id = id,
+                    .urgent = urgent,
+                    .begun = now,
+                    .deadline = deadline};
+        }
 
         route& owner;
         cles::verb verb = verb::pull;
