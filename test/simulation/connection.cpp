@@ -23,7 +23,7 @@ connection::connection(node_run& host, link_ptr carrier, origin from)
     const bool stranger = from_ != origin::dialled && !link_->peer().local;
     datagrams_.emplace(*host.node(), link_->datagram(), stranger ? link_->peer().address : std::string{}, udp_over_v4);
     if (from_ == origin::accepted && host.fault() != planted::source_kept) {
-        life_.emplace(static_cast<core::source_life::keeper&>(*this), host.node()->deadlines);
+        life_.emplace(static_cast<core::source_life::keeper&>(*this), host.node()->deadlines, host.now());
     }
 }
 
@@ -51,9 +51,12 @@ void connection::on_overlong(std::string_view head) {
     in_batch_ = true;
     if (from_ == origin::refused) {
         session_.turn_away(head);
-    } else {
-        session_.on_overlong(head, node_.now());
+        return;
     }
+    if (life_) {
+        life_->heard(node_.now());
+    }
+    session_.on_overlong(head, node_.now());
 }
 
 void connection::on_cut(std::string_view rest) {

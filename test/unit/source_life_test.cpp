@@ -22,7 +22,7 @@ struct fixture : cles::core::source_life::keeper {
     int ends = 0;
     cles::test::manual_clock clock;
     cles::core::deadline_queue deadlines;
-    cles::core::source_life life{*this, deadlines};
+    cles::core::source_life life{*this, deadlines, clock.now()};
 };
 
 } // namespace
@@ -30,7 +30,6 @@ struct fixture : cles::core::source_life::keeper {
 BOOST_FIXTURE_TEST_SUITE(source_life, fixture)
 
 BOOST_AUTO_TEST_CASE(a_source_is_let_go_after_a_minute_of_silence) {
-    life.heard(clock.now());
     pass(59s);
     BOOST_TEST(ends == 0);
     pass(1s);
@@ -50,7 +49,6 @@ BOOST_AUTO_TEST_CASE(each_datagram_begins_the_minute_anew) {
 
 BOOST_AUTO_TEST_CASE(it_stays_while_something_is_kept_for_it) {
     rests = false;
-    life.heard(clock.now());
     pass(10min);
     BOOST_TEST(ends == 0);
     rests = true;
@@ -59,7 +57,6 @@ BOOST_AUTO_TEST_CASE(it_stays_while_something_is_kept_for_it) {
 }
 
 BOOST_AUTO_TEST_CASE(once_ended_it_says_nothing) {
-    life.heard(clock.now());
     life.end();
     pass(1h);
     BOOST_TEST(ends == 0);

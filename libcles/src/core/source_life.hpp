@@ -28,14 +28,13 @@ class source_life final : private deadline {
         ~keeper() = default;
     };
 
-    source_life(keeper& owner, deadline_queue& deadlines) noexcept : owner_(owner), deadlines_(deadlines) {}
-
-    void heard(time_point now) {
-        heard_ = now;
-        if (!armed()) {
-            deadlines_.arm(*this, now + quiet);
-        }
+    /// It begins with the first datagram, whatever that holds.
+    source_life(keeper& owner, deadline_queue& deadlines, time_point now)
+        : owner_(owner), deadlines_(deadlines), heard_(now) {
+        deadlines_.arm(*this, now + quiet);
     }
+
+    void heard(time_point now) noexcept { heard_ = now; }
     void end() noexcept { deadlines_.disarm(*this); }
 
   private:
@@ -51,7 +50,7 @@ class source_life final : private deadline {
 
     keeper& owner_;
     deadline_queue& deadlines_;
-    time_point heard_{};
+    time_point heard_;
 };
 
 } // namespace cles::core

@@ -27,7 +27,7 @@ connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, o
     const bool is_v6 = stranger.find(':') != std::string::npos;
     datagrams_.emplace(engine_->node(), link_->datagram(), stranger, is_v6 ? udp_over_v6 : udp_over_v4);
     if (from_ == origin::accepted) {
-        life_.emplace(static_cast<core::source_life::keeper&>(*this), engine_->deadlines());
+        life_.emplace(static_cast<core::source_life::keeper&>(*this), engine_->deadlines(), engine_->now());
     }
 }
 
@@ -59,6 +59,9 @@ void connection::on_overlong(std::string_view head) {
     if (from_ == origin::refused) {
         session_.turn_away(head);
         return;
+    }
+    if (life_) {
+        life_->heard(now());
     }
     session_.on_overlong(head, now());
 }

@@ -90,7 +90,7 @@ class source final : public test::recording_outlet, public core::binder, private
           node_(node), peer_{.transport = "udp", .address = "udp://192.0.2.1:" + std::to_string(1000 + name)},
           session_(node.host, *this, *this, peer_),
           output_(*node.host, protocol::datagram_bytes, name == 'd' ? peer_.address : std::string{}, 28),
-          life_(*this, node.host->deadlines) {}
+          life_(*this, node.host->deadlines, node.clock.now()) {}
 
     void receive(std::string_view datagram) {
         life_.heard(node_.clock.now());
