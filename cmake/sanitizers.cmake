@@ -30,6 +30,15 @@ function(cles_target_sanitizers target)
     target_link_options(${target} PUBLIC ${flags})
 endfunction()
 
+# cles_target_in_units(target): instrumented, its sources are compiled several at a time. Instrumenting Asio's and the
+# standard library's templates anew for each source is most of the work; the builds without sanitizers compile each alone,
+# and so find what one lacks.
+function(cles_target_in_units target)
+    if(CLES_SANITIZE)
+        set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
+    endif()
+endfunction()
+
 # CLES_TEST_LAUNCHER: what has to stand before a test's command. g++ 12's thread sanitizer cannot start where the kernel
 # spreads addresses over more than 28 bits, so there the tests run with that turned off.
 set(CLES_TEST_LAUNCHER)

@@ -13,12 +13,12 @@ namespace {
 
 constexpr std::uint64_t rate_hz = 1000;
 constexpr std::uint64_t paced_unless_told = 1000;
-constexpr std::uint64_t deliveries_of_a_pass = 200'000;
-constexpr std::uint64_t most_updates = 40'000;
+constexpr std::uint64_t deliveries_of_a_fan_out = 200'000;
+constexpr std::uint64_t most_of_a_fan_out = 40'000;
 
 fan_out_orders orders_of(std::size_t binders, const bench_options& options) {
     const auto told = options.requests;
-    const auto suits = std::clamp<std::uint64_t>(deliveries_of_a_pass / binders, 1, most_updates);
+    const auto suits = std::clamp<std::uint64_t>(deliveries_of_a_fan_out / binders, 1, most_of_a_fan_out);
     return {.paced = {.binders = binders,
                       .updates = told != 0 ? told : paced_unless_told,
                       .interval_ns = 1'000'000'000 / rate_hz},

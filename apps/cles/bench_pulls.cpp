@@ -35,7 +35,7 @@ constexpr std::uint64_t requests_in_flight = 1'000'000;
 constexpr std::uint64_t most_per_second_alone = 1'000'000;
 constexpr std::uint64_t most_per_second_in_flight = 4'000'000;
 constexpr std::uint64_t most_recorded = 20'000'000;
-constexpr std::uint64_t counted_bytes_of = 5'000;
+constexpr std::uint64_t pulls_whose_bytes_count = 5'000;
 
 std::uint64_t requests_of(const bench_options& options) {
     if (options.requests != 0) {
@@ -105,21 +105,22 @@ void count_bytes(const std::string& url, const std::string& node, const std::str
     boost::asio::io_context io{1};
     cles::service client{io, {.name = "bench", .peers = {{node, tap.url()}}}};
     perf::pull_load load{io, client, noun, options.style, false};
-    perf::latency_recorder record{counted_bytes_of};
+    perf::latency_recorder record{pulls_whose_bytes_count};
     load.run(1, std::chrono::nanoseconds::max(), record);
-    figures.request_bytes = rounded(static_cast<double>(tap.to_server()) / static_cast<double>(counted_bytes_of));
-    figures.reply_bytes = rounded(static_cast<double>(tap.to_client()) / static_cast<double>(counted_bytes_of));
+    figures.request_bytes =
+        rounded(static_cast<double>(tap.to_server()) / static_cast<double>(pulls_whose_bytes_count));
+    figures.reply_bytes = rounded(static_cast<double>(tap.to_client()) / static_cast<double>(pulls_whose_bytes_count));
 }
 
-struct self_description {
+struct named_node {
     std::string node;
 };
-BOOST_DESCRIBE_STRUCT(self_description, (), (node))
+BOOST_DESCRIBE_STRUCT(named_node, (), (node))
 
 std::string name_of_node_at(const std::string& url) {
     boost::asio::io_context io{1};
     cles::service client{io, {.name = "bench"}};
-    return cles::from_json<self_description>(client.request("PULL self:cles", cles::call_options{}.at(url))).node;
+    return cles::from_json<named_node>(client.request("PULL self:cles", cles::call_options{}.at(url))).node;
 }
 
 /// The hand-written exchange, both ends.

@@ -24,7 +24,7 @@ namespace perf = cles::perf;
 
 namespace {
 
-constexpr std::uint64_t requests_unless_told = 20'000;
+constexpr std::uint64_t stressed_requests_unless_told = 20'000;
 constexpr int hogs_per_core = 2;
 constexpr int priority = 50; // in the middle: above what is normal, below what the kernel itself needs
 
@@ -89,7 +89,7 @@ stress_report bench_stress(const bench_options& options) {
         real_time->connect(io);
     }
 
-    const auto requests = options.requests != 0 ? options.requests : requests_unless_told;
+    const auto requests = options.requests != 0 ? options.requests : stressed_requests_unless_told;
     perf::latency_recorder record{requests};
     std::vector<latency_figures> idle;
     std::vector<latency_figures> idle_fifo;

@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::uint64_t deliveries_of_a_pass = 4'000'000;
 constexpr std::uint64_t most_updates = 1'000'000;
-constexpr std::uint64_t counted_bytes_of = 5'000;
+constexpr std::uint64_t updates_whose_bytes_count = 5'000;
 
 std::uint64_t updates_of(const bench_options& options) {
     return options.requests != 0
@@ -37,8 +37,8 @@ double count_bytes(const std::string& url) {
     perf::byte_tap tap{cles::parse_url(url)};
     boost::asio::io_context io{1};
     cles::service client{io, {.name = "bench", .peers = {{"car1", tap.url()}}}};
-    perf::take_updates(io, client, {.binders = 1, .updates = counted_bytes_of});
-    return rounded(static_cast<double>(tap.to_client()) / static_cast<double>(counted_bytes_of));
+    perf::take_updates(io, client, {.binders = 1, .updates = updates_whose_bytes_count});
+    return rounded(static_cast<double>(tap.to_client()) / static_cast<double>(updates_whose_bytes_count));
 }
 
 update_figures take(boost::asio::io_context& io, cles::service& client, pid_t publisher,

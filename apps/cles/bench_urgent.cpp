@@ -20,7 +20,7 @@ namespace perf = cles::perf;
 
 namespace {
 
-constexpr std::uint64_t requests_unless_told = 5'000;
+constexpr std::uint64_t urgent_requests_unless_told = 5'000;
 constexpr std::size_t large_in_flight = 4; // so that the node always has the next to send
 
 void serve(const bench_options& options, const perf::child_process::announce& announce) {
@@ -44,7 +44,7 @@ urgent_report bench_urgent(const bench_options& options) {
     perf::pull_load small{io, client, "car1:localization", options.style, true, options.how};
     perf::bulk_load large{client, "car1"};
 
-    const auto requests = options.requests != 0 ? options.requests : requests_unless_told;
+    const auto requests = options.requests != 0 ? options.requests : urgent_requests_unless_told;
     perf::latency_recorder record{requests};
     bench_progress progress{options.rounds * 3};
     const auto pass = [&](const char* what, std::size_t beside, bool hurry, std::vector<latency_figures>& into) {

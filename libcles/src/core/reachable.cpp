@@ -4,6 +4,8 @@
 #include <cles/error.hpp>
 #include <cles/url.hpp>
 
+#include "protocol/digit.hpp"
+
 #include <boost/container/static_vector.hpp>
 
 #include <algorithm>
@@ -30,7 +32,7 @@ host_kind kind_of_ipv4(std::string_view host) noexcept {
         }
         std::uint32_t value = 0;
         std::size_t digits = 0;
-        while (digits < host.size() && digits < 4 && host[digits] >= '0' && host[digits] <= '9') {
+        while (digits < host.size() && digits < 4 && protocol::is_digit(host[digits])) {
             value = value * 10 + static_cast<std::uint32_t>(host[digits++] - '0');
         }
         if (digits == 0 || value > 255 || (digits > 1 && host.front() == '0')) {

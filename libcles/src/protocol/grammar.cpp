@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/grammar.hpp"
 
+#include "protocol/digit.hpp"
 #include "protocol/utf8.hpp"
 
 #include <array>
@@ -25,7 +26,7 @@ constexpr bool in_class(char c, std::uint8_t wanted) noexcept {
 }
 
 constexpr int hex_value(char c) noexcept {
-    if (c >= '0' && c <= '9') {
+    if (is_digit(c)) {
         return c - '0';
     }
     if (c >= 'A' && c <= 'F') {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/json_reader.hpp>
 
+#include "protocol/digit.hpp"
 #include "protocol/json_scan.hpp"
 #include "protocol/json_skip.hpp"
 
@@ -84,7 +85,7 @@ json_reader::kind json_reader::peek() noexcept {
     case 't':
     case 'f': return kind::boolean;
     case 'n': return kind::null;
-    default: return c == '-' || (c >= '0' && c <= '9') ? kind::number : kind::invalid;
+    default: return c == '-' || protocol::is_digit(c) ? kind::number : kind::invalid;
     }
 }
 

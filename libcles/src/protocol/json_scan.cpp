@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/json_scan.hpp"
 
+#include "protocol/digit.hpp"
 #include "protocol/plain_text.hpp"
 #include "protocol/utf8.hpp"
 
@@ -10,8 +11,6 @@
 
 namespace cles::protocol {
 namespace {
-
-constexpr bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 
 void append_utf8(std::string& out, std::uint32_t c) {
     const auto put = [&](std::uint32_t byte) { out.push_back(static_cast<char>(byte)); };

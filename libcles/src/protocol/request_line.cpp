@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/request_line.hpp"
 
+#include "protocol/digit.hpp"
 #include "protocol/parts.hpp"
 
 #include <algorithm>
@@ -15,7 +16,7 @@ std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept {
         return std::nullopt;
     }
     for (const auto c : text) {
-        const bool digit = c >= '0' && c <= '9';
+        const bool digit = is_digit(c);
         if (!digit && (c < 'a' || c > 'f')) {
             return std::nullopt;
         }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/update_head.hpp"
 
+#include "protocol/digit.hpp"
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -10,8 +12,6 @@ namespace {
 
 constexpr std::size_t longest = 256;
 constexpr std::size_t after_size = std::string_view{" epoch=5f3a09c1 "}.size();
-
-bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 
 bool may_be_json(std::string_view body) noexcept {
     return body.size() >= 2 &&

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/inproc_link.hpp"
 
+#include "transport/turn.hpp"
+
 #include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
 
@@ -10,12 +12,6 @@
 
 namespace cles::transport {
 namespace asio = boost::asio;
-
-namespace {
-
-constexpr int lines_per_turn = 1024;
-
-} // namespace
 
 inproc_link::inproc_link(asio::any_io_executor executor, std::string address, const limits& bounds)
     : executor_(std::move(executor)), peer_{.transport = "inproc",

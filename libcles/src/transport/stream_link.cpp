@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/stream_link.hpp"
 
+#include "transport/turn.hpp"
+
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
@@ -13,7 +15,6 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr int lines_per_turn = 1024;
 constexpr std::size_t bytes_per_turn = 65536; // of what is written in answer
 constexpr std::size_t piece = 65536;          // sent as one, before what is urgent has another chance
 constexpr std::size_t roomy = 262144;         // buffers that grew past this are given back
