@@ -29,7 +29,7 @@ outcome expected(std::string_view stream, std::size_t limit) {
     while (!stream.empty()) {
         const auto end = stream.find('\n');
         const auto line = stream.substr(0, end);
-        if (line.size() > limit) {
+        if (line.size() - (line.ends_with('\r') ? 1 : 0) > limit) { // a CR before the LF does not count
             result.overlong = true;
             result.head = line.substr(0, limit);
             return result;
