@@ -31,15 +31,22 @@ connection::~connection() = default;
 
 // -- from the link -------------------------------------------------------------------------------------------------
 
-void connection::on_line(std::string_view line) {
-    in_batch_ = true;
-    node_.watcher().saw(node_.name(), "<--", line);
+bool connection::hears(std::string_view text) {
     if (from_ == origin::refused) {
-        session_.turn_away(line);
-        return;
+        session_.turn_away(text);
+        return false;
     }
     if (life_) {
         life_->heard(node_.now());
+    }
+    return true;
+}
+
+void connection::on_line(std::string_view line) {
+    in_batch_ = true;
+    node_.watcher().saw(node_.name(), "<--", line);
+    if (!hears(line)) {
+        return;
     }
     session_.on_line(line, node_.now());
     if (++lines_ % lines_per_write == 0 || link_->output().size() > node_.bounds().unread) {
@@ -49,12 +56,8 @@ void connection::on_line(std::string_view line) {
 
 void connection::on_overlong(std::string_view head) {
     in_batch_ = true;
-    if (from_ == origin::refused) {
-        session_.turn_away(head);
+    if (!hears(head)) {
         return;
-    }
-    if (life_) {
-        life_->heard(node_.now());
     }
     session_.on_overlong(head, node_.now());
 }

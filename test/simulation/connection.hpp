@@ -78,6 +78,7 @@ class connection final : public link_events,
         std::uint64_t sent = 0;
     };
 
+    bool hears(std::string_view text);
     void on_quiet() override { abandon("nothing came for a while"); }
     void on_stall(time_point now);
     void send_output();

@@ -39,13 +39,20 @@ time_point connection::now() { return now_ ? *now_ : *(now_ = engine_->now()); }
 
 // -- from the link -------------------------------------------------------------------------------------------------
 
-void connection::on_line(std::string_view line) {
+bool connection::hears(std::string_view text) {
     if (from_ == origin::refused) {
-        session_.turn_away(line);
-        return;
+        session_.turn_away(text);
+        return false;
     }
     if (life_) {
         life_->heard(now());
+    }
+    return true;
+}
+
+void connection::on_line(std::string_view line) {
+    if (!hears(line)) {
+        return;
     }
     session_.on_line(line, now());
     // In a long batch the peer gets to work on the first replies while the rest is still being answered: with many
@@ -56,12 +63,8 @@ void connection::on_line(std::string_view line) {
 }
 
 void connection::on_overlong(std::string_view head) {
-    if (from_ == origin::refused) {
-        session_.turn_away(head);
+    if (!hears(head)) {
         return;
-    }
-    if (life_) {
-        life_->heard(now());
     }
     session_.on_overlong(head, now());
 }
