@@ -18,12 +18,12 @@ constexpr std::uint64_t exchanges_unless_told = 2000;
 // The struct's messages: one without the packet, and one with it.
 constexpr double word = sizeof(perf::icd::request_packet);
 constexpr double packet = sizeof(perf::icd::reply_packet);
-constexpr perf::verb_bytes icd{.pull = {word, packet},
-                               .push = {packet, word},
-                               .delegate = {packet, packet},
-                               .ask = {packet, word},
-                               .bind = {word, packet},
-                               .update = packet};
+constexpr perf::verb_bytes interface_control_document{.pull = {word, packet},
+                                                      .push = {packet, word},
+                                                      .delegate = {packet, packet},
+                                                      .ask = {packet, word},
+                                                      .bind = {word, packet},
+                                                      .update = packet};
 
 /// Puts messages into frames and beside each other.
 class framing {
@@ -71,17 +71,19 @@ bytes_report bench_bytes(const bench_options& options) {
     bytes_report report{.exchanges = exchanges};
     const framing frames{report.headers};
     const auto add = [&](const std::string& verb, perf::exchange_bytes perf::verb_bytes::*of) {
-        report.rows.push_back(frames.row(verb + " request", (icd.*of).request, (tcp.*of).request, (udp.*of).request));
-        report.rows.push_back(frames.row(verb + " reply", (icd.*of).reply, (tcp.*of).reply, (udp.*of).reply));
+        report.rows.push_back(frames.row(verb + " request", (interface_control_document.*of).request, (tcp.*of).request,
+                                         (udp.*of).request));
+        report.rows.push_back(
+            frames.row(verb + " reply", (interface_control_document.*of).reply, (tcp.*of).reply, (udp.*of).reply));
     };
     add("PULL", &perf::verb_bytes::pull);
     add("PUSH", &perf::verb_bytes::push);
     add("DELEGATE", &perf::verb_bytes::delegate);
     add("UPDATE", &perf::verb_bytes::ask);
     add("BIND", &perf::verb_bytes::bind);
-    report.rows.push_back(frames.row("update", icd.update, tcp.update, udp.update));
-    report.in_a_frame = {.icd_tcp = frames.fit_tcp(icd.update),
-                         .icd_udp = frames.fit_udp(icd.update),
+    report.rows.push_back(frames.row("update", interface_control_document.update, tcp.update, udp.update));
+    report.in_a_frame = {.icd_tcp = frames.fit_tcp(interface_control_document.update),
+                         .icd_udp = frames.fit_udp(interface_control_document.update),
                          .tcp = frames.fit_tcp(tcp.update)};
     return report;
 }

@@ -82,8 +82,8 @@ void udp_link::send_rest() {
         sent_ += line.size();
         sending_at_ += line.size();
     }
-    constexpr std::size_t roomy = 65536;
-    if (sending_.capacity() > roomy) {
+    constexpr std::size_t largest_kept = 65536;
+    if (sending_.capacity() > largest_kept) {
         sending_ = {};
     }
     sending_.clear();
