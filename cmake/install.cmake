@@ -9,8 +9,8 @@ set(cles_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/cles")
 
 # --- Headers and the library -------------------------------------------------------------------------------------------
 
-install(DIRECTORY libcles/include/cles DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")
-install(TARGETS cles EXPORT cles-targets
+install(DIRECTORY libcles/include/cles DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+install(TARGETS cles cles_plugin EXPORT cles-targets
     ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
     INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 
@@ -25,6 +25,8 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/package/cles-config-vers
 install(FILES
     "${PROJECT_BINARY_DIR}/package/cles-config.cmake"
     "${PROJECT_BINARY_DIR}/package/cles-config-version.cmake"
+    cmake/cles-plugin.cmake
+    cmake/cles-plugin.map
     DESTINATION "${cles_package_dir}")
 
 # --- pkg-config --------------------------------------------------------------------------------------------------------
@@ -66,16 +68,36 @@ string(REGEX REPLACE "/$" "" cles_pc_prefix "${cles_pc_prefix}")
 configure_file(cmake/cles.pc.in "${PROJECT_BINARY_DIR}/package/cles.pc" @ONLY)
 install(FILES "${PROJECT_BINARY_DIR}/package/cles.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
 
-# --- The program -------------------------------------------------------------------------------------------------------
+# --- The programs ------------------------------------------------------------------------------------------------------
 
-if(TARGET cles_command)
-    install(TARGETS cles_command RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
-endif()
+foreach(program IN ITEMS cles_command clesd cles_dsgd cles_jadc2 cles_platoon)
+    if(TARGET ${program})
+        install(TARGETS ${program} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
+    endif()
+endforeach()
+
+# --- Plugins that come along -------------------------------------------------------------------------------------------
+
+foreach(plugin IN ITEMS cles_plugin_system cles_plugin_primes cles_plugin_sgd cles_plugin_fmv cles_plugin_strike)
+    if(TARGET ${plugin})
+        install(TARGETS ${plugin} LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/cles")
+    endif()
+endforeach()
 
 # --- The licence and the pages -----------------------------------------------------------------------------------------
 
 # As they lie in the tree, so that their links lead somewhere.
 install(FILES LICENSE README.md CONTRIBUTING.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
-install(DIRECTORY docs DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY config docs DESTINATION "${CMAKE_INSTALL_DOCDIR}")
+install(DIRECTORY plugins/primes plugins/template DESTINATION "${CMAKE_INSTALL_DOCDIR}/plugins")
 install(DIRECTORY apps/examples DESTINATION "${CMAKE_INSTALL_DOCDIR}/apps"
     FILES_MATCHING PATTERN "*.cpp" PATTERN "*.hpp")
+
+# --- Completion --------------------------------------------------------------------------------------------------------
+
+# Where each shell looks by itself.
+if(TARGET cles_command)
+    install(FILES apps/completion/cles.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions" RENAME cles)
+    install(FILES apps/completion/_cles DESTINATION "${CMAKE_INSTALL_DATADIR}/zsh/site-functions")
+    install(FILES apps/completion/cles.fish DESTINATION "${CMAKE_INSTALL_DATADIR}/fish/vendor_completions.d")
+endif()

@@ -25,6 +25,8 @@ class descriptor {
     ~descriptor() { reset(); }
 
     [[nodiscard]] int get() const noexcept { return fd_; }
+    /// Hands it over to somebody who will close it.
+    [[nodiscard]] int release() noexcept { return std::exchange(fd_, -1); }
     void reset() noexcept {
         if (fd_ >= 0) {
             ::close(std::exchange(fd_, -1));

@@ -2,20 +2,13 @@
 #include "icd_publisher.hpp"
 
 #include "icd_update.hpp"
+#include "wait_until.hpp"
 
 #include <array>
-#include <ctime>
 #include <span>
 
 namespace cles::perf::icd {
 namespace {
-
-void wait_until(std::int64_t monotonic) {
-    constexpr std::int64_t second = 1'000'000'000;
-    const timespec when{.tv_sec = monotonic / second, .tv_nsec = monotonic % second};
-    while (::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &when, nullptr) == EINTR) {
-    }
-}
 
 void publish(const fan_out_order& order, const std::vector<descriptor>& sockets) {
     auto next = monotonic_ns();

@@ -18,11 +18,13 @@ namespace {
 
 constexpr int stream = SOCK_STREAM | SOCK_CLOEXEC;
 
-sockaddr_in loopback(std::uint16_t port) {
+sockaddr_in address_of(const url& where) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    address.sin_port = htons(port);
+    if (::inet_pton(AF_INET, where.host.c_str(), &address.sin_addr) != 1) {
+        throw std::runtime_error(to_string(where) + ": to listen there takes an IPv4 address");
+    }
+    address.sin_port = htons(where.port);
     return address;
 }
 
@@ -76,7 +78,7 @@ descriptor connect_unix(const url& where) {
 
 listener listen_tcp(const url& where) {
     listener made{descriptor{checked(::socket(AF_INET, stream, 0), "socket")}, where};
-    auto address = loopback(where.port);
+    auto address = address_of(where);
     socklen_t length = sizeof address;
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     checked(::bind(made.socket.get(), generic, length), "bind");

@@ -17,7 +17,7 @@ struct listener {
     url where; ///< with the port that the system chose
 };
 
-/// Listens at a `tcp` URL on the loopback, or at a `unix` one.
+/// Listens at a `tcp` URL with an IPv4 address, or at a `unix` one.
 /// \throws std::system_error, or std::runtime_error where the scheme is another
 listener listen_on(const url& where);
 /// Takes the next connection. This and `connect_to` set the flags that the library sets on its own sockets.

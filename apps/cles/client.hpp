@@ -36,6 +36,8 @@ class client {
     /// The URL at which that node is asked, once it has answered.
     [[nodiscard]] std::string where_is(std::string_view node) const;
 
+    /// Ends the work, with this exit code.
+    void end(int code) { end_early(code); }
     /// Ends the work, with success, when so much time has gone.
     void end_after(std::chrono::milliseconds span);
 

@@ -4,7 +4,7 @@
 #include <cles/convert.hpp>
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
-#include <cles/json_writer.hpp>
+#include <cles/verb.hpp>
 
 #include "duration.hpp"
 #include "json_node.hpp"
@@ -13,7 +13,9 @@
 
 #include <boost/describe.hpp>
 
+#include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <utility>
 
 namespace tool {
@@ -45,8 +47,11 @@ struct told_self {
     std::string node;
     std::string epoch;
     std::vector<std::string> endpoints;
+    std::optional<told_load> load;
 };
-BOOST_DESCRIBE_STRUCT(told_self, (), (node, epoch, endpoints))
+BOOST_DESCRIBE_STRUCT(told_self, (), (node, epoch, endpoints, load))
+
+cles::node_load load_of(const told_load& load) { return {load.queued, load.running, load.workers}; }
 
 std::string joined(const std::vector<std::string>& parts) {
     std::string out;
@@ -94,8 +99,10 @@ void write_node(cles::json_writer& w, const listed_node& node, bool tasks) {
     w.value(node.age_ms.value_or(0));
     w.key("state");
     w.value(std::string_view{node.state});
-    w.key("load");
-    cles::write_json(w, told_load{node.load.queued, node.load.running, node.load.workers});
+    if (node.load) {
+        w.key("load");
+        write_load(w, *node.load);
+    }
     if (tasks && node.tasks.empty()) {
         w.key("failure");
         w.value(std::string_view{node.error});
@@ -127,6 +134,22 @@ void listed_node::learn(std::string_view description) {
     cles::append_compact_json(found, tasks);
 }
 
+bool listed_node::offers(std::string_view task) const {
+    const auto colon = task.find(':');
+    const auto verb = cles::verb_from(task.substr(0, colon == std::string_view::npos ? 0 : colon));
+    task.remove_prefix(colon == std::string_view::npos ? 0 : colon + 1);
+    if (tasks.empty()) {
+        return false;
+    }
+    const auto all = parse_json(tasks);
+    return std::any_of(all.elements.begin(), all.elements.end(), [&](const json_node& entry) {
+        const auto* its_verb = entry.find("verb");
+        const auto* its_name = entry.find("task");
+        return its_name != nullptr && its_name->text == task &&
+               (!verb || (its_verb != nullptr && its_verb->text == to_string(*verb)));
+    });
+}
+
 std::vector<listed_node> listed(const std::vector<cles::peer>& peers) {
     std::vector<listed_node> nodes;
     nodes.reserve(peers.size());
@@ -145,20 +168,48 @@ std::vector<listed_node> listed(std::string_view itself, std::string_view others
     const auto self = cles::from_json<told_self>(itself);
     std::vector<listed_node> nodes{
         {.node = self.node, .state = "live", .age_ms = {}, .endpoints = self.endpoints, .epoch = self.epoch}};
+    if (self.load) {
+        nodes.front().load = load_of(*self.load);
+    }
+    auto known = listed_others(others);
+    nodes.insert(nodes.end(), std::make_move_iterator(known.begin()), std::make_move_iterator(known.end()));
+    return nodes;
+}
+
+std::vector<listed_node> listed_others(std::string_view others) {
+    std::vector<listed_node> nodes;
     for (const auto& p : cles::from_json<told_peers>(others).peers) {
         nodes.push_back({.node = p.node,
                          .state = p.state,
                          .age_ms = p.age_ms,
                          .endpoints = p.endpoints,
                          .epoch = p.epoch,
-                         .load = {p.load.queued, p.load.running, p.load.workers}});
+                         .load = load_of(p.load)});
     }
     return nodes;
 }
 
+void write_load(cles::json_writer& w, const cles::node_load& load) {
+    cles::write_json(w, told_load{load.queued, load.running, load.workers});
+}
+
+std::string to_text(const std::optional<cles::node_load>& load) {
+    if (!load) {
+        return "-";
+    }
+    std::string out = std::to_string(load->running);
+    if (load->workers != 0) {
+        out.append("/").append(std::to_string(load->workers));
+    }
+    if (load->queued != 0) {
+        out.append(" +").append(std::to_string(load->queued));
+    }
+    return out;
+}
+
 std::string to_table(const std::vector<listed_node>& nodes, bool tasks) {
     table out;
-    std::vector<const char*> titles{"NODE", "STATE", "HEARD", "ENDPOINTS"};
+    std::vector<const char*> titles{"NODE", "STATE", "LOAD", "HEARD", "ENDPOINTS"};
     if (tasks) {
         titles.push_back("TASKS");
     }
@@ -169,10 +220,11 @@ std::string to_table(const std::vector<listed_node>& nodes, bool tasks) {
         out.row();
         out.set(0, printable(node.node));
         out.set(1, printable(node.state));
-        out.set(2, node.age_ms ? to_text(std::chrono::milliseconds{*node.age_ms}) + " ago" : "now");
-        out.set(3, node.endpoints.empty() ? "-" : joined(node.endpoints));
+        out.set(2, to_text(node.load));
+        out.set(3, node.age_ms ? to_text(std::chrono::milliseconds{*node.age_ms}) + " ago" : "now");
+        out.set(4, node.endpoints.empty() ? "-" : joined(node.endpoints));
         if (tasks) {
-            out.set(4, node.tasks.empty() ? "(" + printable(node.error) + ")" : tasks_in_words(node.tasks));
+            out.set(5, node.tasks.empty() ? "(" + printable(node.error) + ")" : tasks_in_words(node.tasks));
         }
     }
     return out.text();

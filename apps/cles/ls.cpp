@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/verb.hpp>
+
 #include "client.hpp"
 #include "commands.hpp"
 #include "common_options.hpp"
@@ -6,16 +8,19 @@
 #include "diagnostics.hpp"
 #include "failure.hpp"
 #include "listing.hpp"
+#include "node_finding.hpp"
+#include "node_query.hpp"
+#include "noun.hpp"
 #include "output.hpp"
 #include "printer.hpp"
 
-#include <boost/asio/redirect_error.hpp>
-#include <boost/asio/steady_timer.hpp>
-#include <boost/asio/use_awaitable.hpp>
+#include <boost/asio/awaitable.hpp>
 
 #include <CLI/App.hpp>
+#include <CLI/Option.hpp>
 
 #include <chrono>
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -34,87 +39,52 @@ struct ls_command {
     std::chrono::milliseconds wait{350}; // a round of asking, and a little
     std::optional<std::chrono::milliseconds> timeout;
     bool tasks = false;
+    std::string offered;
     output_format format = output_format::automatic;
 };
 
-/// Asks several nodes at once what they offer. Answers may still come when nobody waits for them any more.
-class task_query : public std::enable_shared_from_this<task_query> {
-  public:
-    task_query(client& asker, std::vector<listed_node> nodes)
-        : asker_(asker), nodes_(std::move(nodes)), ended_(asker.context()) {}
-
-    asio::awaitable<void> run(std::chrono::milliseconds limit) {
-        ended_.expires_at(asio::steady_timer::time_point::max());
-        for (auto& node : nodes_) {
-            if (node.endpoints.empty()) {
-                node.error = "no address that can be used from here";
-            } else {
-                ask(node, limit);
-            }
-        }
-        boost::system::error_code code;
-        if (missing_ > 0) {
-            co_await ended_.async_wait(asio::redirect_error(asio::use_awaitable, code));
-        }
-        if (missing_ > 0) {
-            throw boost::system::system_error(code); // interrupted
+// Asks each node what it offers.
+asio::awaitable<void> learn_tasks(client& asker, std::vector<listed_node>& nodes, std::chrono::milliseconds limit) {
+    std::vector<std::string> urls;
+    urls.reserve(nodes.size());
+    for (const auto& node : nodes) {
+        urls.push_back(node.endpoints.empty() ? "" : node.endpoints.front());
+    }
+    const auto answers = co_await ask_all(asker, "self:cles", std::move(urls), limit);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        nodes[i].error = answers[i].error;
+        if (nodes[i].error.empty()) {
+            nodes[i].learn(answers[i].json);
         }
     }
-    [[nodiscard]] const std::vector<listed_node>& nodes() const noexcept { return nodes_; }
-
-  private:
-    void ask(listed_node& node, std::chrono::milliseconds limit) {
-        ++missing_;
-        cles::call_options options;
-        options.at(node.endpoints.front()).deadline(limit).diagnostics(node.error);
-        const auto on_answer = [self = shared_from_this(), &node](boost::system::error_code code,
-                                                                  const cles::json_text& answer) {
-            if (!code) {
-                node.error.clear();
-                node.learn(answer.text);
-            } else if (node.error.empty()) {
-                node.error = code.message();
-            }
-            if (--self->missing_ == 0) {
-                self->ended_.cancel();
-            }
-        };
-        asker_.node().async_pull("self:cles", options, on_answer);
-    }
-
-    client& asker_;
-    std::vector<listed_node> nodes_;
-    asio::steady_timer ended_;
-    std::size_t missing_ = 0;
-};
-
-asio::awaitable<std::vector<listed_node>> find_nodes(client& asker, const ls_command& wanted) {
-    if (wanted.addresses.finds_by_name()) {
-        co_await asker.sleep_until(std::chrono::steady_clock::now() + wanted.wait);
-        co_return listed(asker.node().peers());
-    }
-    // Whom does that one know?
-    const auto options = asker.options_for("self:cles", wanted.timeout);
-    const cles::json_text itself = co_await asker.node().async_pull("self:cles", options);
-    const cles::json_text others = co_await asker.node().async_pull("self:cles/peers", options);
-    co_return listed(itself.text, others.text);
 }
 
 asio::awaitable<void> show(client& asker, const ls_command& wanted) {
-    auto nodes = co_await find_nodes(asker, wanted);
-    if (wanted.tasks) {
-        const auto query = std::make_shared<task_query>(asker, std::move(nodes));
-        co_await query->run(wanted.timeout.value_or(2s));
-        nodes = query->nodes();
+    const auto listen_until = std::chrono::steady_clock::now() + wanted.wait;
+    auto nodes = co_await find_nodes(asker, wanted.addresses, listen_until, wanted.timeout);
+    const bool is_anybody_there = !nodes.empty();
+    if (wanted.tasks || !wanted.offered.empty()) {
+        co_await learn_tasks(asker, nodes, wanted.timeout.value_or(2s));
+    }
+    if (!wanted.offered.empty()) {
+        std::erase_if(nodes, [&](const listed_node& node) { return !node.offers(wanted.offered); });
     }
     if (resolved(wanted.format) == output_format::table) {
         write_output(to_table(nodes, wanted.tasks));
     } else {
         printer{wanted.format, false}.print(to_json(nodes, wanted.tasks));
     }
-    if (nodes.empty()) {
+    if (!is_anybody_there) {
         note("nobody has announced itself on " + wanted.addresses.group().interface +
              "; --multicast says where else to listen");
+    }
+}
+
+void check_offered(const std::string& text) {
+    const auto colon = text.find(':');
+    if (!text.empty() && (!is_name(text.substr(colon == std::string::npos ? 0 : colon + 1)) ||
+                          (colon != std::string::npos && !cles::verb_from(text.substr(0, colon))))) {
+        throw usage_error("--offers '" + text + "': write TASK, or VERB:TASK as in delegate:primes");
     }
 }
 
@@ -124,17 +94,22 @@ void add_ls(CLI::App& app, context& shared) {
     auto wanted = std::make_shared<ls_command>();
     auto* command = app.add_subcommand("ls", "List the nodes that are there");
     command->add_flag("-l,--tasks", wanted->tasks, "Ask each node what it offers");
+    command->add_option("--offers", wanted->offered, "Only nodes that offer this task: TASK, or VERB:TASK")
+        ->type_name("TASK");
     add_duration(*command, "-w,--wait", wanted->wait, "How long to listen (default 350ms)");
     wanted->addresses.add_options(*command);
     add_timeout(*command, wanted->timeout, "2s");
     add_output_option(*command, wanted->format);
-    command->footer("With --at it lists the nodes that the node there knows, and itself.\n\n"
+    command->footer("LOAD is running/workers, and +N where so many pieces of work wait.\n"
+                    "With --at it lists the nodes that the node there knows, and itself.\n\n"
                     "Examples:\n"
                     "  cles ls\n"
                     "  cles ls -l -m eth0\n"
+                    "  cles ls --offers delegate:primes\n"
                     "  cles ls -w 3s -o json | jq -r '.peers[].node'\n"
                     "  cles ls --at tcp://10.0.0.7");
     command->callback([wanted, &shared] {
+        check_offered(wanted->offered);
         if (!wanted->addresses.finds_by_name() && !wanted->addresses.has_url()) {
             throw usage_error("without multicast nobody is heard: say where with --multicast IFACE, or ask a node "
                               "whom it knows with --at URL");

@@ -3,6 +3,7 @@
 
 #include "bench.hpp"
 #include "commands.hpp"
+#include "complete.hpp"
 #include "context.hpp"
 #include "diagnostics.hpp"
 #include "exit_code.hpp"
@@ -15,6 +16,7 @@
 #include <csignal>
 #include <exception>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace {
@@ -69,10 +71,16 @@ int main(int argc, char** argv) {
         tool::add_hz(app, shared);
         tool::add_info(app, shared);
         tool::add_ls(app, shared);
+        tool::add_top(app, shared);
+        tool::add_doctor(app, shared);
+        tool::add_completion(app, shared);
         tool::add_serve(app, shared);
 #ifdef CLES_WITH_BENCH
         tool::add_bench(app, shared.exit_code);
 #endif
+        if (argc > 1 && std::string_view{argv[1]} == "__complete") {
+            return tool::complete(app, {argv + 2, argv + argc});
+        }
         return run(app, shared, argc, argv);
     } catch (...) {
         return tool::report_failure(std::current_exception());

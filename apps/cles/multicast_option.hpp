@@ -23,6 +23,9 @@ class multicast_option {
     /// \throws usage_error where it makes no sense
     [[nodiscard]] cles::multicast_options where() const;
 
+    /// As if `off` had been given.
+    void turn_off() { given_ = "off"; }
+
   private:
     std::string given_;
 };

@@ -3,7 +3,7 @@
 
 #include "protocol/grammar.hpp"
 #include "protocol/message.hpp"
-#include "protocol/parts.hpp"
+#include "shell/command.hpp"
 #include "shell/engine.hpp"
 #include "shell/feed_handle.hpp"
 #include "shell/group_feed_handle.hpp"
@@ -27,19 +27,6 @@ asio::any_io_executor one_at_a_time(asio::any_io_executor executor) {
         return asio::make_strand(executor);
     }
     return executor;
-}
-
-// What a command says beside its deadline would have to be ignored: the library writes the adverbs itself.
-std::string foreign_adverb(std::string_view command) {
-    protocol::part_reader parts{command};
-    parts.next(); // verb
-    parts.next(); // noun
-    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
-        if (!part.starts_with("deadline=") && part != "urgent=yes") {
-            return "of the adverbs only 'deadline' and 'urgent' can be given here, not " + protocol::quoted(part);
-        }
-    }
-    return {};
 }
 
 } // namespace
@@ -67,11 +54,20 @@ std::string service::listen(std::string_view url) { return engine_->listen(url);
 
 void service::set_peer(std::string_view name, std::string_view url) { engine_->routes().set_peer(name, url); }
 
+void service::leave() {
+    engine_->neighbours().leave();
+    engine_->settle();
+}
+
+void service::set_gossip(const gossip_options& how) { engine_->neighbours().gossip(how); }
+
 std::vector<peer> service::peers() const { return engine_->node().others.list(engine_->now()); }
 
 void service::stop() { engine_->stop(); }
 
 void service::add(registration task) { engine_->add(std::move(task)); }
+
+publisher service::make_publisher() { return publisher{engine_->outside_updates()}; }
 
 void service::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
     engine_->publish(noun, write);
@@ -88,32 +84,7 @@ std::uint64_t service::send(const detail::outgoing& request, const call_options&
 
 std::uint64_t service::send_command(std::string_view command, const call_options& options,
                                     detail::pending_ptr operation) {
-    protocol::request_line parsed;
-    protocol::malformed_request wrong;
-    std::string why;
-    if (!protocol::parse_request(command, parsed, wrong)) {
-        why = wrong.why;
-    } else if (parsed.is_update()) {
-        why = "an update with 'seq' and 'epoch' is not a request";
-    } else if (parsed.verb == verb::bind) {
-        why = "a binding is made by async_bind";
-    } else if (!parsed.body.empty()) {
-        is_valid_json(parsed.body, engine_->bounds().depth, &why);
-    }
-    if (why.empty()) {
-        why = foreign_adverb(command);
-    }
-    if (!why.empty()) {
-        engine_->fail_later(std::move(operation), errc::bad_request, std::move(why));
-        return 0;
-    }
-    auto chosen = options;
-    if (chosen.deadline_.count() <= 0 && parsed.deadline_ms != protocol::default_deadline(parsed.verb)) {
-        chosen.deadline(std::chrono::milliseconds{parsed.deadline_ms});
-    }
-    chosen.urgent(chosen.urgent_ || parsed.urgent);
-    const auto noun = std::string{parsed.noun.target} + ":" + std::string{parsed.noun.path};
-    return engine_->send({parsed.verb, noun, parsed.body}, chosen, std::move(operation));
+    return shell::send_command(*engine_, command, options, std::move(operation));
 }
 
 void service::cancel(detail::engine& inside, std::uint64_t ticket) { inside.cancel(ticket); }
@@ -129,7 +100,8 @@ std::shared_ptr<detail::feed_control> service::make_feed(std::string_view noun, 
     }
     std::string scratch;
     const std::string path{protocol::canonical_path(parts, scratch)};
-    if (options.multicast_ || (parts.target == "all" && options.at_.empty())) {
+    const bool routes = engine_->node().way != nullptr; // then `all` is bound by links, through this service itself
+    if (options.multicast_ || (parts.target == "all" && options.at_.empty() && !routes)) {
         return shell::make_group_feed(engine_, parts, path, options);
     }
     auto made =

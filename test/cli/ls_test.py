@@ -8,7 +8,7 @@ import signal
 import socket
 import unittest
 
-from support import PATIENCE, Node, cles, environment, read_line, start, wait_until
+from support import PATIENCE, Node, cles, environment, finish, read_line, start, wait_until
 
 
 def told(process, text):
@@ -82,8 +82,8 @@ class Found(Group):
 
     def test_ls_as_a_table(self):
         lines = self.ok("ls", "-o", "table").splitlines()
-        self.assertEqual(lines[0].split(), ["NODE", "STATE", "HEARD", "ENDPOINTS"])
-        self.assertRegex(lines[1], rf"^car1  live   .* ago +{self.nodes[0].url} {self.nodes[0].unix}$")
+        self.assertEqual(lines[0].split(), ["NODE", "STATE", "LOAD", "HEARD", "ENDPOINTS"])
+        self.assertRegex(lines[1], rf"^car1  live +0 +.* ago +{self.nodes[0].url} {self.nodes[0].unix}$")
         self.assertEqual(len(lines), 3)
 
     def test_ls_with_tasks(self):
@@ -92,10 +92,30 @@ class Found(Group):
         table = self.ok("ls", "-l", "-o", "table")
         self.assertIn("localization (PULL BIND)", table.splitlines()[1])
 
+    def test_ls_shows_load(self):
+        working = start("delegate", "car1:sleep/60000", "-t", "60s", env=ENVIRONMENT)
+        try:
+            wait_until(lambda: self.peers()[0]["load"]["running"] == 1, "car1 tells of its work")
+            self.assertRegex(self.ok("ls", "-o", "table").splitlines()[1], r"^car1  live +1 ")
+        finally:
+            working.send_signal(signal.SIGINT)
+            self.assertEqual(finish(working)[0], 130)
+
+    def test_ls_of_who_offers_a_task(self):
+        for task in ("localization", "pull:localization", "BIND:localization"):
+            self.assertEqual([p["node"] for p in self.peers("--offers", task)], ["car1", "car2"])
+        peers = self.peers("--offers", "echo", "-l")
+        self.assertIn("tasks", peers[0])
+        self.assertNotIn("tasks", self.peers("--offers", "echo")[0])
+        for task in ("primes", "push:localization"):  # nobody does, which is no reason to say that nobody is there
+            self.assertEqual(self.peers("--offers", task), [])
+
     def test_a_node_tells_whom_it_knows(self):
         wait_until(lambda: len(self.peers("--at", self.nodes[0].url)) == 2, "car1 hears of car2")
         peers = self.peers("--at", self.nodes[0].url)
         self.assertEqual([p["node"] for p in peers], ["car1", "car2"])
+        for peer in peers:
+            self.assertEqual(peer["load"]["queued"], 0)
         self.assertEqual(json.loads(self.ok("pull", "car1:cles/peers"))["peers"][0]["node"], "car2")
 
     def test_nobody_of_that_name(self):

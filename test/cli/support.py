@@ -194,8 +194,9 @@ def id_of(line):
     return found.group(1) + " " if found else ""
 
 
-def on_terminal(*arguments, env=None, interrupt_after=None):
-    """Runs the command on a terminal of its own; gives exit code and all it showed."""
+def on_terminal(*arguments, env=None, interrupt_after=None, keys=b"\x03"):
+    """Runs the command on a terminal of its own; gives exit code and all it showed. After it has shown
+    `interrupt_after`, the keys are pressed."""
     pid, terminal = pty.fork()
     if pid == 0:
         os.execve(shutil.which(CLES) or CLES, [CLES, *arguments], env or environment())
@@ -213,7 +214,7 @@ def on_terminal(*arguments, env=None, interrupt_after=None):
             shown += data
         if interrupt_after is not None and interrupt_after in shown:
             interrupt_after = None
-            os.write(terminal, b"\x03")
+            os.write(terminal, keys)
     else:
         os.kill(pid, signal.SIGKILL)
         os.waitpid(pid, 0)

@@ -7,7 +7,8 @@ import unittest
 
 from support import cles, environment
 
-COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "ls", "serve")
+COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "ls", "top", "doctor", "completion",
+            "serve")
 
 
 class Usage(unittest.TestCase):
@@ -73,6 +74,15 @@ class Usage(unittest.TestCase):
         self.refused("bind", "car1:a", "--keep", "0", says="--keep")
         self.refused("bind", "car1:a", "--every", "x", says="no time")
         self.refused("hz", "car1:a", "-w", "0", says="--window")
+
+    def test_top(self):
+        self.refused("top", "-i", "50ms", says="too short")
+        self.refused("top", "--sort", "size", says="size")
+        self.refused("top", says="--multicast IFACE")
+
+    def test_tasks(self):
+        for text in ("a b", "fly:echo", "pull:", ":echo", "pull:a:b"):
+            self.refused("ls", "--offers", text, says="VERB:TASK")
 
     def test_forms_of_output(self):
         self.refused("pull", "car1:a", "-o", "xml", says="xml")

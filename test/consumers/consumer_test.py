@@ -11,6 +11,7 @@ import argparse
 import os
 import re
 import shutil
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -79,6 +80,28 @@ def check_links(pages: Path) -> int:
     return count
 
 
+def check_daemon(consumer: Consumer, clesd: Path) -> None:
+    """The installed daemon finds and loads the installed plugins by their names alone."""
+    if not clesd.exists():  # it was not built, and nothing of it is there
+        expect(not list(clesd.parents[1].rglob("libcles-*.so")), "there are plugins without a daemon")
+        return
+    config = consumer.scratch / "clesd.yaml"
+    config.write_text("listen: tcp://127.0.0.1:0\nmulticast: off\nplugins: [libcles-system.so, libcles-primes.so]\n")
+    daemon = subprocess.Popen([clesd, "--config", config], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        port = re.search(r"listening on tcp://127\.0\.0\.1:(\d+)", daemon.stdout.readline())
+        expect(port is not None, "clesd does not start")
+        with socket.create_connection(("127.0.0.1", int(port[1])), 20) as link:
+            link.sendall(b"PULL self:prime/97\n")
+            expect(link.makefile().readline() == '{"value":true}\n', "clesd does not compute")
+        daemon.terminate()
+        _, log = daemon.communicate(timeout=20)
+    except (AssertionError, OSError, subprocess.TimeoutExpired) as failure:
+        daemon.kill()
+        raise AssertionError(f"{failure}; it logged\n{daemon.communicate()[1]}") from None
+    expect(daemon.returncode == 0 and "plugin system" in log, f"clesd ended with {daemon.returncode}:\n{log}")
+
+
 def install(consumer: Consumer) -> None:
     prefix = consumer.install()
     source = consumer.options.source
@@ -86,6 +109,12 @@ def install(consumer: Consumer) -> None:
         name = public.relative_to(source / "libcles")
         expect((prefix / name).read_bytes() == public.read_bytes(), f"{name} is not installed as it is")
     expect(consumer.run(prefix / "bin" / "cles", "--version") == f"cles {consumer.options.version}\n", "cles --version")
+    check_daemon(consumer, prefix / "bin" / "clesd")
+
+    for name, place in (("cles.bash", "bash-completion/completions/cles"), ("_cles", "zsh/site-functions/_cles"),
+                        ("cles.fish", "fish/vendor_completions.d/cles.fish")):
+        expect((prefix / "share" / place).read_bytes() == (source / "apps" / "completion" / name).read_bytes(),
+               f"{name} is not where its shell looks")
 
     pages = prefix / "share" / "doc" / "cles"
     expect("Boost Software License" in (pages / "LICENSE").read_text(), "the licence is not that of Boost")

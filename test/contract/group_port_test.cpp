@@ -6,13 +6,16 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/multicast.hpp>
+#include <boost/asio/strand.hpp>
 #include <boost/system/system_error.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <deque>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -35,9 +38,14 @@ struct member final : cles::transport::group_events {
     }
     ~member() { port->close(); }
 
-    void on_datagram(const udp::endpoint& from, std::string_view datagram) override {
-        heard.emplace_back(datagram);
-        sources.push_back(from);
+    void on_datagram(const cles::transport::group_datagram& datagram) override {
+        heard.emplace_back(datagram.text);
+        sources.push_back(datagram.from);
+        said.push_back(datagram.said != nullptr);
+        if (throw_at_next) {
+            throw_at_next = false;
+            throw std::runtime_error("a handler's");
+        }
         if (close_at_next) {
             port->close();
         }
@@ -48,8 +56,10 @@ struct member final : cles::transport::group_events {
     std::shared_ptr<cles::transport::group_port> port;
     std::vector<std::string> heard;
     std::vector<udp::endpoint> sources;
+    std::deque<bool> said;
     int batches = 0;
     bool close_at_next = false;
+    bool throw_at_next = false;
 };
 
 struct fixture {
@@ -66,9 +76,35 @@ BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixtu
     run_until(io, [&] { return one.heard.size() == 1 && two.heard.size() == 1; });
     BOOST_TEST(two.heard[0] == "BIND all:x\n");
     BOOST_TEST((two.sources[0] == one.port->source()));
-    BOOST_TEST((one.sources[0] == one.port->source()));
     BOOST_TEST((one.port->source() != two.port->source()));
     BOOST_TEST(one.port->source().address().is_loopback());
+    BOOST_TEST(two.said[0]);
+    one.port->send("garbage\n");
+    run_until(io, [&] { return two.heard.size() == 2; });
+    BOOST_TEST(!two.said[1]);
+}
+
+BOOST_FIXTURE_TEST_CASE(who_is_alone_on_its_executor_does_not_hear_itself, fixture) {
+    member one{io, where};
+    asio::io_context elsewhere;
+    member two{elsewhere, where};
+    one.port->send("1\n");
+    two.port->send("2\n");
+    run_until(elsewhere, [&] { return two.heard.size() == 1; });
+    run_until(io, [&] { return one.heard.size() == 1; });
+    run_ready(elsewhere);
+    BOOST_TEST(one.heard[0] == "2\n");
+    BOOST_TEST(two.heard.size() == 1U);
+    { // two of them share what they hear, and what one sends the other hears
+        member three{io, where};
+        one.port->send("3\n");
+        run_until(io, [&] { return three.heard.size() == 1; });
+    }
+    one.heard.clear();
+    one.port->send("4\n");
+    two.port->send("5\n");
+    run_until(io, [&] { return !one.heard.empty(); });
+    BOOST_TEST(one.heard[0] == "5\n");
 }
 
 BOOST_FIXTURE_TEST_CASE(the_shared_port_serves_the_group_alone, fixture) {
@@ -79,9 +115,10 @@ BOOST_FIXTURE_TEST_CASE(the_shared_port_serves_the_group_alone, fixture) {
     auto other_group = where;
     other_group.group = "239.255.25.38";
     member stranger{io, other_group};
+    member neighbour{io, other_group};
     stranger.port->send("to another group\n");
     two.port->send("to the group\n");
-    run_until(io, [&] { return !one.heard.empty() && !stranger.heard.empty(); });
+    run_until(io, [&] { return !one.heard.empty() && !neighbour.heard.empty(); });
     run_ready(io);
     BOOST_TEST(one.heard == std::vector<std::string>{"to the group\n"}, boost::test_tools::per_element());
 }
@@ -109,6 +146,56 @@ BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_hears_hears_no_more, fixtu
     run_ready(io);
     BOOST_TEST(two.heard.size() == 1U);
     BOOST_TEST(two.port->send("into the void\n"));
+}
+
+BOOST_FIXTURE_TEST_CASE(what_one_member_throws_keeps_nothing_from_the_others, fixture) {
+    member one{io, where};
+    member two{io, where};
+    one.throw_at_next = true;
+    two.port->send("1\n");
+    two.port->send("2\n");
+    int thrown = 0;
+    asio::io_context idle;
+    run_until(idle, [&] {
+        try {
+            io.restart();
+            io.poll();
+        } catch (const std::runtime_error&) {
+            ++thrown;
+        }
+        return one.heard.size() == 2 && two.heard.size() == 2;
+    });
+    BOOST_TEST(thrown == 1);
+    BOOST_TEST(one.heard == (std::vector<std::string>{"1\n", "2\n"}), boost::test_tools::per_element());
+    BOOST_TEST(two.heard == one.heard, boost::test_tools::per_element());
+}
+
+BOOST_FIXTURE_TEST_CASE(the_others_hear_on_when_one_of_them_leaves_and_one_that_comes_back_does_too, fixture) {
+    member one{io, where};
+    { const member passing{io, where}; }
+    member two{io, where};
+    one.port->send("1\n");
+    run_until(io, [&] { return one.heard.size() == 1 && two.heard.size() == 1; });
+    one.port->close();
+    two.port->close();
+    member three{io, where};
+    member four{io, where};
+    three.port->send("2\n");
+    run_until(io, [&] { return four.heard.size() == 1; });
+    BOOST_TEST(one.heard.size() == 1U);
+}
+
+BOOST_FIXTURE_TEST_CASE(members_of_one_executor_share_a_socket_and_those_of_others_do_not, fixture) {
+    using cles::transport::group_receiver;
+    const auto by = cles::transport::find_interface("lo");
+    const udp::endpoint group{asio::ip::make_address_v4(where.group), where.port};
+    const udp::endpoint other_group{asio::ip::make_address_v4("239.255.25.38"), where.port};
+    asio::io_context elsewhere;
+    const auto receiver = group_receiver::of(io.get_executor(), by, group);
+    BOOST_TEST((group_receiver::of(io.get_executor(), by, group) == receiver));
+    BOOST_TEST((group_receiver::of(io.get_executor(), by, other_group) != receiver));
+    BOOST_TEST((group_receiver::of(elsewhere.get_executor(), by, group) != receiver));
+    BOOST_TEST((group_receiver::of(asio::make_strand(io), by, group) != receiver));
 }
 
 BOOST_FIXTURE_TEST_CASE(datagrams_go_out_with_a_TTL_of_1, fixture) {

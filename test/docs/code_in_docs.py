@@ -11,8 +11,8 @@ from pathlib import Path
 from page import blocks_of
 
 COMPILED = {
-    "cpp": ("apps/examples/*.cpp", "test/docs/*.cpp"),
-    "cmake": ("test/consumers/*/CMakeLists.txt",),
+    "cpp": ("apps/examples/*.cpp", "apps/examples/*/*.?pp", "plugins/template/*.cpp", "test/docs/*.cpp"),
+    "cmake": ("test/consumers/*/CMakeLists.txt", "plugins/template/CMakeLists.txt"),
 }
 
 

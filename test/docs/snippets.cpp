@@ -31,6 +31,14 @@ bool only_look(const cles::access& asked) { return asked.verb == cles::verb::pul
 void a_service();
 void an_open_service();
 void a_service_in_a_group();
+void a_hub(asio::io_context& io);
+struct own_pool {
+    std::uint32_t waiting = 0;
+    std::uint32_t busy = 0;
+};
+void a_load(cles::service_options& options, const own_pool& pool);
+std::string plan_a_way(position there);
+void a_task_to_repeat(cles::registrar& tasks);
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
 asio::awaitable<void> asking(cles::service& car);
 asio::awaitable<void> finding(asio::io_context& io);
@@ -91,6 +99,14 @@ asio::awaitable<void> finding(asio::io_context& io) {
     std::cout << speed;
 }
 
+void finding_by_seeds(asio::io_context& io) {
+    cles::service meeting_point{io, {.name = "base", .listen = {"tcp://127.0.0.1:0"}, .gossip = cles::gossip()}};
+    cles::service scout{io,
+                        {.name = "scout",
+                         .listen = {"tcp://127.0.0.1:0"},
+                         .gossip = cles::gossip({meeting_point.endpoints().front()})}};
+}
+
 asio::awaitable<void> errors(cles::service& car) {
     try {
         co_await car.async_pull<double>("car0:altitude");
@@ -120,6 +136,21 @@ asio::awaitable<void> feeds_of_all(cles::service& car) {
     auto one = co_await car.async_bind<position>("car0:position", cles::bind_options{}.multicast());
     const auto event = co_await all.async_next();
     std::cout << event.publisher << " is at " << event.value.lat << '\n';
+}
+
+void a_hub(asio::io_context& io) {
+    cles::service hub{io, {.name = "hub", .listen = {"tcp://127.0.0.1:25370"}, .routing = cles::routing()}};
+    hub.set_peer("car1", "tcp://127.0.0.1:25371");
+}
+
+void a_load(cles::service_options& options, const own_pool& pool) {
+    options.load = [&pool] {
+        return cles::node_load{.queued = pool.waiting, .running = pool.busy, .workers = 4, .service_us = 1'500};
+    };
+}
+
+void a_task_to_repeat(cles::registrar& tasks) {
+    tasks.on_delegate("plan", plan_a_way, {.description = "A way there", .idempotent = true});
 }
 
 void blocking(cles::service& me) {

@@ -9,6 +9,7 @@
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
 
+#include <boost/asio/post.hpp>
 #include <boost/test/data/monomorphic.hpp>
 #include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
@@ -16,6 +17,7 @@
 #include <algorithm>
 #include <chrono>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -24,6 +26,7 @@ BOOST_AUTO_TEST_SUITE(backpressure)
 using namespace cles::test;
 using namespace std::chrono_literals;
 using cles::errc;
+using cles::feed_event;
 
 constexpr std::array carriers{carrier::tcp4, carrier::unix_file, carrier::inproc};
 
@@ -115,6 +118,127 @@ BOOST_DATA_TEST_CASE(async_update_ends_with_its_service_and_goes_on_without_a_lo
     car.reset();
     run_until(io, [&] { return second.code.failed(); });
     BOOST_TEST(second.code == errc::stopped);
+}
+
+// Many at once go on in one turn.
+BOOST_AUTO_TEST_CASE(who_publishes_holds_up_nobody_who_publishes_too) {
+    boost::asio::io_context io;
+    cles::service car{io, listening("car1", carrier::inproc)};
+    std::vector<std::unique_ptr<steady_publisher>> all;
+    for (int i = 0; i < 30; ++i) {
+        all.push_back(std::make_unique<steady_publisher>(car, i == 0 ? 1'000'000 : 20));
+        all.back()->go();
+    }
+    bool other_ran = false;
+    boost::asio::post(io, [&] { other_ran = true; });
+    run_until(io, [&] { return std::all_of(all.begin() + 1, all.end(), [](const auto& p) { return p->done == 20; }); });
+    BOOST_TEST(other_ran);
+    BOOST_TEST(all[0]->done < 1000);
+    BOOST_TEST(metric(car, "updates_published") >= 29U * 20U);
+    car.stop();
+    run_until(io, [&] { return all[0]->code.failed(); });
+    BOOST_TEST(all[0]->code == errc::stopped);
+}
+
+BOOST_AUTO_TEST_CASE(a_publisher_that_throws_ends_the_turn_and_no_other_publisher) {
+    boost::asio::io_context io;
+    cles::service car{io, listening("car1", carrier::inproc)};
+    int ends = 0;
+    for (int i = 0; i < 3; ++i) {
+        car.async_update("place", i, [&](boost::system::error_code failed) {
+            BOOST_TEST(!failed);
+            if (++ends == 2) {
+                throw std::runtime_error("a handler's");
+            }
+        });
+    }
+    BOOST_TEST(ends == 0); // never from inside the call
+    BOOST_CHECK_THROW(run_until(io, [&] { return ends == 3; }), std::runtime_error);
+    BOOST_TEST(ends == 2);
+    run_until(io, [&] { return ends == 3; });
+}
+
+// Both wait, and go on as long as they can.
+BOOST_DATA_TEST_CASE(a_lost_binder_sets_no_two_publishers_on_each_other, every_socket, kind) {
+    boost::asio::io_context io;
+    cles::service car{io, listening("car1", kind)};
+    car.on_bind("place");
+    scripted_peer peer{io, car.endpoints().front(), buffers::small};
+    peer.ask("BIND self:place keep=1");
+    const std::string padding(50000, '.');
+    steady_publisher one{car, 1'000'000, padding};
+    steady_publisher other{car, 1'000'000, padding};
+    one.go();
+    other.go();
+    run_ready(io);
+    const int before = one.done;
+    bool other_ran = false;
+    peer.reset();
+    run_until(io, [&] { return one.done > before; });
+    boost::asio::post(io, [&] { other_ran = true; });
+    run_until(io, [&] { return other_ran; });
+    BOOST_TEST(one.done < 10'000);
+    car.stop();
+    run_until(io, [&] { return one.code.failed() && other.code.failed(); });
+}
+
+BOOST_DATA_TEST_CASE(a_publisher_that_waited_may_throw_an_error_of_ours, every_socket, kind) {
+    boost::asio::io_context io;
+    cles::service car{io, listening("car1", kind)};
+    car.on_bind("place");
+    scripted_peer peer{io, car.endpoints().front(), buffers::small};
+    peer.ask("BIND self:place keep=1");
+    steady_publisher filling{car, 300, std::string(50000, '.')};
+    filling.go();
+    run_ready(io);
+    BOOST_TEST(filling.done < 300);
+    car.async_update("place", 1, [&](boost::system::error_code) { car.update("no such noun", 1); });
+    peer.reset();
+    BOOST_CHECK_THROW(run_until(io, [&] { return filling.done == 300; }), cles::error);
+    run_until(io, [&] { return filling.done == 300; });
+}
+
+BOOST_AUTO_TEST_CASE(publishers_of_a_noun_go_on_in_their_order) {
+    boost::asio::io_context io;
+    cles::service car{io, listening("car1", carrier::tcp4)};
+    cles::service tower{io, knowing("tower", car)};
+    car.on_bind("place");
+    feed_log feed;
+    feed.bind(tower, "car1:place", cles::bind_options{}.keep(24));
+    run_until(io, [&] { return feed.bound; });
+    std::vector<int> order;
+    for (int i = 0; i < 60; ++i) {
+        car.async_update("place", i, [&order, i](boost::system::error_code) { order.push_back(i); });
+    }
+    run_until(io, [&] { return order.size() == 60 && feed.items.size() == 60; });
+    BOOST_TEST(std::is_sorted(order.begin(), order.end()));
+    BOOST_TEST(feed.missed() == 0U);
+}
+
+BOOST_DATA_TEST_CASE(the_last_update_goes_out_before_the_service_ends, every_socket, kind) {
+    boost::asio::io_context io;
+    cles::service car{io, listening("car1", kind)};
+    cles::service tower{io, knowing("tower", car)};
+    car.on_bind("place");
+    feed_log feed;
+    feed.bind(tower, "car1:place");
+    run_until(io, [&] { return feed.bound; });
+    car.update("place", 7);
+    car.stop();
+    run_until(io, [&] { return feed.count(feed_event::update) == 1; });
+}
+
+BOOST_AUTO_TEST_CASE(what_was_published_before_the_end_was_published) {
+    boost::asio::io_context io;
+    cles::service car{io, listening("car1", carrier::inproc)};
+    int good = 0;
+    for (int i = 0; i < 3; ++i) {
+        car.async_update("place", i, [&](boost::system::error_code failed) {
+            good += failed ? 0 : 1;
+            car.stop();
+        });
+    }
+    run_until(io, [&] { return good == 3; });
 }
 
 BOOST_DATA_TEST_CASE(a_slow_binder_harms_nobody_and_gets_the_newest, every_socket, kind) {

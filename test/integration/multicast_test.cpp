@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Bindings by multicast, over loopback; test/cli/multicast_test.py does it between hosts.
 
+#include <cles/convert.hpp>
 #include <cles/service.hpp>
 
 #include "support/feed_log.hpp"
@@ -8,6 +9,7 @@
 #include "support/run_until.hpp"
 #include "transport/group_port.hpp"
 
+#include <boost/describe/class.hpp>
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
@@ -19,9 +21,50 @@
 #include <utility>
 #include <vector>
 
+namespace multicast_types {
+
+struct place {
+    int x = 0;
+};
+BOOST_DESCRIBE_STRUCT(place, (), (x))
+
+/// Can be moved, and not copied.
+struct leg {
+    leg() = default;
+    leg(leg&&) = default;
+    leg& operator=(leg&&) = default;
+    int length = 0;
+};
+BOOST_DESCRIBE_STRUCT(leg, (), (length))
+
+struct route {
+    std::vector<leg> legs{};
+};
+BOOST_DESCRIBE_STRUCT(route, (), (legs))
+
+/// Counts how often one is read.
+struct counted : place {
+    static inline int reads = 0;
+};
+
+} // namespace multicast_types
+
+template <>
+struct cles::converter<multicast_types::counted> {
+    static void write(json_writer& w, const multicast_types::counted& value) {
+        write_json(w, static_cast<const multicast_types::place&>(value));
+    }
+    static bool read(json_reader& r, multicast_types::counted& value) {
+        ++multicast_types::counted::reads;
+        return read_json(r, static_cast<multicast_types::place&>(value));
+    }
+};
+
 BOOST_AUTO_TEST_SUITE(multicast)
 
 using namespace cles::test;
+using multicast_types::counted;
+using multicast_types::route;
 using namespace std::chrono_literals;
 using cles::errc;
 using cles::feed_event;
@@ -43,9 +86,7 @@ struct stranger final : cles::transport::group_events {
         port->start(*this);
     }
     ~stranger() { port->close(); }
-    void on_datagram(const boost::asio::ip::udp::endpoint&, std::string_view datagram) override {
-        heard.emplace_back(datagram);
-    }
+    void on_datagram(const cles::transport::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
     void on_batch() override {}
     void on_room() override {}
     void say(std::string_view line) { port->send(line); }
@@ -141,6 +182,69 @@ BOOST_FIXTURE_TEST_CASE(one_datagram_serves_eight_binders, network) {
     BOOST_TEST(sniffer.count("UPDATE") == 5U);
     BOOST_TEST(metric(*car, "group_sent") == 6U); // and BIND all:cles at its start
     BOOST_TEST(metric(*towers[0], "updates_received") == 5U);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_type_reads_a_datagram_once_for_all_its_feeds, network) {
+    const auto car = node("car1");
+    std::vector<std::unique_ptr<cles::service>> towers;
+    std::vector<cles::feed<counted>> feeds;
+    std::vector<int> heard;
+    int refused = 0;
+    for (int i = 0; i < 3; ++i) {
+        towers.push_back(node("tower" + std::to_string(i)));
+        towers.back()->async_bind<counted>(
+            "car1:place", by_group,
+            [&](boost::system::error_code, cles::feed<counted> f) { feeds.push_back(std::move(f)); });
+    }
+    const auto plain = node("plain");
+    feed_log text;
+    until_bound(text, *plain, "car1:place", by_group);
+    run_until(io, [&] { return feeds.size() == 3 && metric(*car, "group_leases") == 4; });
+    const auto publish = [&](const auto& value, std::size_t so_far) {
+        for (auto& f : feeds) {
+            f.async_next([&](boost::system::error_code failed, const cles::feed_item<counted>& item) {
+                refused += failed == errc::conversion ? 1 : 0;
+                heard.push_back(item.value.x);
+            });
+        }
+        run_ready(io);
+        counted::reads = 0;
+        car->update("place", value);
+        run_until(io, [&] { return heard.size() == 3 && text.items.size() == so_far; });
+    };
+    publish(counted{{7}}, 1);
+    BOOST_TEST(heard == (std::vector<int>{7, 7, 7}), boost::test_tools::per_element());
+    BOOST_TEST(counted::reads == 1);
+    heard.clear();
+    publish(counted{{8}}, 2); // what was read before is forgotten
+    BOOST_TEST(heard == (std::vector<int>{8, 8, 8}), boost::test_tools::per_element());
+    BOOST_TEST(text.items[1].value.text == R"({"x":8})");
+    heard.clear();
+    publish(std::string{"eight"}, 3); // and what cannot be read is refused by each
+    BOOST_TEST(refused == 3);
+}
+
+// What a copy might share, or what cannot be copied, each feed reads for itself.
+BOOST_FIXTURE_TEST_CASE(other_types_are_read_by_each_feed, network) {
+    const auto car = node("car1");
+    const auto tower1 = node("tower1");
+    const auto tower2 = node("tower2");
+    std::vector<cles::feed<route>> feeds;
+    for (auto* tower : {tower1.get(), tower2.get()}) {
+        tower->async_bind<route>("car1:route", by_group, [&](boost::system::error_code, cles::feed<route> f) {
+            feeds.push_back(std::move(f));
+        });
+    }
+    run_until(io, [&] { return feeds.size() == 2 && metric(*car, "group_leases") == 2; });
+    std::size_t legs = 0;
+    for (auto& f : feeds) {
+        f.async_next(
+            [&](boost::system::error_code, const cles::feed_item<route>& item) { legs += item.value.legs.size(); });
+    }
+    route three;
+    three.legs.resize(3);
+    car->update("route", three);
+    run_until(io, [&] { return legs == 6; });
 }
 
 BOOST_FIXTURE_TEST_CASE(the_last_value_of_one_node_comes_at_once, network) {

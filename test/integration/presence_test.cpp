@@ -295,6 +295,36 @@ BOOST_FIXTURE_TEST_CASE(a_stopped_node_is_known_no_more, fixture) {
     BOOST_TEST((pulled(asker, "car1:who").code == errc::no_target));
 }
 
+BOOST_FIXTURE_TEST_CASE(one_that_leaves_is_known_no_more_and_still_answers_and_asks, fixture) {
+    const auto car1 = serving("car1");
+    auto options = in_group("asker");
+    options.listen = {"tcp://127.0.0.1:0"};
+    cles::service asker{here, std::move(options)};
+    asker.on_pull("who", [] { return "asker"; });
+    until([&] { return knows(asker, "car1") && knows(*car1, "asker"); });
+    car1->leave();
+    until([&] { return !knows(asker, "car1"); });
+
+    std::string answer;
+    const auto there_itself = cles::call_options{}.at(car1->endpoints().front());
+    asker.async_pull("self:who", there_itself, [&](auto, const cles::json_text& reply) { answer = reply.text; });
+    const auto onward = pull(*car1, "asker:who");
+    until([&] { return !answer.empty() && onward->ended; });
+    BOOST_TEST(answer == R"({"value":"car1"})");
+    BOOST_TEST(onward->text == R"({"value":"asker"})");
+
+    // However it is asked, it does not say that it is there.
+    const auto before = announcements_sent(*car1);
+    speaker somebody{here, where};
+    somebody.say("BIND car1:cles");
+    somebody.say("BIND all:cles");
+    somebody.announce("last", R"({"endpoints":["tcp://127.0.0.1:9"]})");
+    until([&] { return knows(*car1, "last"); });
+    BOOST_TEST(announcements_sent(*car1) == before);
+    car1->stop();
+    BOOST_TEST(!knows(asker, "car1"));
+}
+
 BOOST_FIXTURE_TEST_CASE(a_silent_node_is_suspect_and_then_gone, fixture) {
     cles::service asker{here, in_group("asker")};
     speaker car1{here, where};

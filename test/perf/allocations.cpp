@@ -18,8 +18,7 @@
 #include <sys/prctl.h>
 #include <sys/wait.h>
 
-// --- Counting
-// ----------------------------------------------------------------------------------------------------------
+// --- Counting --------------------------------------------------------------------------------------------------------
 
 // glibc's own names, below the ones that are replaced here. `operator new` comes by `malloc` too.
 extern "C" {
@@ -54,8 +53,7 @@ void* aligned_alloc(std::size_t alignment, std::size_t size) {
 
 namespace {
 
-// --- The service
-// -------------------------------------------------------------------------------------------------------
+// --- The service -----------------------------------------------------------------------------------------------------
 
 struct localization {
     double utc = 1'700'000'000.5;
@@ -114,8 +112,7 @@ std::uint64_t allocations_of(const char* listen, const std::function<void(const 
     return after - before;
 }
 
-// --- The clients
-// -------------------------------------------------------------------------------------------------------
+// --- The clients -----------------------------------------------------------------------------------------------------
 
 void one_by_one(const std::string& url, const std::function<std::string(std::uint64_t)>& request) {
     scripted_client client{url};

@@ -6,6 +6,7 @@
 """
 
 import json
+import os
 import re
 import socket
 import subprocess
@@ -66,6 +67,10 @@ def main(program: str) -> int:
     libraries = linked_libraries(program)
     foreign = [name for name in libraries if not ALLOWED.search(name)]
     expect(not foreign, f"links {' '.join(libraries)}" + (f": foreign are {' '.join(foreign)}" if foreign else ""))
+
+    # Until it is on the disk, all of a file that was just linked counts as written.
+    with open(program, "rb") as file:
+        os.fsync(file.fileno())
 
     # Private is what the process has written and no other can share. Its clean pages are the page cache's copy of the
     # program's file, which all who run it share and the kernel may take back; how many it maps differs from run to run.

@@ -186,7 +186,7 @@ class Texts:
             self.check_words(name, lines)
             if name.endswith(".md"):
                 self.check_links(name, text)
-            if re.match(r"test/(unit|golden|simulation|contract|integration)/\w+_test\.cpp$", name):
+            if re.match(r"test/(unit|golden|simulation|contract|integration|runtime)/\w+_test\.cpp$", name):
                 self.check_suite(name, text)
         return self.violations
 

@@ -222,7 +222,7 @@ void asking::ask(const order& o) {
          .to = o.to,
          .what = o.what,
          .by = o.by,
-         .deadline = n->now() + milliseconds{o.deadline},
+         .deadline = world_.time().now() + milliseconds{o.deadline},
          .may_fail = o.what == work && o.end == fails,
          .vital = o.vital};
     core::outbound::progress_function progress;
@@ -230,7 +230,8 @@ void asking::ask(const order& o) {
         progress = [this, op = o.op](double fraction, std::string_view json) { on_progress(op, fraction, json); };
     }
     n->run([&] {
-        a.id = n->ask(o.to, o.by, {.verb = task.verb, .noun = noun, .body = body, .deadline = a.deadline},
+        a.id = n->ask(o.to, o.by,
+                      {.verb = task.verb, .noun = noun, .body = body, .deadline = n->now() + milliseconds{o.deadline}},
                       detail::pending_ptr{new answer{*this, o.op}}, std::move(progress));
     });
 }

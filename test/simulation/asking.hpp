@@ -47,7 +47,7 @@ class asking final : public part {
         unsigned what = 0;
         carrier by = carrier::stream;
         std::uint64_t id = 0;
-        time_point deadline{};
+        time_point deadline{};  // by the network's clock
         bool may_fail = false;  // the handler was told to
         bool withdrawn = false; // by its requester
         bool vital = false;     // has to succeed

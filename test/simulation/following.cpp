@@ -21,9 +21,9 @@ std::string path_of(unsigned noun) {
 }
 
 /// The end of an offer to publish.
-class offered final : public detail::pending {
+class offered_update final : public detail::pending {
   public:
-    explicit offered(std::size_t& open) : open_(open) { ++open_; }
+    explicit offered_update(std::size_t& open) : open_(open) { ++open_; }
     verdict offer(std::string_view) override {
         delete this;
         return verdict::completed;
@@ -32,7 +32,7 @@ class offered final : public detail::pending {
     void discard() noexcept override { delete this; }
 
   private:
-    ~offered() { --open_; }
+    ~offered_update() { --open_; }
     std::size_t& open_;
 };
 
@@ -125,11 +125,9 @@ void following::offer(unsigned host, unsigned count, std::size_t size) {
     }
     n->run([&] {
         for (; count != 0; --count) {
-            detail::pending_ptr operation{new offered{offers_}};
+            detail::pending_ptr operation{new offered_update{offers_}};
             const auto text = body(host, when_there_is_room, size);
-            if (n->node()->published.publish_when_room(path_of(when_there_is_room), text, operation)) {
-                operation.release()->offer("{}");
-            }
+            n->node()->published.publish_when_room(path_of(when_there_is_room), text, operation);
             ++published_[host][when_there_is_room];
         }
     });

@@ -29,6 +29,9 @@ class following final : public part {
     void wind_down() override;
     void judge_rest() override;
 
+    /// How much the present run of a host has published of a noun.
+    [[nodiscard]] std::uint64_t count(unsigned host, unsigned noun) const { return published_[host][noun]; }
+
   private:
     static constexpr std::size_t own_nouns = 3; ///< that a node publishes by itself; the last one when there is room
 

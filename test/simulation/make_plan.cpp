@@ -17,9 +17,16 @@ class planner {
         for (auto count = chance_.below(8); count != 0; --count) {
             follow();
         }
+        for (auto count = plan_.group ? chance_.below(5) : 0; count != 0; --count) {
+            gather();
+        }
     }
     void add(std::uint32_t at) {
         at_ = at;
+        if (plan_.group && chance_.chance(100)) {
+            in_the_group();
+            return;
+        }
         const auto pick = chance_.below(1000);
         if (pick < 430) {
             ask();
@@ -76,6 +83,22 @@ class planner {
                          chance_.chance(500) ? 0 : chance_.below(60), chance_.below(1'000'000), chance_.below(3),
                          chance_.chance(300) ? chance_.between(20, 2000) : 0});
     }
+    void in_the_group() {
+        const auto a = host();
+        switch (chance_.below(7)) {
+        case 0: put(deed::namesake, {a, chance_.between(300, 9000), chance_.below(2)}); break;
+        case 1: put(deed::depart, {a, chance_.between(1, 6000)}); break;
+        case 2: put(deed::freeze, {a, chance_.between(1000, 20'000)}); break;
+        case 3: put(deed::mute, {a, other(a), chance_.between(100, 20'000)}); break;
+        case 4: put(deed::jump, {a, chance_.between(10, 20'000)}); break;
+        default: gather();
+        }
+    }
+    void gather() {
+        const auto from = host();
+        put(deed::gather, {++feed_, from, other(from), chance_.below(2), chance_.below(2),
+                           chance_.chance(200) ? chance_.between(1, 120) : 0});
+    }
     void trouble() {
         switch (chance_.below(8)) {
         case 0: put(deed::crash, {host(), chance_.between(1, 3000)}); break;
@@ -111,7 +134,13 @@ plan make_plan(std::uint64_t seed, unsigned actions) {
            .hosts = chance.between(2, 4),
            .small_limits = chance.chance(700),
            .strangers = chance.chance(250)};
-    const auto pace = chance.chance(500) ? chance.between(2, 20) : chance.between(20, 150);
+    auto pace = chance.chance(500) ? chance.between(2, 20) : chance.between(20, 150);
+    // Of its own, so that the plans of all others are the same with and without.
+    dice group{~seed};
+    p.group = group.chance(250);
+    if (p.group) { // what is known of others takes seconds
+        pace = group.between(20, 150);
+    }
     planner think{chance, p};
     think.begin();
     std::uint32_t at = 0;

@@ -5,6 +5,7 @@
 
 #include "protocol/datagram.hpp"
 #include "simulation/datagram_port.hpp"
+#include "simulation/group_port.hpp"
 #include "simulation/stream_half.hpp"
 
 #include <algorithm>
@@ -12,9 +13,8 @@
 namespace cles::simulation {
 namespace {
 
-std::pair<unsigned, unsigned> both(unsigned a, unsigned b) { return std::minmax(a, b); }
-
 constexpr std::chrono::microseconds much_later{400'000};
+constexpr unsigned group_lane = 1U << 16U; // so that what the group carries changes nothing of what else is carried
 
 } // namespace
 
@@ -25,7 +25,12 @@ std::string to_string(const endpoint& where) {
 // -- the weather ---------------------------------------------------------------------------------------------------
 
 void network::part(unsigned a, unsigned b, time_point until) {
-    auto& held = parted_[both(a, b)];
+    mute(a, b, until);
+    mute(b, a, until);
+}
+
+void network::mute(unsigned from, unsigned to, time_point until) {
+    auto& held = parted_[{from, to}];
     held = std::max(held, until);
 }
 
@@ -34,12 +39,13 @@ void network::calm() {
     if (fault_ != planted::partition_stays) {
         parted_.clear();
     } else if (!parted_.empty()) {
-        parted_.begin()->second = time_point::max();
+        const auto [a, b] = parted_.begin()->first;
+        part(a, b, time_point::max());
     }
 }
 
-bool network::reaches(unsigned a, unsigned b) const {
-    const auto held = parted_.find(both(a, b));
+bool network::reaches(unsigned from, unsigned to) const {
+    const auto held = parted_.find({from, to});
     return held == parted_.end() || held->second <= time_.now();
 }
 
@@ -50,7 +56,7 @@ dice& network::chance_between(unsigned from, unsigned to) {
 time_point network::arrival(unsigned from, unsigned to) {
     auto& chance = chance_between(from, to);
     const auto way = weather_.least + chance.within(weather_.spread);
-    const auto held = parted_.find(both(from, to));
+    const auto held = parted_.find({from, to});
     auto leaves = time_.now();
     if (held != parted_.end() && held->second > leaves) {
         if (held->second == time_point::max()) {
@@ -101,7 +107,7 @@ void network::join(const std::shared_ptr<place>& from, endpoint to, const limits
     const auto found = doors_.find(to);
     const auto at = found == doors_.end() ? nullptr : found->second.at.lock();
     if (!at) {
-        from->at(back, [done] { done(make_error_code(errc::unavailable), nullptr); });
+        from->at_true(back, [done] { done(make_error_code(errc::unavailable), nullptr); });
         return;
     }
     const auto [near, far] = stream_half::make(*this, from, bounds, at, found->second.bounds);
@@ -109,7 +115,7 @@ void network::join(const std::shared_ptr<place>& from, endpoint to, const limits
     streams_.push_back({near, {from->host(), to.host}});
     at->run([arrived = found->second.arrived, far = far] { arrived(far); });
     const auto too_late = time_.now() + bounds.connect;
-    from->at(std::min(back, too_late), [done, near = near, too_late, back] {
+    from->at_true(std::min(back, too_late), [done, near = near, too_late, back] {
         if (!near->is_open() || back > too_late) {
             near->close();
             done(make_error_code(errc::unavailable), nullptr);
@@ -134,14 +140,52 @@ void network::cut(unsigned host, unsigned which) {
 // -- datagrams -----------------------------------------------------------------------------------------------------
 
 void network::send(const endpoint& from, const endpoint& to, std::string_view datagram) {
+    inspect(from, datagram);
+    carry(from.host, to.host, chance_between(from.host, to.host), datagram,
+          [&](const std::string& bytes, std::chrono::microseconds after, bool copy) {
+              auto source = from;
+              if (copy && fault_ == planted::source_swapped) {
+                  source.port += 500;
+              }
+              deliver(source, to, bytes, after);
+          });
+}
+
+void network::join(const std::shared_ptr<group_port>& port) {
+    std::erase_if(group_, [](const auto& each) { return each.expired(); });
+    group_.push_back(port);
+}
+
+void network::multicast(const endpoint& from, std::string_view datagram) {
+    inspect(from, datagram);
+    for (const auto& weak : group_) {
+        const auto port = weak.lock();
+        if (!port) {
+            continue;
+        }
+        const auto to = port->local().host;
+        carry(from.host, to, chance_between(from.host + group_lane, to), datagram,
+              [&](const std::string& bytes, std::chrono::microseconds after, bool) {
+                  time_.at(time_.now() + after, [weak, from, bytes] {
+                      if (const auto there = weak.lock()) {
+                          there->receive(from, bytes);
+                      }
+                  });
+              });
+    }
+}
+
+void network::inspect(const endpoint& from, std::string_view datagram) {
     ++datagrams_;
     if (datagram.size() > protocol::datagram_bytes || !datagram.ends_with('\n') ||
         protocol::has_many_lines(datagram.substr(0, datagram.size() - 1))) {
         watcher_.broken(rule::well_formed, "a datagram of " + std::to_string(datagram.size()) + " bytes from " +
                                                to_string(from) + ": " + std::string{datagram.substr(0, 80)});
     }
-    auto& chance = chance_between(from.host, to.host);
-    if (!reaches(from.host, to.host) || chance.chance(weather_.lost)) {
+}
+
+void network::carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver) {
+    if (!reaches(from, to) || chance.chance(weather_.lost)) {
         watcher_.saw("net", "loses", datagram);
         return;
     }
@@ -156,13 +200,9 @@ void network::send(const endpoint& from, const endpoint& to, std::string_view da
         }
         return span;
     };
-    deliver(from, to, bytes, way());
+    deliver(bytes, way(), false);
     if (chance.chance(weather_.doubled)) {
-        auto source = from;
-        if (fault_ == planted::source_swapped) {
-            source.port += 500;
-        }
-        deliver(source, to, bytes, way());
+        deliver(bytes, way(), true);
     }
 }
 

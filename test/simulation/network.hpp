@@ -24,6 +24,7 @@ namespace cles::simulation {
 
 class stream_half;
 class datagram_port;
+class group_port;
 
 /// An address and port.
 struct endpoint {
@@ -57,9 +58,11 @@ class network {
     void set(const weather& now) noexcept { weather_ = now; }
     /// Two hosts do not reach each other: datagrams are lost, streams wait.
     void part(unsigned a, unsigned b, time_point until);
+    /// Nothing that one sends reaches the other one, which is heard well.
+    void mute(unsigned from, unsigned to, time_point until);
     /// Nothing is in the way any more.
     void calm();
-    [[nodiscard]] bool reaches(unsigned a, unsigned b) const;
+    [[nodiscard]] bool reaches(unsigned from, unsigned to) const;
     /// When bytes of a stream that leave now are there, if nothing went before them.
     time_point arrival(unsigned from, unsigned to);
     /// Each direction has a chance of its own, so that less of what happens is changed by what else happens.
@@ -80,6 +83,9 @@ class network {
 
     void open(const endpoint& where, const std::shared_ptr<datagram_port>& port) { ports_[where] = port; }
     void send(const endpoint& from, const endpoint& to, std::string_view datagram);
+    void join(const std::shared_ptr<group_port>& port);
+    /// To all who have joined; each copy has a fate of its own.
+    void multicast(const endpoint& from, std::string_view datagram);
     /// Nobody listens at the host any more.
     void close_doors(unsigned host);
 
@@ -94,6 +100,9 @@ class network {
         on_link arrived;
     };
 
+    using delivery = std::function<void(const std::string& datagram, std::chrono::microseconds after, bool copy)>;
+    void inspect(const endpoint& from, std::string_view datagram);
+    void carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver);
     void deliver(const endpoint& from, const endpoint& to, const std::string& datagram,
                  std::chrono::microseconds after);
     void join(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, const on_dialled& done);
@@ -104,9 +113,10 @@ class network {
     std::map<std::pair<unsigned, unsigned>, dice> chances_;
     planted fault_;
     weather weather_;
-    std::map<std::pair<unsigned, unsigned>, time_point> parted_;
+    std::map<std::pair<unsigned, unsigned>, time_point> parted_; // from and to
     std::map<endpoint, door> doors_;
     std::map<endpoint, std::weak_ptr<datagram_port>> ports_;
+    std::vector<std::weak_ptr<group_port>> group_;
     std::vector<std::pair<std::weak_ptr<stream_half>, std::pair<unsigned, unsigned>>> streams_;
     std::uint64_t datagrams_ = 0;
 };

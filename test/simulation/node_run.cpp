@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/node_run.hpp"
 
+#include "protocol/message.hpp"
 #include "simulation/datagram_port.hpp"
 
 #include <algorithm>
@@ -10,7 +11,7 @@ namespace cles::simulation {
 
 node_run::node_run(network& net, unsigned host, unsigned run, core::node_setup setup)
     : place(net.time(), host, setup.name), net_(net), run_(run),
-      node_(std::make_shared<core::node>(std::move(setup), net.time(), [this] { ask_for_turn(); })) {}
+      node_(std::make_shared<core::node>(std::move(setup), *this, [this] { ask_for_turn(); })) {}
 
 node_run::~node_run() = default;
 
@@ -22,6 +23,14 @@ void node_run::start(bool strangers) {
     door_->open();
 }
 
+// One run in two sends from where the one before it did.
+void node_run::join_group(group_watch& judge) {
+    constexpr unsigned first_port = 40'000;
+    const auto port = std::make_shared<group_port>(net_, shared_from_this(), first_port + run_ / 2);
+    seat_ = std::make_unique<group_seat>(*this, port, judge, *protocol::parse_epoch(node_->epoch));
+    run([this] { seat_->start(); });
+}
+
 void node_run::crash() {
     watcher().saw(name(), "crashes");
     net_.close_doors(host());
@@ -29,6 +38,7 @@ void node_run::crash() {
         c->vanish();
     }
     to_flush_.clear();
+    seat_.reset();
 }
 
 // -- links ---------------------------------------------------------------------------------------------------------
@@ -99,6 +109,9 @@ void node_run::ask_for_turn() {
 }
 
 void node_run::turn() {
+    while (auto result = node_->published.next_result()) {
+        result->tell();
+    }
     if (node_->published.dirty()) {
         node_->published.drain(now());
     }
@@ -108,17 +121,27 @@ void node_run::turn() {
     }
 }
 
+// The timer goes off, if it is due by now; `follow_deadlines` comes next.
+void node_run::after_jump() {
+    ++timer_;
+    set_for_.reset();
+}
+
 void node_run::follow_deadlines() {
     const auto next = node_->deadlines.next();
     if (!next || (set_for_ && *set_for_ <= *next)) {
         return;
     }
     set_for_ = next;
+    absence_.expect(*next, now());
     constexpr std::chrono::milliseconds too_late{20};
     const auto off = fault() == planted::timer_late ? *next + too_late : *next;
     at(off, [this, mine = ++timer_] {
         if (mine == timer_) {
             set_for_.reset();
+            if (absence_.ended(now()) && fault() != planted::excuse_forgotten) {
+                node_->others.excuse(now());
+            }
             node_->deadlines.expire(now());
         }
     });
@@ -172,6 +195,13 @@ void node_run::check_bounds() {
     if (node_->counts.handlers_running > b.running) {
         complain(rule::bounded, "runs " + std::to_string(node_->counts.handlers_running) + " handlers");
     }
+    if (node_->others.size() > b.peers || node_->counts.group_leases > b.group_leases) {
+        complain(rule::bounded, "knows " + std::to_string(node_->others.size()) + " nodes and holds " +
+                                    std::to_string(node_->counts.group_leases) + " leases of the group");
+    }
+    if (seat_ && seat_->unsent() > group_port::most_waiting) {
+        complain(rule::bounded, "holds " + std::to_string(seat_->unsent()) + " bytes for the group");
+    }
     // What may be unread, what one turn answers beyond it, what runs, and updates, which come in pieces. What the node
     // asks by itself nobody bounds.
     constexpr std::size_t piece = 65536;
@@ -200,6 +230,9 @@ void node_run::check_rest() {
     expect_none(node_->deadlines.size(), "deadlines");
     expect_none(node_->remembered.used, "bytes remembered");
     expect_none(node_->counts.handlers_running, "handlers that run");
+    expect_none(node_->others.size(), "nodes that are known though all are silent");
+    expect_none(node_->counts.group_leases, "leases of the group");
+    expect_none(seat_ ? seat_->unsent() : 0, "bytes that wait for the group");
     for (const auto& c : open_) {
         expect_none(c->is_source() ? 1 : 0, "source that is kept");
         expect_none(c->session().serving().in_flight(), "requests in flight");

@@ -3,9 +3,12 @@
 
 #include <cles/link.hpp>
 
+#include "core/absence.hpp"
 #include "core/node.hpp"
 #include "simulation/connection.hpp"
 #include "simulation/feed_ties.hpp"
+#include "simulation/group_seat.hpp"
+#include "simulation/group_watch.hpp"
 #include "simulation/network.hpp"
 #include "simulation/place.hpp"
 #include "simulation/route.hpp"
@@ -32,6 +35,8 @@ class node_run final : public place {
 
     /// Listens. To be called once, when it is owned.
     void start(bool strangers);
+    /// Takes part in the multicast group. To be called once, when it is owned.
+    void join_group(group_watch& judge);
     /// Ends it as a crash does: nothing here hears of it, and the system closes what was open.
     void crash();
 
@@ -41,6 +46,8 @@ class node_run final : public place {
     [[nodiscard]] witness& watcher() noexcept { return net_.watcher(); }
     [[nodiscard]] planted fault() const noexcept { return net_.fault(); }
     [[nodiscard]] feed_ties& feeds() noexcept { return feeds_; }
+    /// Null where it takes no part in multicast.
+    [[nodiscard]] group_seat* seat() noexcept { return seat_.get(); }
     /// Which run of its host it is, from 1.
     [[nodiscard]] unsigned run_number() const noexcept { return run_; }
     [[nodiscard]] std::uint64_t draw_id() noexcept { return node_->next_id++; }
@@ -62,6 +69,7 @@ class node_run final : public place {
 
   private:
     void after() override { follow_deadlines(); }
+    void after_jump() override;
     void follow_deadlines();
     void ask_for_turn();
     void turn();
@@ -76,8 +84,10 @@ class node_run final : public place {
     std::map<std::pair<unsigned, carrier>, std::unique_ptr<route>> routes_;
     feed_ties feeds_{*this};
     std::shared_ptr<datagram_port> door_;
+    std::unique_ptr<group_seat> seat_;
     std::vector<std::shared_ptr<connection>> to_flush_;
     std::optional<time_point> set_for_;
+    core::absence absence_;
     std::uint64_t timer_ = 0; // the one that counts
     bool turn_asked_ = false;
 };

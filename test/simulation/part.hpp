@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "core/group_source.hpp"
+#include "core/presence.hpp"
 #include "simulation/plan.hpp"
+
+#include <string_view>
 
 namespace cles::simulation {
 
@@ -23,6 +27,12 @@ class part {
     virtual void on_start(node_run&) {}
     /// A node is about to be gone with all that it held.
     virtual void on_crash(node_run&) {}
+    /// What happens in the multicast group (group_watch.hpp).
+    virtual void on_group_heard(node_run&, const core::group_source&, std::string_view) {}
+    virtual void on_group_sent(node_run&, std::string_view) {}
+    virtual void on_neighbour(node_run&, std::string_view, core::presence::change) {}
+    /// The trouble is over, just now.
+    virtual void on_calm() {}
     /// The trouble is over, and was for a while: tries what has to work again; later it is judged whether it did.
     virtual void probe() {}
     virtual void judge_probe() {}

@@ -17,7 +17,7 @@ struct kind {
 };
 
 // In the order of `deed`. Times and lengths of time in milliseconds, sizes in bytes, chances of a thousand.
-constexpr std::array<kind, 13> kinds{{
+constexpr std::array<kind, 18> kinds{{
     {"ask", 10, {"op", "from", "to", "by", "what", "deadline", "size", "work", "steps", "end"}},
     {"cancel", 1, {"op"}},
     {"follow", 8, {"feed", "from", "to", "by", "noun", "every", "keep", "slow"}},
@@ -31,6 +31,11 @@ constexpr std::array<kind, 13> kinds{{
     {"part", 3, {"a", "b", "for"}},
     {"cut", 2, {"host", "which"}},
     {"weather", 5, {"lost", "doubled", "late", "least", "spread"}},
+    {"gather", 6, {"feed", "from", "to", "all", "noun", "slow"}},
+    {"namesake", 3, {"host", "for", "silent"}},
+    {"depart", 2, {"host", "down"}},
+    {"mute", 3, {"from", "to", "for"}},
+    {"jump", 2, {"host", "ahead"}},
 }};
 
 const kind& kind_of(deed what) noexcept { return kinds[static_cast<std::size_t>(what)]; }
@@ -91,7 +96,8 @@ std::uint32_t action::operator[](std::string_view field) const {
 
 std::string to_text(const plan& p) {
     std::string text = "seed " + std::to_string(p.seed) + "\nhosts " + std::to_string(p.hosts) + "\nlimits " +
-                       (p.small_limits ? "small" : "default") + "\nstrangers " + (p.strangers ? "yes" : "no") + "\n";
+                       (p.small_limits ? "small" : "default") + "\nstrangers " + (p.strangers ? "yes" : "no") +
+                       "\ngroup " + (p.group ? "yes" : "no") + "\n";
     for (const auto& a : p.actions) {
         text.append(std::to_string(a.at_ms)).append(" ").append(to_string(a.what));
         for (std::size_t i = 0; i < fields_of(a.what).size(); ++i) {
@@ -122,6 +128,8 @@ plan plan_from(std::string_view text) {
                 p.small_limits = rest == "small";
             } else if (first == "strangers") {
                 p.strangers = rest == "yes";
+            } else if (first == "group") {
+                p.group = rest == "yes";
             } else {
                 p.actions.push_back(action_from(first, rest));
             }

@@ -26,6 +26,11 @@ enum class deed : std::uint8_t {
     part,
     cut,
     weather,
+    gather,
+    namesake,
+    depart,
+    mute,
+    jump,
 };
 
 /// The numbers that a deed has, by name.
@@ -51,6 +56,7 @@ struct plan {
     unsigned hosts = 3;
     bool small_limits = true; ///< so that they are reached
     bool strangers = false;   ///< sources of datagrams are sent little
+    bool group = false;       ///< nodes take part in multicast
     std::vector<action> actions{};
 
     bool operator==(const plan&) const = default;

@@ -57,6 +57,23 @@ BOOST_AUTO_TEST_CASE(a_way_that_stays_closed) { finds(sim::planted::partition_st
 BOOST_AUTO_TEST_CASE(a_feed_that_is_not_bound_again) {
     finds(sim::planted::rebind_forgotten, sim::rule::feeds_receive);
 }
+BOOST_AUTO_TEST_CASE(a_node_that_announces_itself_no_more) {
+    finds(sim::planted::announcements_end, sim::rule::others_known);
+}
+BOOST_AUTO_TEST_CASE(a_stop_that_is_not_noticed) { finds(sim::planted::excuse_forgotten, sim::rule::nobody_lost); }
+BOOST_AUTO_TEST_CASE(a_farewell_that_nobody_hears) { finds(sim::planted::farewell_unheard, sim::rule::gone_in_time); }
+BOOST_AUTO_TEST_CASE(a_clash_that_is_not_told) { finds(sim::planted::clash_kept, sim::rule::clashes_told); }
+BOOST_AUTO_TEST_CASE(an_update_that_comes_twice_by_the_group) {
+    finds(sim::planted::group_repeated, sim::rule::update_order);
+}
+BOOST_AUTO_TEST_CASE(a_gap_in_the_group_that_is_not_told) {
+    finds(sim::planted::group_gap_hidden, sim::rule::gaps_told);
+}
+BOOST_AUTO_TEST_CASE(a_lease_that_is_not_renewed) { finds(sim::planted::lease_lapses, sim::rule::feeds_receive); }
+BOOST_AUTO_TEST_CASE(an_update_that_is_sent_twice) { finds(sim::planted::group_sends_twice, sim::rule::sent_once); }
+BOOST_AUTO_TEST_CASE(a_last_update_that_is_not_repeated) {
+    finds(sim::planted::repeat_swallowed, sim::rule::first_soon);
+}
 BOOST_AUTO_TEST_CASE(chance_from_elsewhere) { finds(sim::planted::chance_leaks, sim::rule::same_trace); }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -24,14 +24,15 @@ std::shared_ptr<connection> route::free_for(const core::feed_machine& feed) cons
 
 void route::send(const request& r, detail::pending_ptr operation, core::outbound::progress_function progress) {
     if (const auto c = usable()) {
-        c->session().asking().send({.verb = r.verb, .noun = r.noun, .id = r.id, .body = r.body}, r.deadline,
-                                   node_.now(), std::move(operation), std::move(progress));
+        c->session().asking().send({.verb = r.verb, .noun = r.noun, .id = r.id, .adverbs = r.adverbs, .body = r.body},
+                                   r.deadline, node_.now(), std::move(operation), std::move(progress));
         return;
     }
     auto w = std::make_unique<waiting>(*this);
     w->verb = r.verb;
     w->noun = r.noun;
     w->body = r.body;
+    w->adverbs = r.adverbs;
     w->id = r.id;
     w->deadline = r.deadline;
     w->operation = std::move(operation);
@@ -113,8 +114,8 @@ void route::serve_waiting(const std::shared_ptr<connection>& c) {
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
         node_.node()->deadlines.disarm(w);
-        c->session().asking().send({.verb = w.verb, .noun = w.noun, .id = w.id, .body = w.body}, w.deadline,
-                                   node_.now(), std::move(w.operation), std::move(w.progress));
+        c->session().asking().send({.verb = w.verb, .noun = w.noun, .id = w.id, .adverbs = w.adverbs, .body = w.body},
+                                   w.deadline, node_.now(), std::move(w.operation), std::move(w.progress));
     }
     for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {
         auto& next = binders.front();

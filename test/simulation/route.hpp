@@ -36,6 +36,7 @@ class route {
         std::string_view body;
         std::uint64_t id = 0;
         time_point deadline{};
+        std::string_view adverbs{}; ///< further ones
     };
     void send(const request& r, detail::pending_ptr operation, core::outbound::progress_function progress);
     bool cancel(std::uint64_t id);
@@ -55,6 +56,7 @@ class route {
         cles::verb verb = verb::pull;
         std::string noun;
         std::string body;
+        std::string adverbs;
         std::uint64_t id = 0;
         time_point deadline{};
         detail::pending_ptr operation;

@@ -77,7 +77,9 @@ class shrinking {
     }
     // Nobody asks or follows himself.
     static bool is_sound(const action& a) {
-        return (a.what != deed::ask && a.what != deed::follow) || a["from"] != a["to"];
+        const bool between_two = a.what == deed::ask || a.what == deed::follow || a.what == deed::mute ||
+                                 (a.what == deed::gather && a["all"] == 0);
+        return !between_two || a["from"] != a["to"];
     }
 
     void drop_hosts() {

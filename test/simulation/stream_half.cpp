@@ -93,7 +93,7 @@ void stream_half::taken(std::size_t bytes) {
     peer->in_flight_ -= std::min(bytes, peer->in_flight_);
     if (const auto home = peer->home_.lock(); home && peer->blocked_) {
         peer->blocked_ = false;
-        home->at(net_.arrival(host_, peer_host_), [peer] { peer->write_rest(); });
+        home->at_true(net_.arrival(host_, peer_host_), [peer] { peer->write_rest(); });
     }
 }
 
@@ -238,7 +238,7 @@ void stream_half::transmit(std::string_view bytes) {
     const auto home = peer == nullptr ? nullptr : peer->home_.lock();
     if (home == nullptr) {
         if (const auto own = home_.lock()) {
-            own->at(net_.arrival(host_, peer_host_), [self = shared_from_this()] { self->arrive_reset(); });
+            own->at_true(net_.arrival(host_, peer_host_), [self = shared_from_this()] { self->arrive_reset(); });
         }
         return;
     }
@@ -248,7 +248,7 @@ void stream_half::transmit(std::string_view bytes) {
         const auto whole = static_cast<unsigned>(bytes.size());
         const auto size = chance.chance(150) ? 1 + chance.below(whole) : whole;
         const auto when = in_order(net_.arrival(host_, peer_host_));
-        home->at(when, [peer, piece = std::string{bytes.substr(0, size)}] { peer->arrive(piece); });
+        home->at_true(when, [peer, piece = std::string{bytes.substr(0, size)}] { peer->arrive(piece); });
         bytes.remove_prefix(size);
     }
 }
@@ -261,14 +261,14 @@ void stream_half::transmit_end() {
     net_.watcher().saw(name_, "==> end");
     const auto peer = peer_.lock();
     if (const auto home = peer == nullptr ? nullptr : peer->home_.lock()) {
-        home->at(in_order(net_.arrival(host_, peer_host_)), [peer] { peer->arrive_end(); });
+        home->at_true(in_order(net_.arrival(host_, peer_host_)), [peer] { peer->arrive_end(); });
     }
 }
 
 void stream_half::reset_peer() {
     const auto peer = peer_.lock();
     if (const auto home = peer == nullptr ? nullptr : peer->home_.lock()) {
-        home->at(net_.arrival(host_, peer_host_), [peer] { peer->arrive_reset(); });
+        home->at_true(net_.arrival(host_, peer_host_), [peer] { peer->arrive_reset(); });
     }
 }
 

@@ -33,7 +33,7 @@ class talker final : public place, public link_events {
     talker(network& net, unsigned host, dice style, manner how, const limits& bounds);
 
     void start();
-    /// The node that it talks to has crashed: what is open stays open.
+    /// The node that it talks to has crashed, and what is open stays open; or it may end the stream.
     void excuse() noexcept { excused_ = true; }
     [[nodiscard]] unsigned to() const noexcept { return how_.to; }
     /// What was to be answered has been, unless its stream was lost. Then it leaves.

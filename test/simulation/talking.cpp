@@ -12,6 +12,9 @@ void talking::perform(const action& a) {
     constexpr std::uint32_t first = 1'000'000; // above all that nodes ask
     constexpr std::uint32_t apart = 1000;
     constexpr unsigned hosts_of_clients = 100;
+    if (a.what == deed::jump) { // by its clock they have taken nothing for long
+        excuse(a["host"]);
+    }
     if (a.what != deed::talk || world_.node(a["to"]) == nullptr) {
         return;
     }
@@ -27,9 +30,11 @@ void talking::perform(const action& a) {
     made->start();
 }
 
-void talking::on_crash(node_run& n) {
+void talking::on_crash(node_run& n) { excuse(n.host()); }
+
+void talking::excuse(unsigned host) {
     for (const auto& t : talkers_) {
-        if (t->to() == n.host()) {
+        if (t->to() == host) {
             t->excuse();
         }
     }

@@ -23,6 +23,7 @@ class talking final : public part {
     void wind_down() override;
 
   private:
+    void excuse(unsigned host);
     world& world_;
     std::vector<std::shared_ptr<talker>> talkers_;
 };

@@ -28,6 +28,16 @@ void trouble::perform(const action& a) {
         world_.watcher().saw("net", "is parted");
         net.part(a["a"], a["b"], world_.time().now() + milliseconds{a["for"]});
         break;
+    case deed::mute:
+        world_.watcher().saw("net", "is parted one way");
+        net.mute(a["from"], a["to"], world_.time().now() + milliseconds{a["for"]});
+        break;
+    case deed::jump:
+        if (auto* n = world_.node(a["host"])) {
+            world_.watcher().saw(n->name(), "has its clock set");
+            n->jump(milliseconds{a["ahead"]});
+        }
+        break;
     case deed::cut: net.cut(a["host"], a["which"]); break;
     case deed::weather:
         world_.watcher().saw("net", "changes");

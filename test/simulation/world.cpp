@@ -3,6 +3,8 @@
 
 #include "simulation/asking.hpp"
 #include "simulation/following.hpp"
+#include "simulation/multicasting.hpp"
+#include "simulation/neighbouring.hpp"
 #include "simulation/talking.hpp"
 #include "simulation/trouble.hpp"
 
@@ -54,8 +56,12 @@ world::world(const plan& what, planted fault, witness::reader reader)
       nodes_(what.hosts), runs_(what.hosts) {
     watcher_.read_by(std::move(reader));
     parts_.push_back(std::make_unique<asking>(*this));
-    parts_.push_back(std::make_unique<following>(*this));
+    auto feeds = std::make_unique<following>(*this);
+    const auto& published = *feeds;
+    parts_.push_back(std::move(feeds));
+    parts_.push_back(std::make_unique<multicasting>(*this, published));
     parts_.push_back(std::make_unique<talking>(*this));
+    parts_.push_back(std::make_unique<neighbouring>(*this));
     parts_.push_back(std::make_unique<trouble>(*this));
 }
 
@@ -72,19 +78,42 @@ world::~world() {
     }
 }
 
+core::node_setup world::setup_of(const std::string& name) {
+    core::node_setup setup{.name = name};
+    setup.epoch = static_cast<std::uint32_t>(chance_.next());
+    setup.first_datagram_id = (chance_.next() & 0xFFFFFFFFU) << 20U;
+    if (plan_.small_limits) {
+        setup.bounds = small_limits();
+    }
+    return setup;
+}
+
 void world::start(unsigned host) {
     const auto run = ++runs_[host];
-    core::node_setup setup{.name = name_of(host),
-                           .epoch = static_cast<std::uint32_t>(chance_.next()),
-                           .first_datagram_id = (chance_.next() & 0xFFFFFFFFU) << 20U,
-                           .bounds = plan_.small_limits ? small_limits() : limits{}};
-    nodes_[host] = std::make_shared<node_run>(net_, host, run, std::move(setup));
+    nodes_[host] = std::make_shared<node_run>(net_, host, run, setup_of(name_of(host)));
     auto& n = *nodes_[host];
     watcher_.saw(n.name(), "starts", n.node()->epoch);
     for (const auto& p : parts_) {
         p->on_start(n);
     }
     n.start(plan_.strangers);
+    if (plan_.group) {
+        n.join_group(*this);
+    }
+}
+
+std::shared_ptr<node_run> world::begin_stranger(const std::string& name, unsigned host, unsigned run) {
+    auto n = std::make_shared<node_run>(net_, host, run, setup_of(name));
+    watcher_.saw(name, "has a namesake", n->node()->epoch);
+    n->join_group(*this);
+    return n;
+}
+
+void world::end_stranger(node_run& n) {
+    for (const auto& p : parts_) {
+        p->on_crash(n);
+    }
+    n.crash();
 }
 
 void world::crash(unsigned host, milliseconds down) {
@@ -105,6 +134,36 @@ void world::crash(unsigned host, milliseconds down) {
     });
 }
 
+void world::depart(unsigned host, milliseconds down) {
+    auto* n = node(host);
+    if (n == nullptr || n->frozen()) {
+        return;
+    }
+    if (n->seat() != nullptr) {
+        watcher_.saw(n->name(), "leaves");
+        n->run([n] { n->seat()->leave(); });
+    }
+    crash(host, down);
+}
+
+void world::on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) {
+    for (const auto& p : parts_) {
+        p->on_group_heard(at, from, datagram);
+    }
+}
+
+void world::on_group_sent(node_run& by, std::string_view line) {
+    for (const auto& p : parts_) {
+        p->on_group_sent(by, line);
+    }
+}
+
+void world::on_neighbour(node_run& at, std::string_view node, core::presence::change what) {
+    for (const auto& p : parts_) {
+        p->on_neighbour(at, node, what);
+    }
+}
+
 void world::collect(node_run& n) {
     for (const auto count : n.node()->counts.requests) {
         report_.requests += count;
@@ -120,6 +179,9 @@ void world::end_trouble() {
             start(host);
         }
         node(host)->thaw();
+    }
+    for (const auto& p : parts_) {
+        p->on_calm();
     }
 }
 

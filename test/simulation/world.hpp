@@ -3,6 +3,7 @@
 
 #include "simulation/agenda.hpp"
 #include "simulation/dice.hpp"
+#include "simulation/group_watch.hpp"
 #include "simulation/network.hpp"
 #include "simulation/node_run.hpp"
 #include "simulation/part.hpp"
@@ -33,7 +34,7 @@ struct report {
 };
 
 /// Nodes, what they do to each other, the network between them, and time. Lives through one plan.
-class world {
+class world final : private group_watch {
   public:
     explicit world(const plan& what, planted fault = planted::none, witness::reader reader = {});
     ~world();
@@ -52,12 +53,22 @@ class world {
     /// How many runs have begun there.
     [[nodiscard]] unsigned runs(unsigned host) const noexcept { return runs_[host]; }
     void crash(unsigned host, std::chrono::milliseconds down);
+    /// Ends the node there in order.
+    void depart(unsigned host, std::chrono::milliseconds down);
+    /// Begins a node that is none of the hosts', and takes part in the group alone.
+    std::shared_ptr<node_run> begin_stranger(const std::string& name, unsigned host, unsigned run);
+    void end_stranger(node_run& n);
+    [[nodiscard]] bool has_group() const noexcept { return plan_.group; }
 
   private:
     void start(unsigned host);
     void end_trouble();
     void pass(std::chrono::milliseconds time) { time_.run_until(time_.now() + time); }
     void collect(node_run& n);
+    [[nodiscard]] core::node_setup setup_of(const std::string& name);
+    void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override;
+    void on_group_sent(node_run& by, std::string_view line) override;
+    void on_neighbour(node_run& at, std::string_view node, core::presence::change what) override;
 
     const plan& plan_;
     planted fault_;

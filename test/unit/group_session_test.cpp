@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/group_session.hpp"
 #include "support/group_recorder.hpp"
+#include "support/hear.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/data/monomorphic.hpp>
@@ -34,7 +35,7 @@ class recording_presence final : public cles::core::group_presence {
 struct fixture {
     fixture() { session.attend(&presence); }
     void hear(std::string_view datagram, const group_source& from = other) {
-        session.on_datagram(from, datagram, node.clock.now());
+        cles::test::hear(session, from, datagram, node.clock.now());
     }
     /// Whether it was dropped.
     bool drops(std::string_view datagram) {
@@ -46,7 +47,7 @@ struct fixture {
     cles::test::test_node node;
     recording_presence presence;
     cles::test::group_recorder out;
-    cles::core::group_session session{*node.host, self, out, 1};
+    cles::core::group_session session{node.host, self, out, 1};
 };
 
 } // namespace
@@ -160,11 +161,11 @@ BOOST_AUTO_TEST_CASE(the_access_rules_are_asked_as_for_links) {
                                                      std::string{to_string(a.verb)} + " " + std::string{a.path});
                                      return a.task == "open";
                                  }};
-    cles::core::group_session guarded{*strict.host, self, out, 1};
+    cles::core::group_session guarded{strict.host, self, out, 1};
     recording_presence told;
     guarded.attend(&told);
     for (const auto* line : {"BIND all:open", "BIND all:secret/x", "BIND all:cles"}) {
-        guarded.on_datagram(other, line, strict.clock.now());
+        cles::test::hear(guarded, other, line, strict.clock.now());
     }
     BOOST_TEST(strict.counts().group_leases == 1U);
     BOOST_TEST(strict.counts().group_dropped == 2U);

@@ -11,6 +11,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -33,26 +34,27 @@ BOOST_FIXTURE_TEST_SUITE(node, fixture)
 
 BOOST_AUTO_TEST_SUITE(description)
 
-BOOST_AUTO_TEST_CASE(pull_self_cles_tells_name_version_protocol_epoch_uptime_endpoints_and_tasks) {
+BOOST_AUTO_TEST_CASE(pull_self_cles_tells_name_version_protocol_epoch_uptime_endpoints_tasks_and_load) {
     node.host->endpoints = {"tcp://127.0.0.1:25370", "unix:///run/car1.sock"};
     node.pass(1500ms);
     BOOST_TEST(link.ask("PULL self:cles id=7") ==
                "id=7 {\"node\":\"car1\",\"version\":\"" + std::string{cles::version} +
                    "\",\"protocol\":1,\"epoch\":\"5f3a09c1\",\"uptime_ms\":1500,"
                    "\"endpoints\":[\"tcp://127.0.0.1:25370\",\"unix:///run/car1.sock\"],"
-                   "\"tasks\":[]}\n");
+                   "\"tasks\":[],\"load\":{\"queued\":0,\"running\":0,\"workers\":0}}\n");
     BOOST_TEST(link.kind("PULL car1:cles") == "ok");
 }
 
-BOOST_AUTO_TEST_CASE(each_task_is_told_with_its_verb_and_where_there_are_such_description_and_parameters) {
+BOOST_AUTO_TEST_CASE(each_task_is_told_with_its_verb_and_what_else_is_known_of_it) {
     node.host->tasks.add(verb::pull, "speed",
                          {.info = {.description = "in \"m/s\"", .parameters = {"unit", "place"}},
                           .plain = [](const cles::request&, cles::json_writer&) {}});
-    node.on(verb::push, "speed", std::string{});
+    node.host->tasks.add(verb::push, "speed",
+                         {.info = {.idempotent = true}, .plain = [](const cles::request&, cles::json_writer&) {}});
     const auto tasks = boost::json::serialize(pull("self:cles").at("tasks"));
     BOOST_TEST(tasks == "[{\"verb\":\"PULL\",\"task\":\"speed\",\"description\":\"in "
                         "\\\"m/s\\\"\",\"parameters\":[\"unit\",\"place\"]},"
-                        "{\"verb\":\"PUSH\",\"task\":\"speed\"}]");
+                        "{\"verb\":\"PUSH\",\"task\":\"speed\",\"idempotent\":true}]");
 }
 
 BOOST_AUTO_TEST_CASE(what_can_be_bound_is_told_however_it_came_to_be) {
@@ -145,6 +147,21 @@ BOOST_AUTO_TEST_CASE(plain_handlers_are_sampled) {
     const auto samples = pull("self:cles/metrics").at("handler_us").at("samples").as_int64();
     BOOST_TEST(samples > 0);
     BOOST_TEST(samples < 100);
+}
+
+BOOST_AUTO_TEST_CASE(a_program_adds_its_own) {
+    cles::test::test_node counting;
+    counting.host = std::make_shared<cles::core::node>(cles::core::node_setup{.name = "car1",
+                                                                              .metrics =
+                                                                                  [](cles::json_writer& w) {
+                                                                                      w.key("pool");
+                                                                                      w.raw(R"({"admitted":3})");
+                                                                                  }},
+                                                       counting.clock, [] {});
+    cles::test::test_link to{counting};
+    const auto all = boost::json::parse(to.ask("PULL self:cles/metrics"));
+    BOOST_TEST(all.at("pool").at("admitted").as_int64() == 3);
+    BOOST_TEST(all.at("handler_us").at("samples").as_int64() >= 0);
 }
 
 BOOST_AUTO_TEST_CASE(the_uptime_is_told) {

@@ -10,11 +10,16 @@ namespace {
 
 using strings = std::vector<std::string>;
 
-constexpr cles::core::group_source loopback{0x7F000001, 40000};
-constexpr cles::core::group_source other_host{0x0A000007, 40000}; // 10.0.0.7
+using cles::core::teller;
 
-strings usable(const strings& announced, const cles::core::group_source& from) {
+const auto loopback = teller::of(cles::core::group_source{0x7F000001, 40000});
+const auto other_host = teller::of(cles::core::group_source{0x0A000007, 40000}); // 10.0.0.7
+
+strings usable(const strings& announced, const teller& from) {
     return cles::core::reachable_endpoints(announced, from);
+}
+strings passed_on(const strings& announced, const teller& from) {
+    return cles::core::endpoints_to_pass_on(announced, from);
 }
 
 void check(const strings& found, const strings& expected) {
@@ -88,6 +93,19 @@ BOOST_AUTO_TEST_CASE(addresses_of_both_kinds_are_taken) {
 
 BOOST_AUTO_TEST_CASE(a_scheme_of_later_days_comes_last) {
     check(usable({"quic://10.0.0.7:1", "udp://10.0.0.7:1"}, other_host), {"udp://10.0.0.7:1", "quic://10.0.0.7:1"});
+}
+
+BOOST_AUTO_TEST_CASE(an_unspecified_address_is_not_one_of_ipv4_where_the_teller_is_known_by_ipv6) {
+    const auto by_ipv6 = teller::at("tcp://[2001:db8::1]:25370");
+    check(usable({"tcp://0.0.0.0:1", "tcp://[::]:2"}, by_ipv6), {"tcp://[2001:db8::1]:2"});
+    check(usable({"tcp://0.0.0.0:1"}, teller{}), {});
+}
+
+BOOST_AUTO_TEST_CASE(what_is_passed_on_means_the_same_to_the_next_one) {
+    const strings all{"tcp://0.0.0.0:1", "tcp://127.0.0.1:2", "unix://@a", "inproc://a", "udp://10.0.0.9:3", "nothing"};
+    check(passed_on(all, other_host), {"tcp://10.0.0.7:1", "udp://10.0.0.9:3"});
+    // The next one puts this host's address in, or is on this host too.
+    check(passed_on(all, loopback), {"tcp://0.0.0.0:1", "tcp://127.0.0.1:2", "unix://@a", "udp://10.0.0.9:3"});
 }
 
 BOOST_AUTO_TEST_SUITE_END()

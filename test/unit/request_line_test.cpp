@@ -167,6 +167,8 @@ BOOST_AUTO_TEST_CASE(the_default_deadline_is_5_s_and_30_s_for_delegate) {
 }
 
 BOOST_AUTO_TEST_CASE(known_adverbs_are_taken_between_their_bounds) {
+    const std::string longest_since(64, 'x');
+    const std::string too_long_since(65, 'x');
     struct example {
         std::string_view verb_and_noun;
         std::string_view key;
@@ -195,6 +197,8 @@ BOOST_AUTO_TEST_CASE(known_adverbs_are_taken_between_their_bounds) {
          "epoch",
          {"00000000", "5f3a09c1", "ffffffff"},
          {"5F3A09C1", "5f3a09c", "5f3a09c11", "5f3a09cg"}},
+        {"PULL a:b", "since", {"0", "5f3a09c1.42", longest_since}, {too_long_since}},
+        {"PULL a:b", "describe", {"5f3a09c1", "5f3a09c1,00000000"}, {"5f3a09c1,", ",5f3a09c1", "5F3A09C1", "1", "x"}},
         {"PULL a:b", "via", {"car1", "car1,car2,x.y-z_0"}, {",", "car1,", ",car1", "car1,,car2", "c%r", "c~r"}},
     };
     for (const auto& e : examples) {
@@ -245,7 +249,7 @@ BOOST_AUTO_TEST_CASE(a_known_adverb_twice_is_refused) {
          {"PULL a:b id=7 id=7", "PULL a:b id=7 id=8", "PULL a:b deadline=1 deadline=1", "PUSH a:b reply=no reply=no",
           "PULL a:b hops=1 hops=2", "DELEGATE a:b progress=yes progress=yes", "BIND a:b lease=1 lease=1",
           "BIND a:b every=1 every=1", "BIND a:b keep=1 keep=1", "UPDATE a:b seq=1 seq=1 epoch=00000000",
-          "UPDATE a:b seq=1 epoch=00000000 epoch=00000000", "PULL a:b via=a via=b"}) {
+          "UPDATE a:b seq=1 epoch=00000000 epoch=00000000", "PULL a:b via=a via=b", "PULL a:b since=0 since=0"}) {
         BOOST_TEST(names(why(bad), "stands twice"), bad << " gives: " << why(bad));
     }
 }

@@ -53,27 +53,49 @@ class feed_control {
 
 /// False where the body is no JSON. What a type reads of it is checked by reading it.
 template <class T>
+bool read_body(const raw_event& event, T& value, boost::system::error_code& code, std::string& why) {
+    constexpr std::string_view what = "the update";
+    if constexpr (std::is_same_v<T, json_text>) {
+        value.text = event.body;
+        return event.has_json();
+    } else if constexpr (comes_wrapped<T>) {
+        wrapped<T> carrier{};
+        const auto verdict = read_result(event.body, carrier, code, why, what);
+        value = std::move(carrier.value);
+        return verdict == pending::verdict::completed;
+    } else {
+        return read_result(event.body, value, code, why, what) == pending::verdict::completed;
+    }
+}
+
+/// The same, for less where another feed of this type has read it.
+template <class T>
+bool read_shared_body(const raw_event& event, T& value, boost::system::error_code& code, std::string& why) {
+    if constexpr (shared_reading::keeps<T>) {
+        if (event.reading != nullptr) {
+            if (const T* known = event.reading->get<T>()) {
+                value = *known;
+                return true;
+            }
+            const bool is_json = read_body(event, value, code, why);
+            if (is_json && !code) {
+                event.reading->put(value);
+            }
+            return is_json;
+        }
+    }
+    return read_body(event, value, code, why);
+}
+
+/// False where the body is no JSON.
+template <class T>
 bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code& code, std::string& why) {
     item.kind = event.kind;
     item.publisher = event.publisher;
     item.seq = event.seq;
     item.missed = event.missed;
     item.text = event.text;
-    if (!item.has_value()) {
-        return true;
-    }
-    constexpr std::string_view what = "the update";
-    if constexpr (std::is_same_v<T, json_text>) {
-        item.value.text = event.body;
-        return event.has_json();
-    } else if constexpr (comes_wrapped<T>) {
-        wrapped<T> value{};
-        const auto verdict = read_result(event.body, value, code, why, what);
-        item.value = std::move(value.value);
-        return verdict == pending::verdict::completed;
-    } else {
-        return read_result(event.body, item.value, code, why, what) == pending::verdict::completed;
-    }
+    return !item.has_value() || read_shared_body(event, item.value, code, why);
 }
 
 template <class T, bool Throws, class Handler>

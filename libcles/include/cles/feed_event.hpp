@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/pending.hpp>
+#include <cles/shared_reading.hpp>
 
 #include <boost/system/error_code.hpp>
 
@@ -30,9 +31,20 @@ struct raw_event {
     std::uint64_t seq = 0;
     std::uint64_t missed = 0;
     std::string_view text{};
+    std::string_view line{};           ///< of an update that is not queued: all of it
+    shared_reading* reading = nullptr; ///< of the body, where other feeds are handed it too
 
     /// Whether the body is valid JSON; looked at only where that is not known.
-    [[nodiscard]] bool has_json() const { return checked || is_valid_answer(body); }
+    [[nodiscard]] bool has_json() const {
+        if (checked || (reading != nullptr && reading->is_json())) {
+            return true;
+        }
+        const bool found = is_valid_answer(body);
+        if (found && reading != nullptr) {
+            reading->found_json();
+        }
+        return found;
+    }
 };
 
 /// One call of `async_next` that waits.

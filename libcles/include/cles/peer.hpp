@@ -14,6 +14,8 @@ struct node_load {
     std::uint32_t queued = 0;  ///< work that waits
     std::uint32_t running = 0; ///< handlers that have not ended
     std::uint32_t workers = 0; ///< what it has for it; 0: no pool of workers
+    /// How long one piece of work takes, smoothed, in microseconds; 0: not known.
+    std::uint32_t service_us = 0;
 
     bool operator==(const node_load&) const = default;
 };
@@ -27,7 +29,8 @@ enum class peer_state : std::uint8_t {
 /// "live", "suspect", "clash"
 std::string_view to_string(peer_state state) noexcept;
 
-/// Another node, as it announced itself to the multicast group (docs/protocol.md, "Presence").
+/// Another node, as it announced itself to the multicast group, or as others tell of it (docs/protocol.md, "Presence"
+/// and "Gossip").
 struct peer {
     std::string node;
     std::vector<std::string> endpoints; ///< URLs, as they can be used from here; the first is where it is asked

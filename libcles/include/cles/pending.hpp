@@ -31,6 +31,11 @@ class pending {
     /// Offers the result's text. `malformed`: it is no JSON, and the operation goes on waiting.
     virtual verdict offer(std::string_view json) = 0;
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
+    /// The same where the peer itself said so; `answer` is the whole of what it said.
+    virtual void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) {
+        static_cast<void>(answer);
+        fail(code, message);
+    }
     /// Destroys it without calling its handler, as Asio does when an execution context goes.
     virtual void discard() noexcept = 0;
 

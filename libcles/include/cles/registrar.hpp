@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/publisher.hpp>
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
 #include <cles/task_info.hpp>
@@ -34,6 +35,7 @@ struct registration {
     task_info info{};
     plain_handler plain{};
     async_handler async{};
+    bool coroutine = false; ///< `async` runs a coroutine, and so needs the service's executor
 };
 
 namespace detail {
@@ -135,6 +137,7 @@ void set_handler(registration& to, F f) {
     if constexpr (shape::takes_responder) {
         to.async = std::move(f);
     } else if constexpr (awaited<result>::is_awaitable) {
+        to.coroutine = true;
         to.async = [f = std::make_shared<F>(std::move(f))](const request& r, responder answer) {
             auto signal = std::make_shared<boost::asio::cancellation_signal>();
             answer.on_stop([signal] { signal->emit(boost::asio::cancellation_type::terminal); });
@@ -164,6 +167,9 @@ void set_handler(registration& to, F f) {
 /// not fit is answered with `bad_request` before the handler runs. What a handler throws becomes the answer:
 /// `cles::error` with its code, anything else `failed`.
 ///
+/// In a plugin, handlers, those of BIND too, run on threads of a pool, several at once, unless the task is `inline_ok`;
+/// coroutines, which need the executor of an application, are refused there.
+///
 /// \throws cles::error from every function: `invalid_name`, `already_registered`
 class registrar {
   public:
@@ -173,6 +179,8 @@ class registrar {
     virtual ~registrar() = default;
 
     virtual void add(registration task) = 0;
+    /// For tasks that publish: what it returns may be kept, and used on any thread.
+    [[nodiscard]] virtual publisher make_publisher() = 0;
 
     template <class F>
     void on_pull(std::string_view task, F handler, task_info info = {}) {

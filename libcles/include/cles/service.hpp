@@ -4,6 +4,7 @@
 #include <cles/call_options.hpp>
 #include <cles/error.hpp>
 #include <cles/feed.hpp>
+#include <cles/gossip.hpp>
 #include <cles/identity.hpp>
 #include <cles/limits.hpp>
 #include <cles/log.hpp>
@@ -12,6 +13,7 @@
 #include <cles/pending.hpp>
 #include <cles/registrar.hpp>
 #include <cles/reply_operation.hpp>
+#include <cles/routing.hpp>
 #include <cles/short_text.hpp>
 
 #include <boost/asio/any_io_executor.hpp>
@@ -48,9 +50,20 @@ struct service_options {
     std::vector<std::string> networks{};
     /// Whether and where it takes part in multicast; beyond loopback only where it is `insecure` too.
     multicast_options multicast{};
+    /// Finds other nodes by asking, without multicast and beyond its reach, where it is `cles::gossip({seeds})`.
+    gossip_options gossip{};
+    /// Acts for its clients on `any:`, `all:` and the names of other nodes (docs/routing.md) where it is
+    /// `cles::routing()`. Without it these are answered `no_target`.
+    const detail::routing_part* routing = nullptr;
+    /// How much this node has to do, as it tells others and is weighed by for `any:`; called on the service's executor,
+    /// often, and so to be quick. Where it is empty: the handlers that have not answered, and no pool of workers.
+    std::function<node_load()> load{};
     cles::limits limits{};
     authoriser authorise{}; ///< nobody is refused where it is empty
     log_sink log{};
+    /// Adds what the program counts to the reply of `PULL self:cles/metrics`: called within its object, for keys and
+    /// values of other names. It must neither throw nor block.
+    std::function<void(json_writer&)> metrics{};
 };
 
 namespace detail {
@@ -104,14 +117,23 @@ class service : public registrar {
     std::string listen(std::string_view url);
     /// Says where a node is. An empty URL forgets it.
     void set_peer(std::string_view name, std::string_view url);
-    /// The other nodes that announce themselves to the multicast group, by name. Requests to them need no URL; what
-    /// `service_options::peers` and `set_peer` say goes first.
+    /// Takes part in gossip from now on, with these seeds instead of those that were given before.
+    /// \throws cles::error: `invalid_url`, `unknown_scheme`
+    void set_gossip(const gossip_options& how);
+    /// The other nodes that announce themselves to the multicast group, or of which others tell, by name. Requests to
+    /// them need no URL; what `service_options::peers` and `set_peer` say goes first.
     [[nodiscard]] std::vector<peer> peers() const;
+    /// Tells the others that this node leaves: they forget its name, and no `any:` or `all:` of theirs reaches it any
+    /// more. What is asked on links that are there, or at its URL, is answered as before, so that work can be brought
+    /// to its end before `stop`, which does this too. Repeating it does nothing.
+    void leave();
     /// Ends everything: listeners, links, feeds; operations fail with `stopped`, handlers that still run are told to
-    /// stop. Answers already given are sent first where the peer takes them at once. Repeating it does nothing.
+    /// stop. Answers already given and updates already published are sent first, where the peer takes them at once.
+    /// Repeating it does nothing.
     void stop();
 
     void add(registration task) override;
+    [[nodiscard]] publisher make_publisher() override;
 
     /// Publishes a value to all that are bound to the task (or to "task/parameter/..."), and keeps it as the last one.
     /// Opens the task for BIND. Never blocks: what a slow binder does not take in time is dropped for it, and it is
@@ -122,7 +144,8 @@ class service : public registrar {
         publish(noun, [&](json_writer& w) { write_json(w, value); });
     }
 
-    /// Publishes once every binder's queue has room, so that nothing is dropped: `void(error_code)`.
+    /// Publishes once every binder's queue has room, so that nothing is dropped: `void(error_code)`. It completes when
+    /// the update is in those queues, in the order of the calls.
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(

@@ -47,10 +47,11 @@ bool read_load(json_reader& r, node_load& out) {
     }
     std::string_view key;
     while (r.next_key(key)) {
-        const bool good = key == "queued"    ? read_count(r, out.queued)
-                          : key == "running" ? read_count(r, out.running)
-                          : key == "workers" ? read_count(r, out.workers)
-                                             : r.skip();
+        const bool good = key == "queued"       ? read_count(r, out.queued)
+                          : key == "running"    ? read_count(r, out.running)
+                          : key == "workers"    ? read_count(r, out.workers)
+                          : key == "service_us" ? read_count(r, out.service_us)
+                                                : r.skip();
         if (!good) {
             return false;
         }
@@ -75,7 +76,9 @@ bool read_digest(json_reader& r, std::string& out) {
     return out.size() <= longest_digest || r.fail("the digest has more than 64 bytes");
 }
 
-bool read_member(json_reader& r, std::string_view key, announcement& out) {
+} // namespace
+
+bool read_announcement_member(json_reader& r, std::string_view key, announcement& out) {
     if (key == "node") {
         return r.read(out.node);
     }
@@ -97,6 +100,8 @@ bool read_member(json_reader& r, std::string_view key, announcement& out) {
     return r.skip();
 }
 
+namespace {
+
 bool read_members(json_reader& r, announcement& out) {
     if (!r.begin_object()) {
         return false;
@@ -104,7 +109,7 @@ bool read_members(json_reader& r, announcement& out) {
     std::string_view key;
     while (r.next_key(key)) {
         const std::string name{key};
-        if (!read_member(r, name, out)) {
+        if (!read_announcement_member(r, name, out)) {
             r.inside_member(name);
             return false;
         }
@@ -146,6 +151,10 @@ void write_load(json_writer& w, const node_load& load) {
     w.value(std::uint64_t{load.running});
     w.plain_key("workers");
     w.value(std::uint64_t{load.workers});
+    if (load.service_us != 0) {
+        w.plain_key("service_us");
+        w.value(std::uint64_t{load.service_us});
+    }
     w.end_object();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
 #include <cles/peer.hpp>
 
@@ -34,6 +35,9 @@ struct announcement {
 
 /// Reads an update of the noun `<node>:cles`. On failure false, and `why` says what is wrong.
 bool read_announcement(const protocol::request_line& update, announcement& out, std::string& why);
+
+/// Reads the value of one of its keys; a key that it does not know is passed over.
+bool read_announcement_member(json_reader& r, std::string_view key, announcement& out);
 
 /// Appends the whole line and its LF, in 1200 bytes at most: endpoints that do not fit are left out, the last first.
 void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch);

@@ -40,6 +40,9 @@ class announcer final : private deadline {
     announcer(voice& owner, deadline_queue& deadlines, std::uint32_t seed) noexcept
         : owner_(owner), deadlines_(deadlines), jitter_(seed) {}
 
+    /// How long it is from one announcement to the next, at most, where so many others are known.
+    [[nodiscard]] static std::chrono::milliseconds interval_among(std::size_t others) noexcept;
+
     /// Begins; before that nothing else has an effect.
     void start(time_point now);
     /// Somebody asks for this node alone: no time is lost.

@@ -1,21 +1,36 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/bind_requests.hpp"
 
+#include "core/bind_decision.hpp"
 #include "core/handler_failure.hpp"
 #include "core/request_checks.hpp"
 
 #include <chrono>
 #include <string>
+#include <utility>
 
 namespace cles::core {
 
-bind_requests::bind_requests(node& host, const outlet& out, binder& updates, const identity& peer,
+namespace {
+
+std::chrono::milliseconds lease_of(const protocol::request_line& r) {
+    return std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)};
+}
+
+binding::terms terms_of(const protocol::request_line& r) {
+    return {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep};
+}
+
+} // namespace
+
+bind_requests::bind_requests(std::shared_ptr<node> host, const outlet& out, binder& updates, const identity& peer,
                              reply_writer& replies)
-    : node_(host), peer_(peer), replies_(replies), bound_(host.published, updates) {
+    : shared_node_(std::move(host)), node_(*shared_node_), peer_(peer), replies_(replies), updates_(updates),
+      bound_(node_.published, updates) {
     if (out.datagram() != 0) {
-        leases_.emplace(host.deadlines, [this](const std::string& path) {
+        leases_.emplace(node_.deadlines, [this](const std::string& path) {
             ++node_.counts.leases_expired;
-            bound_.unbind(path);
+            drop(path);
         });
     }
 }
@@ -24,16 +39,65 @@ void bind_requests::clear() {
     if (leases_) {
         leases_->clear();
     }
+    asking_.clear();
+    elsewhere_.reset();
     bound_.clear();
 }
 
-void bind_requests::serve(const protocol::request_line& r, time_point now) {
+void bind_requests::drain(time_point now) {
+    bound_.drain(now);
+    if (elsewhere_) {
+        elsewhere_->drain(now);
+    }
+}
+
+// A noun of another node has its name before a colon, as no path of this one does.
+void bind_requests::drop(const std::string& noun) {
+    const auto colon = noun.find(':');
+    if (colon == std::string::npos) {
+        bound_.unbind(noun);
+    } else if (elsewhere_) {
+        elsewhere_->unbind(std::string_view{noun}.substr(0, colon), std::string_view{noun}.substr(colon + 1));
+    }
+}
+
+void bind_requests::serve_elsewhere(const protocol::request_line& r, time_point due, time_point now,
+                                    call_opener& from) {
+    std::string scratch;
+    auto noun = std::string{r.noun.target}.append(":").append(protocol::canonical_path(r.noun, scratch));
+    if (r.unbinds()) {
+        if (leases_) {
+            leases_->drop(noun);
+        }
+        drop(noun);
+        replies_.done(reply_to{r}, {});
+        return;
+    }
+    if (size() >= node_.bounds.bindings) {
+        replies_.fail(r, errc::busy, node_.name + ": too many bindings on this link");
+        return;
+    }
+    if (!elsewhere_) {
+        elsewhere_ = std::make_unique<relayed_bindings>(node_.published, bound_, node_.way->relayed(), updates_);
+    }
+    hold(noun, lease_of(r), now);
+    node_.way->bind(r, *elsewhere_, due, now, from);
+}
+
+void bind_requests::hold(std::string_view path, std::chrono::milliseconds lease, time_point now) {
+    if (leases_) {
+        leases_->set(std::string{path}, now + lease);
+    }
+}
+
+void bind_requests::serve(const protocol::request_line& r, time_point due, time_point now, call_opener& from) {
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
     if (r.unbinds()) {
         if (leases_) {
             leases_->drop(path);
         }
+        withdraw(path);
         bound_.unbind(path);
         replies_.done(reply_to{r}, {});
         return;
@@ -43,20 +107,66 @@ void bind_requests::serve(const protocol::request_line& r, time_point now) {
         replies_.fail(r, errc::no_task, node_.name + " has no BIND '" + std::string{r.noun.task} + "'");
         return;
     }
+    if (bind_decision::is_needed(node_, r)) {
+        serve_later(r, path, due, now, from);
+        return;
+    }
     try {
         ask_bind_handler(node_, peer_, r);
-        if (!bound_.has(path) && bound_.size() >= node_.bounds.bindings) {
-            replies_.fail(r, errc::busy, node_.name + ": too many bindings on this link");
-            return;
-        }
-        auto& t = published.open(path);
+        auto& t = open(path);
         replies_.done(reply_to{r}, t.last_body());
-        bound_.bind(t, {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep});
-        if (leases_) {
-            leases_->set(path, now + std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)});
-        }
+        bound_.bind(t, terms_of(r));
+        hold(path, lease_of(r), now);
     } catch (...) {
         replies_.fail(r, describe(std::current_exception()));
+    }
+}
+
+topic& bind_requests::open(std::string_view path) {
+    if (!bound_.has(path) && bound_.size() >= node_.bounds.bindings) {
+        throw error(errc::busy, node_.name + ": too many bindings on this link");
+    }
+    return node_.published.open(path);
+}
+
+void bind_requests::serve_later(const protocol::request_line& r, std::string_view path, time_point due, time_point now,
+                                call_opener& from) {
+    const auto c = from.open_call(r, due, now);
+    if (!c) {
+        return;
+    }
+    std::erase_if(asking_, [](const asking& a) { return a.answers->ended(); });
+    asking_.push_back({std::string{path}, c});
+    const auto decision =
+        std::make_shared<bind_decision>(shared_node_, [this, c, path = std::string{path}, terms = terms_of(r),
+                                                       lease = lease_of(r)](const protocol::failure* why_not) {
+            if (c->ended()) { // and this may be gone with its link
+                return;
+            }
+            if (why_not != nullptr) {
+                c->fail(*why_not);
+                return;
+            }
+            try {
+                auto& t = open(path);
+                // Bound before the answer, which may set off what else the peer asked for; updates follow it later.
+                bound_.bind(t, terms);
+                hold(path, lease, node_.time.now());
+                c->done(t.last_body());
+            } catch (...) {
+                c->fail(describe(std::current_exception()));
+            }
+        });
+    c->on_stop([decision] { decision->withdraw(); });
+    decision->ask(r, peer_, due, now);
+}
+
+void bind_requests::withdraw(std::string_view path) {
+    for (const auto& a : std::vector<asking>{asking_}) {
+        if (a.path == path && !a.answers->ended()) {
+            a.answers->fail({.code = errc::cancelled, .message = node_.name + ": it was unbound"});
+            a.answers->stop();
+        }
     }
 }
 

@@ -1,21 +1,23 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/call.hpp"
 
-#include "core/inbound.hpp"
 #include "core/node.hpp"
-#include "core/result_text.hpp"
 
 #include <algorithm>
 #include <utility>
 
 namespace cles::core {
 
-call::call(std::shared_ptr<node> host, inbound& owner, terms wanted, time_point started)
+call::call(std::shared_ptr<node> host, call_owner& owner, terms wanted, time_point started)
     : node_(std::move(host)), owner_(&owner), terms_(std::move(wanted)), started_(started) {
     ++node_->counts.handlers_running;
+    node_->counts.routed += terms_.routed ? 1 : 0;
 }
 
-call::~call() { --node_->counts.handlers_running; }
+call::~call() {
+    --node_->counts.handlers_running;
+    node_->counts.routed -= terms_.routed ? 1 : 0;
+}
 
 void call::done(std::string_view json) {
     if (owner_ != nullptr) {
@@ -33,22 +35,13 @@ bool call::progress(double fraction, std::string_view json) {
     if (owner_ == nullptr || !terms_.wants_progress || terms_.id == 0) {
         return false;
     }
-    if (owner_->out_.is_behind()) {
-        return true; // the next one tells more
-    }
     reported_ = std::max(reported_, std::clamp(fraction, 0.0, 1.0));
-    auto& out = terms_.urgent ? owner_->out_.urgent_output() : owner_->out_.output();
-    const auto line = out.size();
-    protocol::append_progress_head(out, terms_.id, reported_);
-    const auto body = out.size();
-    out.append(json);
-    close_result(out, body);
-    if (out.size() - line > owner_->replies_.longest()) { // the peer would close the link over it, or it does not fit
-        out.replace(body, out.size() - body, "{}");
-    }
-    out.push_back('\n');
-    owner_->out_.wake();
+    owner_->report(*this, reported_, json);
     return true;
+}
+
+void call::say(log_level level, std::string_view text) const {
+    node_->say(level, {text, owner_ != nullptr ? owner_->peer_address() : std::string_view{}, terms_.id});
 }
 
 void call::on_stop(std::function<void()> callback) {
@@ -57,6 +50,11 @@ void call::on_stop(std::function<void()> callback) {
     } else if (owner_ != nullptr) {
         on_stop_ = std::move(callback);
     }
+}
+
+void call::detach() noexcept {
+    owner_ = nullptr;
+    node_->deadlines.disarm(*this);
 }
 
 void call::stop() {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/error.hpp>
+#include <cles/log.hpp>
 #include <cles/verb.hpp>
 
 #include "core/deadlines.hpp"
@@ -12,11 +13,30 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace cles::core {
 
-class inbound;
+class call;
 struct node;
+
+/// Whom a call answers to: what serves the link that its request came by.
+class call_owner {
+  public:
+    call_owner() = default;
+    call_owner(const call_owner&) = delete;
+    call_owner& operator=(const call_owner&) = delete;
+    /// The call has its result, or has failed; it is let go of.
+    virtual void answer(call& c, std::string_view json) = 0;
+    virtual void refuse(call& c, const protocol::failure& why) = 0;
+    /// How far it is; never less than before.
+    virtual void report(call& c, double fraction, std::string_view json) = 0;
+    /// Who asked, as a URL; empty where it was this node itself.
+    [[nodiscard]] virtual std::string_view peer_address() const noexcept { return {}; }
+
+  protected:
+    ~call_owner() = default;
+};
 
 /// A request whose handler answers later.
 ///
@@ -31,11 +51,12 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
         bool wants_reply = true;
         bool wants_progress = false;
         bool urgent = false;
+        bool routed = false;        ///< other nodes answer it
         std::string publish_path{}; ///< of a request to publish: where
         std::string publish_body{};
     };
 
-    call(std::shared_ptr<node> host, inbound& owner, terms wanted, time_point started);
+    call(std::shared_ptr<node> host, call_owner& owner, terms wanted, time_point started);
     ~call();
 
     void done(std::string_view json);
@@ -44,20 +65,27 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     bool progress(double fraction, std::string_view json);
     /// Runs once when the call is ended by anything but the handler; at once where it has been.
     void on_stop(std::function<void()> callback);
+    /// Takes back what `on_stop` was given.
+    std::function<void()> forget_on_stop() noexcept { return std::exchange(on_stop_, nullptr); }
+    /// The handler's words for the log, with the request's id, and the peer while it waits.
+    void say(log_level level, std::string_view text) const;
     [[nodiscard]] bool ended() const noexcept { return owner_ == nullptr; }
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
     [[nodiscard]] const terms& wanted() const noexcept { return terms_; }
     [[nodiscard]] time_point started() const noexcept { return started_; }
 
-  private:
-    friend inbound;
-    void on_deadline(time_point now) override;
-    /// Cuts it off from its link and tells the handler.
+    // For its owner.
+    /// Cuts it off: nothing it says is heard any more.
+    void detach() noexcept;
+    /// Tells the handler that nobody waits.
     void stop();
 
+  private:
+    void on_deadline(time_point now) override;
+
     std::shared_ptr<node> node_; // the handler may outlive the service
-    inbound* owner_;
+    call_owner* owner_;
     terms terms_;
     time_point started_;
     double reported_ = 0;

@@ -27,6 +27,10 @@ struct counters {
     std::uint64_t announcements_received = 0; ///< of others, and taken
     std::uint64_t announcements_dropped = 0;  ///< malformed or old
     std::uint64_t peers_refused = 0;          ///< announcements of nodes past the limit
+    std::uint64_t tables_asked = 0;           ///< of others, by gossip
+    std::uint64_t tables_failed = 0;          ///< of these: refused, late, or no tables
+    std::uint64_t tables_told = 0;            ///< to others
+    std::uint64_t entries_dropped = 0;        ///< of tables, since they could not be read
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to strangers who would have got too much
     std::uint64_t group_received = 0;     ///< datagrams of the multicast group, other than its own
@@ -41,6 +45,7 @@ struct counters {
     std::uint64_t group_leases = 0; ///< that live now
     std::uint64_t links_open = 0;
     std::uint64_t handlers_running = 0;
+    std::uint64_t routed = 0; ///< of these, requests that wait for other nodes
 };
 
 } // namespace cles::core

@@ -4,12 +4,10 @@
 #include <cles/limits.hpp>
 
 #include "core/feed_mailbox.hpp"
-#include "core/update_order.hpp"
+#include "core/publisher_orders.hpp"
 #include "protocol/request_line.hpp"
 
 #include <cstddef>
-#include <cstdint>
-#include <map>
 #include <string>
 #include <string_view>
 
@@ -22,7 +20,7 @@ class group_feed {
   public:
     /// `target`: a node's name, or "all".
     group_feed(const limits& bounds, std::string target, std::string path)
-        : target_(std::move(target)), path_(std::move(path)), most_publishers_(bounds.publishers), mail_(bounds) {}
+        : target_(std::move(target)), path_(std::move(path)), mail_(bounds), publishers_(bounds.publishers) {}
     group_feed(const group_feed&) = delete;
     group_feed& operator=(const group_feed&) = delete;
 
@@ -35,18 +33,10 @@ class group_feed {
     [[nodiscard]] std::size_t publishers() const noexcept { return publishers_.size(); }
 
   private:
-    struct source {
-        update_order order;
-        std::uint64_t heard = 0; // when, counted in updates
-    };
-    source& known(std::string_view name);
-
     std::string target_;
     std::string path_;
-    std::size_t most_publishers_;
     feed_mailbox mail_;
-    std::map<std::string, source, std::less<>> publishers_;
-    std::uint64_t heard_ = 0;
+    publisher_orders publishers_;
 };
 
 } // namespace cles::core

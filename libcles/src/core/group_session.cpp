@@ -5,39 +5,34 @@
 
 #include "core/bind_requests.hpp"
 #include "core/request_checks.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/line.hpp"
 
 #include <string>
 
 namespace cles::core {
 
-void group_session::on_datagram(const group_source& from, std::string_view datagram, time_point now) {
+namespace {
+
+identity identity_of(const group_source& from) {
+    return {.transport = "multicast",
+            .address = "udp://" + host_text(from) + ":" + std::to_string(from.port),
+            .name = {},
+            .uid = {},
+            .local = from.is_loopback()};
+}
+
+} // namespace
+
+void group_session::on_message(const group_source& from, const protocol::request_line* said, time_point now) {
     if (from == self_) { // looped back for others on this host
         return;
     }
     ++node_.counts.group_received;
-    if (!serve(from, datagram, now)) {
+    if (said == nullptr || !serve(from, *said, now)) {
         ++node_.counts.group_dropped;
     }
 }
 
-bool group_session::serve(const group_source& from, std::string_view datagram, time_point now) {
-    if (datagram.size() > protocol::datagram_bytes) {
-        return false;
-    }
-    if (datagram.ends_with('\n')) {
-        datagram.remove_suffix(1);
-    }
-    const auto line = protocol::trim(datagram);
-    if (line.empty() || protocol::has_many_lines(line) || protocol::is_reply(line)) {
-        return false;
-    }
-    protocol::request_line request;
-    protocol::malformed_request ignored;
-    if (!protocol::parse_request(line, request, ignored)) {
-        return false;
-    }
+bool group_session::serve(const group_source& from, const protocol::request_line& request, time_point now) {
     const auto target = request.noun.target;
     if (request.is_update()) {
         return !protocol::is_reserved_target(target) && on_update(from, request, now);
@@ -56,11 +51,11 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
     if (by_name && noun.target != node_.name) { // another's
         return true;
     }
-    if (!permits(from, bind)) {
-        return false;
-    }
     if (!solicits) {
-        return bindings_.bind(from, bind, now);
+        return bind_noun(from, bind, now);
+    }
+    if (!allows(node_, identity_of(from), bind)) {
+        return false;
     }
     if (presence_ != nullptr) {
         presence_->on_solicitation(by_name, now);
@@ -68,25 +63,24 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
     return true;
 }
 
-// The access rules, and the handler for BIND where there is one.
-bool group_session::permits(const group_source& from, const protocol::request_line& bind) const {
-    const identity peer{.transport = "multicast",
-                        .address = "udp://" + host_text(from) + ":" + std::to_string(from.port),
-                        .name = {},
-                        .uid = {},
-                        .local = from.is_loopback()};
+// By the access rules, and by the handler for BIND where there is one.
+bool group_session::bind_noun(const group_source& from, const protocol::request_line& bind, time_point now) {
+    const auto peer = identity_of(from);
     if (!allows(node_, peer, bind)) {
         return false;
     }
     if (bind.unbinds()) {
-        return true;
+        welcomes_.drop(from, bind);
+    } else if (bind_decision::is_needed(node_, bind)) {
+        return welcomes_.ask(from, peer, bind, now);
+    } else {
+        try {
+            ask_bind_handler(node_, peer, bind);
+        } catch (...) { // there is nobody to tell
+            return false;
+        }
     }
-    try {
-        ask_bind_handler(node_, peer, bind);
-        return true;
-    } catch (...) { // there is nobody to tell
-        return false;
-    }
+    return bindings_.bind(from, bind, now);
 }
 
 bool group_session::on_update(const group_source& from, const protocol::request_line& update, time_point now) {

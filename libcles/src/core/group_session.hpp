@@ -7,10 +7,12 @@
 #include "core/group_feeds.hpp"
 #include "core/group_output.hpp"
 #include "core/group_source.hpp"
+#include "core/group_welcomes.hpp"
 #include "core/node.hpp"
 #include "protocol/message.hpp"
 
 #include <cstdint>
+#include <memory>
 #include <string_view>
 
 namespace cles::core {
@@ -35,28 +37,42 @@ class group_presence {
 class group_session {
   public:
     /// `self`: where what this node sends comes from.
-    group_session(node& host, const group_source& self, group_output& out, std::uint32_t seed)
-        : node_(host), self_(self), bindings_(host, out, seed), feeds_(host, out, ~seed) {}
+    group_session(const std::shared_ptr<node>& host, const group_source& self, group_output& out, std::uint32_t seed)
+        : node_(*host), self_(self), bindings_(*host, out, seed),
+          welcomes_(host,
+                    [this](const group_source& from, const protocol::request_line& bind) {
+                        if (!bindings_.bind(from, bind, node_.time.now())) {
+                            ++node_.counts.group_dropped;
+                        }
+                    }),
+          feeds_(*host, out, ~seed) {}
 
     /// Who hears of the reserved task from now on; null: nobody. It must outlive this.
     void attend(group_presence* presence) noexcept { presence_ = presence; }
 
     /// What others are bound to here.
     [[nodiscard]] group_bindings& bindings() noexcept { return bindings_; }
+    /// Nobody is bound any more, nor will be who has asked.
+    void unbind_all() {
+        welcomes_.clear();
+        bindings_.clear();
+    }
     /// What this node is bound to.
     [[nodiscard]] group_feeds& feeds() noexcept { return feeds_; }
 
-    void on_datagram(const group_source& from, std::string_view datagram, time_point now);
+    /// What a datagram says (protocol/group_message.hpp), null where it says nothing that a group is for.
+    void on_message(const group_source& from, const protocol::request_line* said, time_point now);
 
   private:
-    bool serve(const group_source& from, std::string_view datagram, time_point now);
+    bool serve(const group_source& from, const protocol::request_line& request, time_point now);
     bool on_bind(const group_source& from, const protocol::request_line& bind, time_point now);
-    [[nodiscard]] bool permits(const group_source& from, const protocol::request_line& bind) const;
+    bool bind_noun(const group_source& from, const protocol::request_line& bind, time_point now);
     bool on_update(const group_source& from, const protocol::request_line& update, time_point now);
 
     node& node_;
     group_source self_;
     group_bindings bindings_;
+    group_welcomes welcomes_;
     group_feeds feeds_;
     group_presence* presence_ = nullptr;
 };

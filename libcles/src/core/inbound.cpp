@@ -4,6 +4,9 @@
 #include <cles/json_reader.hpp>
 
 #include "core/handler_failure.hpp"
+#include "core/progress_line.hpp"
+#include "core/raised.hpp"
+#include "core/refusals.hpp"
 #include "core/request_checks.hpp"
 #include "core/reserved_tasks.hpp"
 
@@ -20,37 +23,11 @@ constexpr unsigned sample_every = 16;
 constexpr int requests_per_turn = 256;
 constexpr std::size_t bytes_per_turn = 65536;
 
-/// Holds a flag while it lives, whatever is thrown.
-class raised {
-  public:
-    explicit raised(bool& flag) noexcept : flag_(flag) { flag_ = true; }
-    raised(const raised&) = delete;
-    raised& operator=(const raised&) = delete;
-    ~raised() { flag_ = false; }
-
-  private:
-    bool& flag_;
-};
-
-protocol::failure busy(std::string message) { return {.code = errc::busy, .message = std::move(message)}; }
-
-// A failure once the handler has begun: whoever repeats what was too large has to know.
-protocol::failure after_run(protocol::failure why) {
-    why.ran = why.code == errc::too_large;
-    return why;
-}
-
-std::string failure_text(const protocol::failure& why) {
-    std::string text;
-    protocol::append_failure(text, why);
-    return text;
-}
-
 } // namespace
 
 inbound::inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
     : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out),
-      bound_(*node_, out, updates, peer, replies_) {
+      bound_(node_, out, updates, peer, replies_) {
     if (out_.datagram() != 0) {
         datagrams_.emplace(*node_, out_, replies_);
     }
@@ -119,11 +96,7 @@ void inbound::on_overlong(std::string_view head, time_point now) {
         return;
     }
     const auto meant = protocol::salvage(head);
-    const protocol::failure why{.code = errc::too_large,
-                                .message = node_->name +
-                                           (datagrams_ ? ": a datagram has at most " : ": a line has at most ") +
-                                           std::to_string(datagrams_ ? out_.datagram() : node_->bounds.line) +
-                                           (datagrams_ ? " bytes: use TCP" : " bytes")};
+    const auto why = overlong(*node_, out_.datagram());
     if (meant.id == 0 && meant.wants_reply && must_wait()) {
         answer_in_turn(failure_text(why), now);
     } else {
@@ -152,16 +125,14 @@ void inbound::lose() {
     auto calls = std::exchange(calls_, {});
     auto anonymous = std::exchange(anonymous_, nullptr);
     waiting_.clear();
-    bound_.clear();
-    const auto cut = [this](call& c) {
-        c.owner_ = nullptr;
-        node_->deadlines.disarm(c);
-    };
     for (auto& [id, c] : calls) {
-        cut(*c);
+        c->detach();
     }
     if (anonymous) {
-        cut(*anonymous);
+        anonymous->detach();
+    }
+    bound_.clear();
+    if (anonymous) {
         anonymous->stop();
     }
     for (auto& [id, c] : calls) {
@@ -232,10 +203,24 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
         replies_.fail(r, *why);
         return;
     }
+    if (is_for(*node_, r)) {
+        serve_here(r, arrived, now);
+        return;
+    }
+    const auto due = arrived + std::chrono::milliseconds{r.deadline_ms};
+    if (r.verb == verb::bind) {
+        bound_.serve_elsewhere(r, due, now, *this);
+        finish_if_done();
+    } else if (!node_->way->route(r, peer_, due, now, *this)) {
+        serve_here(r, arrived, now);
+    }
+}
+
+void inbound::serve_here(const protocol::request_line& r, time_point arrived, time_point now) {
     if (r.noun.task == "cles") {
-        serve_reserved(*node_, replies_, r);
+        serve_reserved(*node_, replies_, r, peer_);
     } else if (r.verb == verb::bind) {
-        bound_.serve(r, now);
+        bound_.serve(r, arrived + std::chrono::milliseconds{r.deadline_ms}, now, *this);
         finish_if_done();
     } else {
         serve_task(r, arrived, now);
@@ -260,9 +245,7 @@ void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, ti
 void inbound::serve_task(const protocol::request_line& r, time_point arrived, time_point now) {
     const auto* h = node_->tasks.find(r.verb, r.noun.task);
     if (h == nullptr) {
-        replies_.fail(r, errc::no_task,
-                      node_->name + " has no " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} +
-                          "'");
+        replies_.fail(r, no_such_task(*node_, r));
         return;
     }
     if (r.verb == verb::update && !node_->published.can_open(protocol::canonical_path(r.noun, path_))) {
@@ -308,10 +291,6 @@ void inbound::run_plain(const protocol::request_line& r, const handler& h, const
 
 void inbound::run_later(const protocol::request_line& r, const handler& h, const cles::request& request,
                         time_point now) {
-    if (node_->counts.handlers_running >= node_->bounds.running) {
-        replies_.fail(r, busy(node_->name + " runs as many handlers as it may"));
-        return;
-    }
     call::terms wanted{.verb = r.verb,
                        .id = r.id,
                        .wants_reply = r.wants_reply,
@@ -321,21 +300,45 @@ void inbound::run_later(const protocol::request_line& r, const handler& h, const
         wanted.publish_path = protocol::canonical_path(r.noun, path_);
         append_compact_json(request.body(), wanted.publish_body);
     }
-    const auto c = std::make_shared<call>(node_, *this, std::move(wanted), now);
+    const auto c = begin_call(r, std::move(wanted), request.deadline(), now);
+    if (!c) {
+        return;
+    }
+    try {
+        h.start(request, c);
+    } catch (...) {
+        c->fail(describe(std::current_exception()));
+    }
+}
+
+std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call::terms wanted, time_point due,
+                                          time_point now) {
+    if (node_->counts.handlers_running >= node_->bounds.running) {
+        replies_.fail(r, busy(node_->name + " runs as many handlers as it may"));
+        return nullptr;
+    }
+    auto c = std::make_shared<call>(node_, static_cast<call_owner&>(*this), std::move(wanted), now);
     if (r.id != 0) {
-        if (datagrams_ && r.verb == verb::pull) {
+        if (datagrams_ && (r.verb == verb::pull || r.verb == verb::bind)) {
             datagrams_->begin_repeatable(r);
         }
         calls_.emplace(r.id, c);
     } else {
         anonymous_ = c;
     }
-    node_->deadlines.arm(*c, request.deadline());
-    try {
-        h.start(request, c);
-    } catch (...) {
-        c->fail(describe(std::current_exception()));
-    }
+    node_->deadlines.arm(*c, due);
+    return c;
+}
+
+std::shared_ptr<call> inbound::open_call(const protocol::request_line& r, time_point due, time_point now) {
+    return begin_call(r,
+                      {.verb = r.verb,
+                       .id = r.id,
+                       .wants_reply = r.wants_reply,
+                       .wants_progress = r.wants_progress,
+                       .urgent = r.urgent,
+                       .routed = true},
+                      due, now);
 }
 
 // -- calls ---------------------------------------------------------------------------------------------------------
@@ -365,16 +368,26 @@ void inbound::answer(call& c, std::string_view json) {
 
 void inbound::refuse(call& c, const protocol::failure& why) {
     const auto& wanted = c.wanted();
-    replies_.fail({wanted.id, wanted.wants_reply, wanted.urgent}, after_run(why));
+    replies_.fail({wanted.id, wanted.wants_reply, wanted.urgent}, wanted.routed ? why : after_run(why));
     detach(c);
+}
+
+void inbound::report(call& c, double fraction, std::string_view json) {
+    if (out_.is_behind()) {
+        return; // the next one tells more
+    }
+    auto& out = c.wanted().urgent ? out_.urgent_output() : out_.output();
+    append_progress_line(out, c.wanted().id, fraction, json, replies_.longest());
+    out_.wake();
 }
 
 void inbound::detach(call& c) {
     const auto keep = c.shared_from_this();
     const auto now = node_->time.now();
-    c.owner_ = nullptr;
-    node_->deadlines.disarm(c);
-    node_->handler_time.record(now - c.started());
+    c.detach();
+    if (!c.wanted().routed) {
+        node_->handler_time.record(now - c.started());
+    }
     out_.wake();
     if (c.wanted().id != 0) {
         calls_.erase(c.wanted().id);

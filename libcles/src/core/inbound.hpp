@@ -9,6 +9,7 @@
 #include "core/node.hpp"
 #include "core/outlet.hpp"
 #include "core/reply_writer.hpp"
+#include "core/router.hpp"
 #include "core/waiting_requests.hpp"
 #include "protocol/message.hpp"
 
@@ -27,7 +28,7 @@ namespace cles::core {
 ///
 /// Requests with an id start at once. Those without wait for each other. Plain handlers are run in line and answered
 /// into the link's output; other handlers become calls.
-class inbound {
+class inbound final : private call_owner, private call_opener {
   public:
     inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer);
     inbound(const inbound&) = delete;
@@ -61,13 +62,16 @@ class inbound {
     [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
 
   private:
-    friend call;
-
     void serve(const protocol::request_line& request, time_point arrived, time_point now);
     void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
+    void serve_here(const protocol::request_line& request, time_point arrived, time_point now);
     void serve_task(const protocol::request_line& request, time_point arrived, time_point now);
     void run_plain(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
     void run_later(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
+
+    std::shared_ptr<call> begin_call(const protocol::request_line& request, call::terms wanted, time_point due,
+                                     time_point now);
+    std::shared_ptr<call> open_call(const protocol::request_line& request, time_point due, time_point now) override;
 
     [[nodiscard]] bool must_wait() const noexcept { return anonymous_ != nullptr || !waiting_.empty(); }
     void answer_in_turn(std::string answer, time_point now);
@@ -77,8 +81,10 @@ class inbound {
     void finish_if_done();
 
     void withdraw(std::uint64_t id);
-    void answer(call& c, std::string_view json);
-    void refuse(call& c, const protocol::failure& why);
+    void answer(call& c, std::string_view json) override;
+    void refuse(call& c, const protocol::failure& why) override;
+    void report(call& c, double fraction, std::string_view json) override;
+    [[nodiscard]] std::string_view peer_address() const noexcept override { return peer_.address; }
     void detach(call& c);
 
     std::shared_ptr<node> node_;

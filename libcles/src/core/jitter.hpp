@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 
 namespace cles::core {
@@ -13,13 +14,19 @@ class jitter {
 
     /// Up to a quarter of the span.
     std::chrono::milliseconds quarter_of(std::chrono::milliseconds span) noexcept {
+        return std::chrono::milliseconds{next() % static_cast<std::uint32_t>(span.count() / 4 + 1)};
+    }
+    /// From 0 on, less than `most`, which is not 0.
+    std::size_t below(std::size_t most) noexcept { return next() % most; }
+
+  private:
+    std::uint32_t next() noexcept {
         state_ ^= state_ << 13U; // xorshift32 (Marsaglia 2003)
         state_ ^= state_ >> 17U;
         state_ ^= state_ << 5U;
-        return std::chrono::milliseconds{state_ % static_cast<std::uint32_t>(span.count() / 4 + 1)};
+        return state_;
     }
 
-  private:
     std::uint32_t state_;
 };
 

@@ -18,11 +18,9 @@ void link_bindings::bind(topic& t, binding::terms wanted) {
     t.bind(target_, wanted);
 }
 
-// Publishers that waited for this binder may go on.
 void link_bindings::release(topic& t) {
     t.unbind(target_);
-    source_.admit(t);
-    source_.tidy(t);
+    source_.release(t);
 }
 
 void link_bindings::unbind(std::string_view path) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/publications.hpp"
 #include "core/topic.hpp"
+#include "core/topic_source.hpp"
 
 #include <cstddef>
 #include <string_view>
@@ -13,7 +13,7 @@ namespace cles::core {
 /// What the peer of one link is bound to.
 class link_bindings {
   public:
-    link_bindings(publications& source, binder& target) noexcept : source_(source), target_(target) {}
+    link_bindings(topic_source& source, binder& target) noexcept : source_(source), target_(target) {}
     link_bindings(const link_bindings&) = delete;
     link_bindings& operator=(const link_bindings&) = delete;
 
@@ -32,7 +32,7 @@ class link_bindings {
   private:
     void release(topic& t);
 
-    publications& source_;
+    topic_source& source_;
     binder& target_;
     std::vector<topic*> topics_;
 };

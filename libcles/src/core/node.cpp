@@ -29,6 +29,10 @@ void write_task(json_writer& w, std::string_view verb, std::string_view task, co
         }
         w.end_array();
     }
+    if (info.idempotent) {
+        w.key("idempotent");
+        w.value(true);
+    }
     w.end_object();
 }
 
@@ -40,10 +44,16 @@ std::int64_t milliseconds_since(time_point then, time_point now) {
 
 node::node(node_setup setup, const core::clock& source, std::function<void()> wake)
     : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
-      bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)), time(source),
-      started(source.now()), others(name, setup.epoch, deadlines, bounds.peers),
+      bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)),
+      metrics(std::move(setup.metrics)), load(std::move(setup.load)), time(source), started(source.now()),
+      others(name, setup.epoch, deadlines, bounds.peers),
       published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)),
       remembered{.limit = bounds.remembered} {}
+
+// What is handed on to other nodes is work of theirs.
+node_load node::load_now() const {
+    return load ? load() : node_load{.running = static_cast<std::uint32_t>(counts.handlers_running - counts.routed)};
+}
 
 void write_tasks(json_writer& w, const node& n) {
     w.begin_array();
@@ -84,6 +94,8 @@ void write_description(json_writer& w, const node& n) {
     w.end_array();
     w.key("tasks");
     write_tasks(w, n);
+    w.key("load");
+    write_load(w, n.load_now());
     w.end_object();
 }
 
@@ -105,6 +117,7 @@ void write_metrics(json_writer& w, const node& n) {
     number("errors", c.errors);
     number("errors_unsent", c.errors_unsent);
     number("handlers_running", c.handlers_running);
+    number("routed", c.routed);
     number("requests_repeated", c.requests_repeated);
     number("requests_sent", c.requests_sent);
     number("requests_resent", c.requests_resent);
@@ -120,6 +133,10 @@ void write_metrics(json_writer& w, const node& n) {
     number("announcements_dropped", c.announcements_dropped);
     number("peers_known", n.others.size());
     number("peers_refused", c.peers_refused);
+    number("tables_asked", c.tables_asked);
+    number("tables_failed", c.tables_failed);
+    number("tables_told", c.tables_told);
+    number("entries_dropped", c.entries_dropped);
     number("leases_expired", c.leases_expired);
     number("datagrams_withheld", c.datagrams_withheld);
     number("group_received", c.group_received);
@@ -144,6 +161,9 @@ void write_metrics(json_writer& w, const node& n) {
     quantile("p99", 0.99);
     quantile("p999", 0.999);
     w.end_object();
+    if (n.metrics) {
+        n.metrics(w);
+    }
     w.end_object();
 }
 

@@ -24,6 +24,8 @@
 
 namespace cles::core {
 
+class gossip_answers;
+
 /// How a node begins.
 struct node_setup {
     std::string name;
@@ -32,7 +34,11 @@ struct node_setup {
     cles::limits bounds{};
     authoriser authorise{};
     log_sink log{};
+    std::function<void(json_writer&)> metrics{}; ///< what the program counts
+    std::function<node_load()> load{};           ///< how much it has to do; empty: its handlers that run
 };
+
+class router;
 
 /// What all sessions of a node share.
 struct node {
@@ -45,6 +51,8 @@ struct node {
     const cles::limits bounds;
     const authoriser authorise;
     const log_sink log;
+    const std::function<void(json_writer&)> metrics;
+    const std::function<node_load()> load;
     const core::clock& time;
     const time_point started;
 
@@ -52,16 +60,19 @@ struct node {
     registry tasks;
     deadline_queue deadlines;
     presence others;
+    gossip_answers* talk = nullptr; ///< to those who take part in gossip; null where this node does not
     counters counts;
     latency_histogram handler_time; ///< of all handlers that answer later, and of a sample of the others
     publications published;
     dedup_memory remembered;
     reflection_limit reflection;
     std::uint64_t next_id = 1; ///< of requests that this node sends
+    router* way = nullptr;     ///< what serves requests for `any`, `all` and other nodes; null: nothing does
 
-    void say(log_level level, std::string_view text) const {
+    [[nodiscard]] node_load load_now() const;
+    void say(log_level level, const log_entry& what) const {
         if (log) {
-            log(level, text);
+            log(level, what);
         }
     }
 };

@@ -150,7 +150,7 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         if (protocol::parse_failure(reply.body, why)) {
             auto operation = std::move(e->operation);
             recycle(std::move(e));
-            operation.release()->fail(why.code, why.message);
+            operation.release()->refuse(why.code, why.message, reply.body);
             return;
         }
     } else {

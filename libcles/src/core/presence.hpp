@@ -1,26 +1,34 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/json_writer.hpp>
 #include <cles/peer.hpp>
 
 #include "core/announcement.hpp"
 #include "core/deadlines.hpp"
+#include "core/ended_runs.hpp"
 #include "core/group_source.hpp"
+#include "core/known_run.hpp"
+#include "core/news_item.hpp"
+#include "core/peer_report.hpp"
+#include "core/run_index.hpp"
+#include "core/teller.hpp"
 
-#include <array>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <list>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
 
-/// Who else is there, from what they announce (docs/protocol.md, "Presence").
+/// Who else is there, from what they announce, and from what others tell of them (docs/protocol.md, "Presence" and
+/// "Gossip").
 ///
 /// A name belongs to the run of a node that was heard under it first, for as long as that run is live: only it, from
 /// where it announces, moves the name or leaves. Another run that announces the same name waits. When the first one
@@ -37,8 +45,8 @@ class presence final : private deadline {
         gone,     ///< without one
         clash,    ///< a second live node of that name
     };
-    /// Who is told of changes, after they have been made. `where`: the URL at which it is asked now, or of `clash`
-    /// where the second one was heard from; it may be empty.
+    /// Who is told of changes, after they have been made. `where`: the URL at which it is asked now, or was
+    /// until now, or of `clash` where the second one was heard from; it may be empty.
     class watcher {
       public:
         watcher() = default;
@@ -50,87 +58,148 @@ class presence final : private deadline {
         ~watcher() = default;
     };
 
+    /// Who is told of whatever is heard of a node, after it has been taken, and when it is forgotten.
+    class observer {
+      public:
+        observer() = default;
+        observer(const observer&) = delete;
+        observer& operator=(const observer&) = delete;
+        virtual void on_heard(std::string_view node) = 0;
+
+      protected:
+        ~observer() = default;
+    };
+
     enum class verdict : std::uint8_t {
         taken,
         own,     ///< this node's own word, back from the group
         old,     ///< overtaken, repeated, or from a run that has left
         refused, ///< as many are known as may be
+        unknown, ///< of a run that has not been described
+    };
+    /// A node, as whoever asks it needs to know it. Views are valid until the next change.
+    struct known {
+        std::string_view node;
+        std::string_view where; ///< empty: at no address that can be used from here
+        std::uint32_t epoch = 0;
+        bool suspect = false;
+        std::string_view tasks; ///< a digest of what it offers
+        node_load load;
     };
 
     presence(std::string own_name, std::uint32_t own_epoch, deadline_queue& deadlines, std::size_t most)
-        : own_name_(std::move(own_name)), own_epoch_(own_epoch), deadlines_(deadlines), most_(most) {}
+        : own_name_(std::move(own_name)), own_epoch_(own_epoch), deadlines_(deadlines), most_(most), ended_(most) {}
     void watch(watcher* who) noexcept { watcher_ = who; }
+    void observe(observer* who) noexcept { observer_ = who; }
 
+    /// An announcement by multicast.
     verdict hear(const announcement& said, std::uint32_t epoch, std::uint64_t seq, const group_source& from,
                  time_point now);
+    /// What another node tells. `asked`: when it was asked, since ages count from then.
+    verdict be_told(const peer_report& report, const teller& by, time_point asked, time_point now);
+    verdict be_told(const peer_beat& beat, time_point asked, time_point now);
+    /// This node announces itself: it is to be told to others from then on.
+    void speak(const announcement& own, std::uint64_t seq, time_point now);
+    /// This node says farewell: from then on it is told as one that has left.
+    void leave(time_point now);
+    /// This node as it announced itself; null where it has not.
+    [[nodiscard]] const known_run* own() const noexcept { return own_ ? &*own_ : nullptr; }
+    /// This node was stopped, and could hear nobody: silence counts from now on.
+    void excuse(time_point now) noexcept { excused_ = now; }
 
     /// Where the node of that name is to be asked; nothing where it is not known, empty where no address of it can be
     /// used from here. Valid until the next change.
     [[nodiscard]] std::optional<std::string_view> find(std::string_view node) const noexcept;
     /// How many others there are.
     [[nodiscard]] std::size_t size() const noexcept { return peers_.size(); }
+    /// And how many there may be.
+    [[nodiscard]] std::size_t most() const noexcept { return most_; }
     /// All of them by name, those that clash behind those whose name it is.
     [[nodiscard]] std::vector<peer> list(time_point now) const;
 
-  private:
-    /// A node from one start to the next.
-    struct run {
-        announcement said;
-        std::uint32_t epoch = 0;
-        std::uint64_t seq = 0;
-        group_source from;
-        time_point heard{};
-        std::vector<std::string> endpoints; // as they can be used here
+    /// What is known of it; nothing where it is not known.
+    [[nodiscard]] std::optional<known> look(std::string_view node) const;
+    /// The node whose name follows, behind the last the first; nothing where nobody is known.
+    [[nodiscard]] std::optional<known> after(std::string_view node) const;
+    /// By its index among all, from 0 on and less than `size`.
+    [[nodiscard]] known at(std::size_t index) const;
 
-        [[nodiscard]] bool is(std::uint32_t e, const group_source& f) const noexcept { return epoch == e && from == f; }
-        [[nodiscard]] std::string_view where() const noexcept {
-            return endpoints.empty() ? std::string_view{} : std::string_view{endpoints.front()};
+    /// Calls it with each one, by name.
+    template <class F>
+    void each(F&& what) const {
+        for (const auto& one : peers_) {
+            what(known_of(one));
         }
-        [[nodiscard]] time_point silent_at() const noexcept { return heard + said.interval * 7 / 2; }
-        [[nodiscard]] time_point gone_at() const noexcept { return heard + said.interval * 15; }
-    };
+    }
+
+    /// What there is to tell that is newer than that, in order.
+    [[nodiscard]] std::vector<news_item> news_since(std::uint64_t news, time_point now) const;
+    /// All about a run; nothing where it is not known, or is told of in full anyway.
+    [[nodiscard]] std::optional<news_item> description_of(std::uint32_t epoch) const;
+    /// The number of the newest.
+    [[nodiscard]] std::uint64_t latest_news() const noexcept { return news_; }
+
+  private:
     /// Another run under a name that is taken.
     struct rival {
-        run of;
+        known_run of;
+        time_point first{};
         bool first_heard_since = false; // the name's owner, after this one
         bool clashes = false;
     };
+    struct entry;
+    using named_entry = std::pair<const std::string, entry>;
     struct entry {
-        run owner;
+        known_run owner;
         bool suspect = false;
         std::unique_ptr<rival> second;
+        std::list<named_entry*>::iterator in_news{};
     };
     using entries = std::map<std::string, entry, std::less<>>;
-    struct farewell {
-        std::uint32_t epoch = 0;
-        std::uint64_t seq = 0;
-    };
 
-    static void take(run& into, const announcement& said, std::uint64_t seq, time_point now);
-    static run first_words(const announcement& said, std::uint32_t epoch, std::uint64_t seq, const group_source& from,
-                           time_point now);
-    verdict hear_owner(entries::iterator at, const announcement& said, std::uint64_t seq, time_point now);
-    verdict hear_rival(std::unique_ptr<rival>& second, run said);
+    static known known_of(const entries::value_type& one) noexcept {
+        const auto& [name, e] = one;
+        return {name, e.owner.where(), e.owner.epoch, e.suspect, e.owner.said.tasks, e.owner.said.load};
+    }
+
+    [[nodiscard]] std::chrono::milliseconds interval_of(const announcement& said, const group_source& from) const;
+    /// Told, and too long ago to make anybody known.
+    [[nodiscard]] bool is_stale(const word& w, time_point now) const;
+    [[nodiscard]] time_point silent_at(const known_run& r) const;
+    [[nodiscard]] time_point gone_at(const known_run& r) const;
+    known_run first_words(const word& w);
+    verdict take_word(const word& w, time_point now);
+    verdict take_owners_word(entries::iterator at, const word& w, time_point now);
+    verdict take_namesakes_word(const word& w, time_point now);
+    verdict take_rivals_word(std::unique_ptr<rival>& second, const word& w, time_point now);
+    verdict take_farewell(const word& w, time_point now);
+    void heard_again(named_entry& one, bool moved, bool told, time_point now);
     void end(entries::iterator at, change how, time_point now);
-    void succeed(entries::iterator at, run next);
-    [[nodiscard]] bool has_left(std::uint32_t epoch, std::uint64_t seq) const noexcept;
-    void remember(const run& left) noexcept;
+    void succeed(entries::iterator at, known_run next);
+    void remember(const std::string& node, const known_run& over, bool farewell, time_point now);
+    void drop_second(entries::iterator at);
+    /// There is news of it: it goes behind all others.
+    void freshen(named_entry& one) { by_news_.splice(by_news_.end(), by_news_, one.second.in_news); }
     void on_deadline(time_point now) override;
     void follow(time_point due);
     void tell(std::string_view node, change what, std::string_view where) const;
+    void say_heard(std::string_view node) const;
 
     const std::string own_name_;
     const std::uint32_t own_epoch_;
     deadline_queue& deadlines_;
     const std::size_t most_;
     watcher* watcher_ = nullptr;
+    observer* observer_ = nullptr;
     entries peers_;
+    std::list<named_entry*> by_news_; // the latest last
+    run_index<named_entry> by_epoch_;
     std::unique_ptr<rival> namesake_; // of this node itself
-    std::array<farewell, 16> farewells_{};
-    std::size_t next_farewell_ = 0;
+    std::optional<known_run> own_;    // as it announces itself
+    time_point own_since_{};
+    ended_runs ended_;
+    std::uint64_t news_ = 0;
+    time_point excused_ = time_point::min();
 };
-
-/// Writes the reply to `PULL self:cles/peers`.
-void write_peers(json_writer& w, const presence& others, time_point now);
 
 } // namespace cles::core

@@ -126,19 +126,40 @@ bool publications::publish_when_room(std::string_view path, std::string_view bod
         return false;
     }
     publish_body(path, body);
+    keep({.operation = std::move(operation)});
     return true;
 }
 
+// Told later, one by one: a publisher that goes on at once may publish again, or throw, or end it all.
+void publications::keep(publication_result result) {
+    results_.push_back(std::move(result));
+    if (results_.size() == 1) {
+        wake_();
+    }
+}
+
+std::optional<publication_result> publications::next_result() {
+    if (results_.empty()) {
+        return std::nullopt;
+    }
+    auto next = std::move(results_.front());
+    results_.pop_front();
+    return next;
+}
+
 void publications::admit(topic& t) {
-    while (!t.waiters().empty() && t.has_room()) {
-        auto next = std::move(t.waiters().front());
-        t.waiters().pop_front();
+    auto& waiting = t.waiters();
+    while (!waiting.empty() && t.has_room()) {
+        publication_result result;
         try {
-            publish_body(t.path(), next.body);
-            next.operation.release()->offer("{}");
+            publish_body(t.path(), waiting.front().body);
         } catch (const error& e) {
-            next.operation.release()->fail(e.code(), e.message());
+            result.code = e.code();
+            result.why = e.message();
         }
+        result.operation = std::move(waiting.front().operation);
+        waiting.pop_front(); // only now: a topic for which nobody waits may go where publishing fails
+        keep(std::move(result));
     }
 }
 

@@ -4,12 +4,16 @@
 #include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
 
+#include "core/publication_result.hpp"
 #include "core/text_map.hpp"
 #include "core/topic.hpp"
+#include "core/topic_source.hpp"
 
 #include <cstddef>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -18,9 +22,9 @@
 namespace cles::core {
 
 /// All that a node publishes.
-class publications {
+class publications final : public topic_source {
   public:
-    /// `wake` is called when there is something to drain, once until `drain`.
+    /// `wake` is called when there is something to drain or to tell, once until `drain` and until all is told.
     publications(topic_context shared, const cles::limits& bounds, std::string publisher, std::string epoch,
                  std::function<void()> wake);
 
@@ -29,15 +33,19 @@ class publications {
     void publish(std::string_view path, const std::function<void(json_writer&)>& write);
     /// Publishes JSON that is known to be valid and without white space.
     void publish_body(std::string_view path, std::string_view body);
-    /// Publishes a body of any kind now, or once every binder has room. True: now, and completing the operation is left
-    /// to the caller; otherwise it is taken and completed later.
+    /// Publishes a body of any kind now, or once every binder has room, and takes the operation: what comes of it is
+    /// among the results. True: now. \throws as `publish`; the operation is left then
     bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation);
+    /// The next that has come of `publish_when_room`, to be told by the caller, of each noun in order. None: nobody
+    /// waits for any.
+    [[nodiscard]] std::optional<publication_result> next_result();
+    [[nodiscard]] bool has_results() const noexcept { return !results_.empty(); }
 
     /// Who is told of each topic that is made from now on, before anything is published there; empty: nobody.
     void on_opened(std::function<void(topic&)> told) { opened_ = std::move(told); }
 
     /// The topic, or null.
-    [[nodiscard]] topic* find(std::string_view path) noexcept;
+    [[nodiscard]] topic* find(std::string_view path) noexcept override;
     /// Whether anything of the task has been published or bound.
     [[nodiscard]] bool knows(std::string_view task) const noexcept;
     /// The topic, made if need be.
@@ -47,12 +55,17 @@ class publications {
     [[nodiscard]] bool can_open(std::string_view path) noexcept;
     /// Forgets a topic that nobody is bound to and that was never published.
     void tidy(topic& t);
+    /// Publishers that waited for this binder may go on.
+    void release(topic& t) override {
+        admit(t);
+        tidy(t);
+    }
 
     /// Puts to binders what has been published since the last time.
     void drain(time_point now);
     [[nodiscard]] bool dirty() const noexcept { return !dirty_.empty(); }
     /// Publishes what waits for room in this topic, as far as there is some.
-    void admit(topic& t);
+    void admit(topic& t) override;
 
     [[nodiscard]] std::uint64_t published() const noexcept { return shared_.counts.updates_published; }
     /// Takes out all that wait for room.
@@ -64,6 +77,7 @@ class publications {
   private:
     void end(topic& t, std::size_t body_at);
     void mark(topic& t);
+    void keep(publication_result result);
 
     topic_context shared_;
     const cles::limits& bounds_;
@@ -78,6 +92,7 @@ class publications {
     };
     text_map<task_nouns> nouns_; // per task
     std::vector<topic*> dirty_;
+    std::deque<publication_result> results_;
     topic* recent_ = nullptr; // most publish the same noun again
 };
 

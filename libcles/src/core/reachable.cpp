@@ -108,38 +108,53 @@ int rank_of(const url& where, std::string_view heard_from) {
     return scheme * 2 + (where.host == heard_from ? 0 : 1);
 }
 
-std::optional<place> place_of(std::string_view endpoint, const group_source& from, const std::string& heard_from) {
-    url where;
+bool is_printable(std::string_view text) noexcept {
+    return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < '\x7F'; });
+}
+
+std::optional<url> url_of(std::string_view endpoint) {
     try {
-        where = parse_url(endpoint);
+        return is_printable(endpoint) ? std::optional{parse_url(endpoint)} : std::nullopt;
     } catch (const error&) {
         return {};
     }
-    const bool printable = std::all_of(endpoint.begin(), endpoint.end(), [](char c) { return c > ' ' && c < '\x7F'; });
-    if (where.scheme == "inproc" || !printable) {
+}
+
+// An address that is unspecified is the teller's; one of IPv4 not where he is known by IPv6.
+bool put_in_host(url& where, const teller& from) {
+    if (kind_of(where.host) != host_kind::unspecified) {
+        return true;
+    }
+    const bool is_ipv4 = where.host.find(':') == std::string::npos;
+    if (from.host.empty() || (is_ipv4 && from.host.find(':') != std::string::npos)) {
+        return false;
+    }
+    where.host = from.host;
+    return true;
+}
+
+std::optional<place> place_of(std::string_view endpoint, const teller& from) {
+    auto where = url_of(endpoint);
+    if (!where || where->scheme == "inproc") {
         return {};
     }
-    if (where.scheme == "unix") {
-        return from.is_loopback() ? std::optional{place{std::string{endpoint}, rank_of(where, heard_from)}}
-                                  : std::nullopt;
+    if (where->scheme == "unix") {
+        return from.local ? std::optional{place{std::string{endpoint}, rank_of(*where, from.host)}} : std::nullopt;
     }
-    const auto kind = kind_of(where.host);
-    if (kind == host_kind::none || where.port == 0 || (kind == host_kind::loopback && !from.is_loopback())) {
+    const auto kind = kind_of(where->host);
+    if (kind == host_kind::none || where->port == 0 || (kind == host_kind::loopback && !from.local) ||
+        !put_in_host(*where, from)) {
         return {};
     }
-    if (kind == host_kind::unspecified) {
-        where.host = heard_from;
-    }
-    return place{to_string(where), rank_of(where, heard_from)};
+    return place{to_string(*where), rank_of(*where, from.host)};
 }
 
 } // namespace
 
-std::vector<std::string> reachable_endpoints(const std::vector<std::string>& announced, const group_source& from) {
-    const auto heard_from = host_text(from);
+std::vector<std::string> reachable_endpoints(const std::vector<std::string>& announced, const teller& from) {
     std::vector<place> places;
     for (const auto& endpoint : announced) {
-        if (auto found = place_of(endpoint, from, heard_from)) {
+        if (auto found = place_of(endpoint, from)) {
             places.push_back(std::move(*found));
         }
     }
@@ -148,6 +163,26 @@ std::vector<std::string> reachable_endpoints(const std::vector<std::string>& ann
     result.reserve(places.size());
     for (auto& each : places) {
         result.push_back(std::move(each.text));
+    }
+    return result;
+}
+
+std::vector<std::string> endpoints_to_pass_on(const std::vector<std::string>& announced, const teller& from) {
+    std::vector<std::string> result;
+    for (const auto& endpoint : announced) {
+        auto where = url_of(endpoint);
+        if (!where || where->scheme == "inproc") {
+            continue;
+        }
+        if (from.local) { // to the next one it means this host, as it was meant
+            result.push_back(endpoint);
+            continue;
+        }
+        const auto kind = kind_of(where->host);
+        if (where->scheme != "unix" && kind != host_kind::none && kind != host_kind::loopback &&
+            put_in_host(*where, from)) {
+            result.push_back(to_string(*where));
+        }
     }
     return result;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/group_source.hpp"
+#include "core/teller.hpp"
 
 #include <string>
 #include <string_view>
@@ -17,6 +17,10 @@ namespace cles::core {
 ///
 /// Streams come before datagrams: `tcp`, then `unix` (whose permissions may keep others out), then `udp`, then schemes
 /// that are not known here. Among equals an address that the announcement came from goes first, then the node's order.
-std::vector<std::string> reachable_endpoints(const std::vector<std::string>& announced, const group_source& from);
+std::vector<std::string> reachable_endpoints(const std::vector<std::string>& announced, const teller& from);
+
+/// The same, as this node tells of them: what is of no use to anybody who hears it from here is left out, and addresses
+/// that are unspecified get the teller's host, unless that is this one.
+std::vector<std::string> endpoints_to_pass_on(const std::vector<std::string>& announced, const teller& from);
 
 } // namespace cles::core

@@ -69,7 +69,8 @@ void reply_writer::fail(reply_to where, const protocol::failure& why) {
     }
     ++node_.counts.errors;
     auto told = why;
-    if (!told.message.starts_with(node_.name)) { // a handler's own words do not say whose they are
+    if (told.answer.empty() &&
+        !told.message.starts_with(node_.name)) { // a handler's own words do not say whose they are
         told.message.insert(0, node_.name + ": ");
     }
     auto& out = output_for(where);
@@ -79,6 +80,7 @@ void reply_writer::fail(reply_to where, const protocol::failure& why) {
     protocol::append_failure(out, told);
     if (out.size() - line > longest_) { // a handler may have many words; the peer would close the link over them
         out.resize(body);
+        told.answer.clear();
         cut(told.message, longest_ / longest_escape > head_room ? longest_ / longest_escape - head_room : 0);
         protocol::append_failure(out, told);
     }

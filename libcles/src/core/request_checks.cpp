@@ -41,13 +41,14 @@ bool passes(std::string_view via, std::string_view name) {
 namespace {
 
 // What the rules throw is their own fault, and no reason to let anybody in.
-bool ask_rules(const node& n, const access& asked) {
+bool ask_rules(const node& n, const access& asked, std::uint64_t id) {
     try {
         return n.authorise(asked);
     } catch (const std::exception& thrown) {
-        n.say(log_level::error, std::string{"denied, since the access rules threw: "} + thrown.what());
+        const auto why = std::string{"denied, since the access rules threw: "} + thrown.what();
+        n.say(log_level::error, {why, asked.peer.address, id});
     } catch (...) {
-        n.say(log_level::error, "denied, since the access rules threw");
+        n.say(log_level::error, {"denied, since the access rules threw", asked.peer.address, id});
     }
     return false;
 }
@@ -60,7 +61,11 @@ bool allows(const node& n, const identity& peer, const protocol::request_line& r
     }
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
-    return ask_rules(n, {peer, r.verb, r.noun.task, path});
+    return ask_rules(n, {peer, r.verb, r.noun.task, path}, r.id);
+}
+
+bool is_for(const node& n, const protocol::request_line& r) {
+    return r.noun.target == "self" || r.noun.target == n.name;
 }
 
 std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& r) {
@@ -71,7 +76,9 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
         return object(errc::denied, n.name + " does not allow " + std::string{to_string(r.verb)} + " '" +
                                         std::string{r.noun.task} + "'");
     }
-    if ((r.noun.target != "self" && r.noun.target != n.name) || passes(r.via, n.name)) {
+    // What is told of the reserved task is for the link that it comes by: an id to withdraw, for one.
+    const bool stays = n.way == nullptr || (r.noun.task == "cles" && r.verb != verb::pull);
+    if ((stays && !is_for(n, r)) || passes(r.via, n.name)) {
         return object(errc::no_target, n.name + " knows no way to '" + std::string{r.noun.target} + "'");
     }
     std::string why;

@@ -28,6 +28,9 @@ bool passes(std::string_view via, std::string_view name);
 /// Whether the access rules let this peer ask for this.
 bool allows(const node& n, const identity& peer, const protocol::request_line& request);
 
+/// Whether it is for this node by name or as `self`.
+bool is_for(const node& n, const protocol::request_line& request);
+
 /// What keeps a node from serving a request, whatever it asks for: access, target, body.
 std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& request);
 

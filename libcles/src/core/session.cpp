@@ -33,7 +33,7 @@ void session::on_line(std::string_view line, time_point now) {
         if (is_datagram()) { // no web page sends one
             return;
         }
-        node_->say(log_level::warning, "a web client was turned away: " + peer_.address);
+        node_->say(log_level::warning, {"a web client was turned away: " + peer_.address, peer_.address});
         on_lost("the peer speaks HTTP");
         out_.close();
         return;

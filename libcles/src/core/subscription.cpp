@@ -9,13 +9,18 @@ namespace cles::core {
 
 namespace {
 
-// At the other end of a link `self` is a node that has a name too, and it holds one binding of a noun for the link.
-bool overlap(std::string_view a, std::string_view b) noexcept { return a == b || a == "self" || b == "self"; }
+// At the other end of a link `self` is a node that has a name too, and it holds one binding of a noun for the link;
+// `all` are all, whatever their names.
+bool overlap(std::string_view a, std::string_view b) noexcept {
+    const auto is_some = [](std::string_view t) { return t == "self" || t == "all"; };
+    return a == b || is_some(a) || is_some(b);
+}
 
 } // namespace
 
 bool subscription::take(const protocol::request_line& update) {
-    return take_in(order_, update, thinned_, [this](const detail::raw_event& event) { return on_event(event); });
+    return take_in(each_ ? each_->of(update.noun.target) : order_, update, thinned_,
+                   [this](const detail::raw_event& event) { return on_event(event); });
 }
 
 bool subscriptions::has(std::string_view target, std::string_view path) const {
@@ -49,12 +54,16 @@ subscription* subscriptions::find(std::string_view publisher, std::string_view p
     if (found == by_path_.end()) {
         return nullptr;
     }
+    subscription* of_all = nullptr;
     for (auto* s : found->second) {
         if (s->target() == publisher || s->target() == "self") { // whoever is at the other end; no other is beside it
             return s;
         }
+        if (s->target() == "all") {
+            of_all = s;
+        }
     }
-    return nullptr;
+    return of_all;
 }
 
 subscriptions::match subscriptions::recognise(std::string_view line) noexcept {

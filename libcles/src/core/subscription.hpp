@@ -2,13 +2,16 @@
 #pragma once
 
 #include <cles/feed_event.hpp>
+#include <cles/limits.hpp>
 
+#include "core/publisher_orders.hpp"
 #include "core/text_map.hpp"
 #include "core/update_order.hpp"
 #include "protocol/message.hpp"
 #include "protocol/update_head.hpp"
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,7 +24,8 @@ class subscription {
   public:
     /// `thinned`: with `every`, so that what is missing is no gap.
     subscription(std::string target, std::string path, bool thinned)
-        : target_(std::move(target)), path_(std::move(path)), thinned_(thinned) {}
+        : target_(std::move(target)), path_(std::move(path)), thinned_(thinned),
+          each_(target_ == "all" ? std::make_unique<publisher_orders>(limits{}.publishers) : nullptr) {}
     subscription(const subscription&) = delete;
     subscription& operator=(const subscription&) = delete;
 
@@ -43,6 +47,7 @@ class subscription {
     std::string path_;
     bool thinned_;
     update_order order_;
+    std::unique_ptr<publisher_orders> each_; // where it is bound to all
 };
 
 /// The subscriptions on one link, by what they are bound to: one for each publisher and noun.

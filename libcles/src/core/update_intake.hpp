@@ -21,7 +21,9 @@ bool take_in(update_order& order, const protocol::request_line& update, bool thi
     }
     detail::raw_event event{.body = update.body.empty() ? std::string_view{"{}"} : update.body,
                             .publisher = update.noun.target,
-                            .seq = *update.seq};
+                            .seq = *update.seq,
+                            .line = update.text,
+                            .reading = update.reading};
     if (verdict.missed != 0 && !thinned) {
         event.checked = event.has_json();
         if (!event.checked) {

@@ -81,6 +81,10 @@ bool parse_failure(std::string_view body, failure& out) {
 }
 
 void append_failure(std::string& out, const failure& f) {
+    if (!f.answer.empty()) {
+        out.append(f.answer);
+        return;
+    }
     json_writer writer{out};
     writer.begin_object();
     writer.key("error");

@@ -40,12 +40,14 @@ struct failure {
     std::string message;
     std::optional<std::uint64_t> retry_ms{};
     bool ran = false;
+    std::string answer{}; ///< where it is passed on: the whole body, as another node wrote it
 };
 
 /// Reads a failure's members; a code from a newer node counts as `failed`. False: it is not valid JSON.
 bool parse_failure(std::string_view body, failure& out);
 
-/// Appends a failure's body. `ran` is written where it says something, `retry_ms` there and with `busy` always.
+/// Appends a failure's body: as it was written already, where it was. `ran` is written where it says something,
+/// `retry_ms` there and with `busy` always.
 void append_failure(std::string& out, const failure& f);
 
 /// Appends "id=7 ", or nothing for 0.

@@ -10,21 +10,6 @@
 namespace cles::protocol {
 namespace {
 
-std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept {
-    std::uint32_t value = 0;
-    if (text.size() != 8) {
-        return std::nullopt;
-    }
-    for (const auto c : text) {
-        const bool digit = is_digit(c);
-        if (!digit && (c < 'a' || c > 'f')) {
-            return std::nullopt;
-        }
-        value = value << 4U | static_cast<std::uint32_t>(digit ? c - '0' : c - 'a' + 10);
-    }
-    return value;
-}
-
 bool is_name_list(std::string_view text) noexcept {
     for (;;) {
         const auto comma = text.find(',');
@@ -35,6 +20,24 @@ bool is_name_list(std::string_view text) noexcept {
             return true;
         }
         text.remove_prefix(comma + 1);
+    }
+}
+
+bool is_epoch_list(std::string_view text) noexcept {
+    constexpr std::size_t each = 9; // with its comma
+    if (text.size() % each != each - 1 || text.size() > most_described * each) {
+        return false;
+    }
+    for (;; text.remove_prefix(each)) {
+        if (!parse_epoch(text.substr(0, each - 1))) {
+            return false;
+        }
+        if (text.size() < each) {
+            return true;
+        }
+        if (text[each - 1] != ',') {
+            return false;
+        }
     }
 }
 
@@ -60,11 +63,14 @@ enum class known : std::uint8_t {
     seq,
     epoch,
     via,
+    since,
+    describe,
     none
 };
 
-constexpr std::array<std::string_view, 12> known_keys{"id",    "deadline", "reply", "hops", "progress", "urgent",
-                                                      "lease", "every",    "keep",  "seq",  "epoch",    "via"};
+constexpr std::array<std::string_view, 14> known_keys{"id",     "deadline", "reply", "hops",    "progress",
+                                                      "urgent", "lease",    "every", "keep",    "seq",
+                                                      "epoch",  "via",      "since", "describe"};
 
 constexpr std::uint8_t on(std::initializer_list<verb> verbs) {
     std::uint8_t mask = 0;
@@ -75,7 +81,7 @@ constexpr std::uint8_t on(std::initializer_list<verb> verbs) {
 }
 
 constexpr std::uint8_t on_all = on({verb::pull, verb::push, verb::delegate, verb::bind, verb::update});
-constexpr std::array<std::uint8_t, 12> known_on{on_all,
+constexpr std::array<std::uint8_t, 14> known_on{on_all,
                                                 on_all,
                                                 on({verb::push, verb::update}),
                                                 on_all,
@@ -86,7 +92,9 @@ constexpr std::array<std::uint8_t, 12> known_on{on_all,
                                                 on({verb::bind}),
                                                 on({verb::update}),
                                                 on({verb::update}),
-                                                on_all};
+                                                on_all,
+                                                on({verb::pull}),
+                                                on({verb::pull})};
 
 known find_known(std::string_view key, verb v) noexcept {
     for (std::size_t i = 0; i < known_keys.size(); ++i) {
@@ -127,6 +135,8 @@ bool apply(known k, std::string_view value, request_line& out) {
     case known::seq: out.seq = number_between(value, 1, max_id); return out.seq.has_value();
     case known::epoch: out.epoch = parse_epoch(value); return out.epoch.has_value();
     case known::via: out.via = value; return is_name_list(value);
+    case known::since: out.since = value; return value.size() <= longest_since;
+    case known::describe: out.describe = value; return is_epoch_list(value);
     case known::none: break;
     }
     return true;
@@ -216,6 +226,8 @@ bool parse_request(std::string_view line, request_line& out, malformed_request& 
     return false;
 }
 
+bool is_known_adverb(std::string_view key, verb on) noexcept { return find_known(key, on) != known::none; }
+
 malformed_request salvage(std::string_view line) {
     malformed_request result;
     part_reader parts{line};
@@ -291,6 +303,21 @@ void append_update_head(std::string& out, std::string_view publisher, std::strin
     out.append(path);
     append_adverb(out, "seq", seq);
     out.append(" epoch=").append(epoch).push_back(' ');
+}
+
+std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept {
+    std::uint32_t value = 0;
+    if (text.size() != 8) {
+        return std::nullopt;
+    }
+    for (const auto c : text) {
+        const bool digit = is_digit(c);
+        if (!digit && (c < 'a' || c > 'f')) {
+            return std::nullopt;
+        }
+        value = value << 4U | static_cast<std::uint32_t>(digit ? c - '0' : c - 'a' + 10);
+    }
+    return value;
 }
 
 std::string epoch_text(std::uint32_t epoch) {

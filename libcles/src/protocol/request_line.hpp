@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/shared_reading.hpp>
 #include <cles/verb.hpp>
 
 #include "protocol/grammar.hpp"
 #include "protocol/parts.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -23,6 +25,8 @@ inline constexpr std::uint64_t max_keep = 65'536;
 inline constexpr std::uint64_t max_hops = 16;
 inline constexpr std::uint32_t default_lease_ms = 10'000;
 inline constexpr std::uint32_t max_lease_ms = 60'000;
+inline constexpr std::size_t longest_since = 64;
+inline constexpr std::size_t most_described = 64;
 
 constexpr std::uint32_t default_deadline(verb v) noexcept {
     return v == verb::delegate ? default_delegate_deadline_ms : default_deadline_ms;
@@ -44,8 +48,11 @@ struct request_line {
     std::optional<std::uint64_t> seq;
     std::optional<std::uint32_t> epoch;
     std::string_view via;
-    std::string_view body; ///< empty: none was given
-    std::string_view text; ///< the line that all this was read from
+    std::string_view since;                    ///< what has been told already
+    std::string_view describe;                 ///< epochs of runs that are to be told of in full, separated by commas
+    std::string_view body;                     ///< empty: none was given
+    std::string_view text;                     ///< the line that all this was read from
+    detail::shared_reading* reading = nullptr; ///< of the body, where others are handed the same line
 
     /// An update, as opposed to a request to publish.
     [[nodiscard]] bool is_update() const noexcept { return seq && epoch; }
@@ -61,6 +68,9 @@ struct malformed_request {
 
 /// Reads the parts of a request. The body is found but not validated, so that a caller which drops it need not pay.
 bool parse_request(std::string_view line, request_line& out, malformed_request& error);
+
+/// Whether an adverb of that key has a meaning of this version on that verb.
+bool is_known_adverb(std::string_view key, verb on) noexcept;
 
 /// What the parts before the body say for an answer to a line that cannot be read as a whole.
 malformed_request salvage(std::string_view line);
@@ -88,7 +98,8 @@ void append_request(std::string& out, const request_text& request);
 void append_update_head(std::string& out, std::string_view publisher, std::string_view path, std::uint64_t seq,
                         std::string_view epoch);
 
-/// Eight lower-case hex digits.
+/// Eight lower-case hex digits, both ways.
+std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept;
 std::string epoch_text(std::uint32_t epoch);
 
 } // namespace cles::protocol

@@ -50,6 +50,7 @@ const request_line* update_head::recognise(std::string_view line) noexcept {
     if (before_.empty() || !line.starts_with(before_)) {
         return nullptr;
     }
+    const auto whole = line;
     line.remove_prefix(before_.size());
     constexpr std::size_t most_digits = 18; // longer ones are for the parser to judge
     std::uint64_t seq = 0;
@@ -67,6 +68,7 @@ const request_line* update_head::recognise(std::string_view line) noexcept {
     }
     update_->seq = seq;
     update_->body = line;
+    update_->text = whole;
     return update_.get();
 }
 

@@ -200,7 +200,8 @@ void connection::on_stall(time_point now) {
         engine_->deadlines().arm(stall_, now + engine_->bounds().stall);
         return;
     }
-    engine_->say(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address);
+    engine_->say(log_level::warning,
+                 {"closed a link whose peer takes nothing: " + link_->peer().address, link_->peer().address});
     abandon("the peer took nothing for too long");
 }
 

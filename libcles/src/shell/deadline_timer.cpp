@@ -5,8 +5,9 @@
 
 namespace cles::shell {
 
-deadline_timer::deadline_timer(const boost::asio::any_io_executor& executor, std::function<void()> due)
-    : timer_(executor), due_(std::move(due)) {}
+deadline_timer::deadline_timer(const boost::asio::any_io_executor& executor, const core::clock& time,
+                               std::function<void(bool)> due)
+    : timer_(executor), time_(time), due_(std::move(due)) {}
 
 void deadline_timer::follow(const core::deadline_queue& deadlines) {
     const auto next = deadlines.next();
@@ -14,11 +15,12 @@ void deadline_timer::follow(const core::deadline_queue& deadlines) {
         return;
     }
     set_for_ = next;
+    absence_.expect(*next, time_.now());
     timer_.expires_at(*next);
     timer_.async_wait([self = shared_from_this()](boost::system::error_code code) {
         if (!code && self->due_) {
             self->set_for_.reset();
-            self->due_();
+            self->due_(self->absence_.ended(self->time_.now()));
         }
     });
 }

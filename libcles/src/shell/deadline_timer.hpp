@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "core/absence.hpp"
+#include "core/clock.hpp"
 #include "core/deadlines.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
@@ -16,15 +18,19 @@ namespace cles::shell {
 /// requests which end in time cost it nothing.
 class deadline_timer : public std::enable_shared_from_this<deadline_timer> {
   public:
-    /// `due` is called when the earliest deadline has come.
-    deadline_timer(const boost::asio::any_io_executor& executor, std::function<void()> due);
+    /// `due` is called when the earliest deadline has come, and told whether the process was stopped meanwhile. The
+    /// clock stays until `stop`.
+    deadline_timer(const boost::asio::any_io_executor& executor, const core::clock& time,
+                   std::function<void(bool)> due);
 
     void follow(const core::deadline_queue& deadlines);
     void stop();
 
   private:
     boost::asio::steady_timer timer_;
-    std::function<void()> due_;
+    const core::clock& time_;
+    std::function<void(bool)> due_;
+    core::absence absence_;
     std::optional<time_point> set_for_;
 };
 

@@ -16,8 +16,8 @@ namespace asio = boost::asio;
 
 namespace {
 
-// How many turns of the executor updates may wait for more to come, so that one write carries them all.
-constexpr int most_turns_put_off = 64;
+// Publishers that go on in one turn, before others have theirs.
+constexpr int most_go_on = 8;
 
 core::node_setup setup_of(service_options& options) {
     std::random_device source;
@@ -29,7 +29,9 @@ core::node_setup setup_of(service_options& options) {
             .first_datagram_id = (source() & 0xFFFFFFFFU) * apart,
             .bounds = options.limits,
             .authorise = std::move(options.authorise),
-            .log = std::move(options.log)};
+            .log = std::move(options.log),
+            .metrics = std::move(options.metrics),
+            .load = std::move(options.load)};
 }
 
 void check_node_name(const std::string& name) {
@@ -46,7 +48,7 @@ void check_node_name(const std::string& name) {
 
 engine::engine(asio::any_io_executor executor, service_options options)
     : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks),
-      multicast_(options.multicast) {
+      multicast_(options.multicast), gossip_(options.gossip), routing_wanted_(options.routing) {
     check_node_name(options.name);
     for (const auto& [name, where] : options.peers) {
         routes_.set_peer(name, where);
@@ -58,31 +60,58 @@ engine::engine(asio::any_io_executor executor, service_options options)
 engine::~engine() = default;
 
 void engine::start(const std::vector<std::string>& listen_at) {
-    timer_ = std::make_shared<shell::deadline_timer>(executor_, [weak = weak_from_this()] {
+    timer_ = std::make_shared<shell::deadline_timer>(executor_, clock_, [weak = weak_from_this()](bool was_away) {
         if (const auto self = weak.lock()) {
-            self->node_->deadlines.expire(self->now());
-            self->settle();
+            self->expire(was_away);
         }
     });
+    if (routing_wanted_ != nullptr) {
+        routing_ = routing_wanted_->make(*this);
+    }
     for (const auto& where : listen_at) {
         listen(where);
     }
     if (multicast_.is_on()) {
         join_group();
     }
+    if (gossip_.part != nullptr) {
+        neighbours_->gossip(gossip_);
+    } else {
+        neighbours_->start();
+    }
+    if (routing_ && neighbours_->expects_more()) {
+        routing_->hold();
+    }
     listeners_.open_local_doors();
+}
+
+void engine::expire(bool was_away) {
+    const auto at = now();
+    if (was_away) {
+        node_->others.excuse(at);
+    }
+    node_->deadlines.expire(at);
+    settle();
 }
 
 void engine::join_group() {
     try {
         group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
         group_->start();
-        neighbours_->start(*group_, multicast_.interface);
+        neighbours_->join(*group_, multicast_.interface);
     } catch (const error& e) {
         if (multicast_.required) {
             throw;
         }
         say(log_level::warning, "no multicast: " + e.message());
+    }
+}
+
+void engine::on_round_over() {
+    const auto keep = shared_from_this();
+    routes_.on_round_over();
+    if (routing_) {
+        routing_->release(now());
     }
 }
 
@@ -109,7 +138,8 @@ std::string engine::stranger(const identity& peer) const {
 // -- turns ---------------------------------------------------------------------------------------------------------
 
 void engine::flush_soon(shell::connection& c) {
-    if (!c.flush_asked_) {
+    // Once stopped there are no more turns; stop() itself flushes whatever is said on the way, like a farewell.
+    if (!c.flush_asked_ && !stopped_) {
         c.flush_asked_ = true;
         to_flush_.push_back(c.shared_from_this());
         ask_for_turn();
@@ -130,19 +160,22 @@ void engine::turn() {
     if (stopped_) {
         return;
     }
+    let_publishers_go_on();
+    if (stopped_) {
+        return;
+    }
     auto& published = node_->published;
     if (published.dirty()) {
-        // While each turn brings more updates, they are let gather: one write for many.
-        const auto so_far = published.published();
-        if (so_far != published_at_last_turn_ && turns_put_off_ < most_turns_put_off) {
-            published_at_last_turn_ = so_far;
-            ++turns_put_off_;
+        const auto at = now();
+        if (gathering_.waits(published.published(), at)) {
             ask_for_turn();
         } else {
-            turns_put_off_ = 0;
-            published.drain(now());
-            published_at_last_turn_ = published.published();
+            published.drain(at);
+            gathering_.gone(published.published());
         }
+    }
+    if (routing_) {
+        routing_->drain(now());
     }
     flushing_.swap(to_flush_);
     for (const auto& c : flushing_) {
@@ -151,6 +184,21 @@ void engine::turn() {
     }
     flushing_.clear();
     settle();
+}
+
+// Each may publish again at once, and then waits here anew. The next turn is asked for first: what they do may throw.
+void engine::let_publishers_go_on() {
+    if (!node_->published.has_results()) {
+        return;
+    }
+    ask_for_turn();
+    for (int i = 0; i < most_go_on; ++i) {
+        auto next = node_->published.next_result();
+        if (!next) {
+            return;
+        }
+        next->tell();
+    }
 }
 
 // -- asking --------------------------------------------------------------------------------------------------------
@@ -209,10 +257,10 @@ void engine::cancel(std::uint64_t ticket) {
 void engine::add(registration task) {
     core::handler entry{.info = std::move(task.info), .plain = std::move(task.plain)};
     if (task.async) {
-        entry.start = [handler = std::move(task.async), executor = executor_](const request& r,
-                                                                              const std::shared_ptr<core::call>& call) {
+        entry.start = [handler = std::move(task.async), executor = executor_,
+                       self = weak_from_this()](const request& r, const std::shared_ptr<core::call>& call) {
             // Held here too, so that what a handler throws is the answer, and not that its responder went without one.
-            const auto control = std::make_shared<shell::service_call>(call, executor);
+            const auto control = std::make_shared<shell::service_call>(call, executor, self);
             try {
                 handler(r, responder{control});
             } catch (...) {
@@ -249,6 +297,28 @@ void engine::publish(std::string_view noun, const std::function<void(json_writer
     node_->published.publish(noun, write);
 }
 
+std::shared_ptr<update_sink> engine::outside_updates() {
+    if (!outside_updates_) {
+        // The service outlives what is taken: it closes this when it stops.
+        outside_updates_ = std::make_shared<shell::outside_updates>(
+            executor_,
+            [this](std::string_view noun, std::string_view json) {
+                try {
+                    publish(noun, [json](json_writer& w) { write_text(w, json); });
+                } catch (const error& e) {
+                    say(log_level::warning, "an update of '" + std::string{noun} + "' was refused: " + e.message());
+                }
+            },
+            [this](std::size_t count) {
+                say(log_level::warning, std::to_string(count) + " updates were dropped: they come faster than they go");
+            });
+        if (stopped_) {
+            outside_updates_->close();
+        }
+    }
+    return outside_updates_;
+}
+
 void engine::publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation) {
     if (stopped_) {
         fail_later(std::move(operation), errc::stopped, "the service has been stopped");
@@ -258,9 +328,7 @@ void engine::publish_when_room(std::string_view noun, std::string_view json, pen
         if (node_->published.find(noun) == nullptr) {
             check_path(noun);
         }
-        if (node_->published.publish_when_room(noun, json, operation)) {
-            asio::post(executor_, [operation = std::move(operation)]() mutable { operation.release()->offer("{}"); });
-        }
+        node_->published.publish_when_room(noun, json, operation);
     } catch (const error& e) {
         fail_later(std::move(operation), e.code(), e.message());
     }
@@ -273,9 +341,13 @@ void engine::stop() {
         return;
     }
     const auto keep = shared_from_this();
+    node_->published.drain(now()); // what has been published goes out
     stopped_ = true;
     listeners_.close();
     timer_->stop();
+    if (routing_) {
+        routing_->stop();
+    }
     for (const auto& c : std::exchange(to_flush_, {})) {
         c->flush();
     }
@@ -286,6 +358,12 @@ void engine::stop() {
         }
     };
     feeds_.stop();
+    if (outside_updates_) {
+        outside_updates_->close();
+    }
+    while (auto result = node_->published.next_result()) {
+        asio::post(executor_, [result = std::move(*result)]() mutable { result.tell(); });
+    }
     tell(node_->published.take_waiters());
     neighbours_->stop();
     if (group_) {

@@ -7,6 +7,7 @@
 
 #include "core/feed_machine.hpp"
 #include "core/node.hpp"
+#include "core/update_gathering.hpp"
 #include "protocol/grammar.hpp"
 #include "shell/connection.hpp"
 #include "shell/connections.hpp"
@@ -16,7 +17,9 @@
 #include "shell/listeners.hpp"
 #include "shell/neighbours.hpp"
 #include "shell/networks.hpp"
+#include "shell/outside_updates.hpp"
 #include "shell/routes.hpp"
+#include "shell/routing_part.hpp"
 #include "shell/steady_clock.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
@@ -51,23 +54,29 @@ class engine final : public std::enable_shared_from_this<engine> {
     /// The address of a peer that might be another than it says, for which there is a limit on what is sent there;
     /// empty for others.
     [[nodiscard]] std::string stranger(const identity& peer) const;
-    void say(log_level level, std::string_view text) const { node_->say(level, text); }
+    void say(log_level level, const log_entry& what) const { node_->say(level, what); }
     [[nodiscard]] shell::connections& connections() noexcept { return connections_; }
     [[nodiscard]] shell::listeners& listeners() noexcept { return listeners_; }
     [[nodiscard]] shell::routes& routes() noexcept { return routes_; }
     [[nodiscard]] shell::neighbours& neighbours() noexcept { return *neighbours_; }
     /// The multicast group; null where it is off.
     [[nodiscard]] shell::group* group() noexcept { return group_.get(); }
+    /// Whoever is there has been heard of, as far as could be waited for.
+    void on_round_over();
     /// A connection has ended.
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
     /// Has its output written when what runs now has ended.
     void flush_soon(shell::connection& c);
+    /// Has what waits carried on when what runs now has ended.
+    void ask_for_turn();
     /// To be called when something has happened: sets the timer.
     void settle() { timer_->follow(node_->deadlines); }
 
     // For the façade.
     void add(registration task);
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
+    /// Where updates go that come from other threads.
+    std::shared_ptr<detail::update_sink> outside_updates();
     void publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation);
     std::uint64_t send(const outgoing& request, const call_options& options, pending_ptr operation);
     void cancel(std::uint64_t ticket);
@@ -80,8 +89,9 @@ class engine final : public std::enable_shared_from_this<engine> {
 
   private:
     void join_group();
-    void ask_for_turn();
+    void expire(bool was_away);
     void turn();
+    void let_publishers_go_on();
     void check_path(std::string_view noun) const;
 
     boost::asio::any_io_executor executor_;
@@ -91,16 +101,19 @@ class engine final : public std::enable_shared_from_this<engine> {
     bool insecure_;
     shell::networks networks_;
     multicast_options multicast_;
+    gossip_options gossip_;
     shell::routes routes_{*this};
     shell::listeners listeners_{*this};
     shell::connections connections_{*this};
     shell::feed_links feeds_{*this};
     std::unique_ptr<shell::group> group_;
     std::unique_ptr<shell::neighbours> neighbours_;
+    std::shared_ptr<shell::outside_updates> outside_updates_; ///< once somebody wants to publish from elsewhere
+    const routing_part* routing_wanted_;
+    std::unique_ptr<routing_host> routing_; // null: off
     std::vector<std::shared_ptr<shell::connection>> to_flush_;
     std::vector<std::shared_ptr<shell::connection>> flushing_;
-    std::uint64_t published_at_last_turn_ = 0;
-    int turns_put_off_ = 0;
+    core::update_gathering gathering_;
     bool turn_asked_ = false;
     bool stopped_ = false;
 };

@@ -170,7 +170,8 @@ protocol::request_text feed_links::bind_text(entry& e, const connection& c) {
                                    .noun = e.terms.noun,
                                    .id = engine_.draw_id(),
                                    .every_ms = e.terms.every_ms,
-                                   .keep = e.terms.keep};
+                                   .keep = e.terms.keep,
+                                   .adverbs = e.terms.adverbs};
     if (c.datagram() != 0) {
         request.lease_ms = static_cast<std::uint32_t>(engine_.bounds().lease.count());
         e.asking = request.id;

@@ -25,6 +25,7 @@ struct feed_terms {
     std::chrono::milliseconds deadline{};
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
+    std::string adverbs{}; ///< further ones, as they stand on the wire
 };
 
 /// The feeds of a service and the links that they are on: finds each a link, sends its BIND, and unbinds it.

@@ -47,7 +47,7 @@ std::shared_ptr<transport::group_port> join(detail::engine& host, const multicas
 
 group::group(detail::engine& host, const multicast_options& where, bool insecure)
     : engine_(host), port_(join(host, where, insecure)), source_(source_of(port_->source())),
-      session_(host.node(), source_, *this, std::random_device{}()) {}
+      session_(host.shared_node(), source_, *this, std::random_device{}()) {}
 
 group::~group() { port_->close(); }
 
@@ -61,7 +61,7 @@ void group::stop() {
             });
         }
     }
-    session_.bindings().clear();
+    session_.unbind_all();
     port_->close();
 }
 
@@ -75,9 +75,9 @@ bool group::send(std::string_view line) {
     return true;
 }
 
-void group::on_datagram(const boost::asio::ip::udp::endpoint& from, std::string_view datagram) {
+void group::on_datagram(const transport::group_datagram& datagram) {
     const auto keep = engine_.shared_from_this();
-    session_.on_datagram(source_of(from), datagram, engine_.now());
+    session_.on_message(source_of(datagram.from), datagram.said, engine_.now());
 }
 
 void group::on_batch() { engine_.settle(); }

@@ -36,7 +36,7 @@ class group final : public core::group_output, private transport::group_events {
     [[nodiscard]] const core::group_source& source() const noexcept { return source_; }
 
   private:
-    void on_datagram(const boost::asio::ip::udp::endpoint& from, std::string_view datagram) override;
+    void on_datagram(const transport::group_datagram& datagram) override;
     void on_batch() override;
     void on_room() override;
 

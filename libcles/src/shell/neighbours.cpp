@@ -11,17 +11,37 @@
 namespace cles::shell {
 
 neighbours::neighbours(detail::engine& host, std::uint32_t seed)
-    : engine_(host), announcer_(*this, host.deadlines(), seed), round_(*this, host.deadlines()) {
+    : engine_(host), announcer_(*this, host.deadlines(), seed), round_(*this, host.deadlines()), seed_(seed * 7 + 3) {
     host.node().others.watch(this);
 }
 
 neighbours::~neighbours() { engine_.node().others.watch(nullptr); }
 
-void neighbours::start(group& through, std::string interface) {
+void neighbours::join(group& through, std::string interface) {
     group_ = &through;
     interface_ = std::move(interface);
     group_->session().attend(this);
-    round_.expect();
+}
+
+void neighbours::gossip(const gossip_options& how) {
+    if (gossiper_) {
+        gossiper_->set_seeds(how.seeds);
+        engine_.settle();
+    } else if (how.part != nullptr) {
+        auto made = how.part->make(engine_, seed_);
+        made->set_seeds(how.seeds);
+        gossiper_ = std::move(made);
+        start();
+    }
+}
+
+void neighbours::start() {
+    if (group_ == nullptr && !gossiper_) {
+        return;
+    }
+    if (!begun_) {
+        round_.expect();
+    }
     boost::asio::post(engine_.executor(), [weak = engine_.weak_from_this(), this] {
         if (const auto host = weak.lock(); host && !host->stopped()) {
             begin();
@@ -31,9 +51,19 @@ void neighbours::start(group& through, std::string interface) {
 
 void neighbours::begin() {
     const auto now = engine_.now();
-    group_->send("BIND all:cles\n");
-    round_.begin(now);
-    announcer_.start(now);
+    if (!std::exchange(begun_, true)) {
+        if (group_ != nullptr) {
+            group_->send("BIND all:cles\n");
+        }
+        round_.begin(now);
+        if (!left_) {
+            announcer_.start(now);
+        }
+    }
+    if (gossiper_) {
+        announcer_.hurry(now); // those who are asked are told of this node
+        gossiper_->start();
+    }
     engine_.settle();
 }
 
@@ -43,14 +73,27 @@ void neighbours::ask_for(std::string_view node) {
     }
 }
 
+void neighbours::leave() {
+    if (std::exchange(left_, true)) {
+        return;
+    }
+    announcer_.stop();
+    if (gossiper_) {
+        gossiper_->leave();
+    }
+    if (group_ != nullptr && seq_ != 0) {
+        announce(core::announcer::shortest, true);
+    }
+}
+
 void neighbours::stop() {
     engine_.node().others.watch(nullptr);
-    announcer_.stop();
+    leave();
     round_.stop();
+    if (gossiper_) {
+        gossiper_->stop();
+    }
     if (group_ != nullptr) {
-        if (seq_ != 0) {
-            announce(core::announcer::shortest, true);
-        }
         group_->session().attend(nullptr);
         group_ = nullptr;
     }
@@ -69,21 +112,39 @@ void neighbours::announce(std::chrono::milliseconds interval, bool leaving) {
     std::string tasks;
     json_writer w{tasks};
     write_tasks(w, node);
-    const core::announcement said{.node = node.name,
-                                  .endpoints = endpoints_to_tell(),
-                                  .load = {.running = static_cast<std::uint32_t>(node.counts.handlers_running)},
-                                  .interval = interval,
-                                  .tasks = core::digest_of_tasks(tasks),
-                                  .leaving = leaving};
-    std::string line;
-    append_announcement(line, said, ++seq_, node.epoch);
-    if (group_->send(line)) {
-        ++node.counts.announcements_sent;
+    core::announcement said{.node = node.name,
+                            .load = node.load_now(),
+                            .interval = interval,
+                            .tasks = core::digest_of_tasks(tasks),
+                            .leaving = leaving};
+    ++seq_;
+    if (gossiper_ && !leaving) {
+        said.endpoints = endpoints_for_gossip();
+        node.others.speak(said, seq_, engine_.now());
+    }
+    if (group_ != nullptr) {
+        said.endpoints = endpoints_for_group();
+        std::string line;
+        append_announcement(line, said, seq_, node.epoch);
+        if (group_->send(line)) {
+            ++node.counts.announcements_sent;
+        }
     }
 }
 
+// Those who hear of them from others pass over what they cannot use.
+std::vector<std::string> neighbours::endpoints_for_gossip() const {
+    std::vector<std::string> result;
+    for (const auto& endpoint : engine_.node().endpoints) {
+        if (!endpoint.starts_with("inproc:")) {
+            result.push_back(endpoint);
+        }
+    }
+    return result;
+}
+
 // What others in the group can use: on loopback all but what stays in this process, elsewhere what other hosts reach.
-std::vector<std::string> neighbours::endpoints_to_tell() const {
+std::vector<std::string> neighbours::endpoints_for_group() const {
     std::vector<std::string> result;
     const bool loopback = group_->source().is_loopback();
     for (const auto& endpoint : engine_.node().endpoints) {
@@ -130,7 +191,8 @@ void neighbours::on_announcement(const core::group_source& from, const protocol:
     case core::presence::verdict::taken: ++counts.announcements_received; break;
     case core::presence::verdict::old: ++counts.announcements_dropped; break;
     case core::presence::verdict::refused: ++counts.peers_refused; break;
-    case core::presence::verdict::own: break;
+    case core::presence::verdict::own:
+    case core::presence::verdict::unknown: break;
     }
 }
 
@@ -144,7 +206,12 @@ void neighbours::on_peer(std::string_view node, core::presence::change what, std
     case core::presence::change::silent: engine_.say(log_level::debug, name + " is not heard any more"); break;
     case core::presence::change::returned: engine_.say(log_level::debug, name + " is heard again"); break;
     case core::presence::change::left: engine_.say(log_level::info, name + " has left"); break;
-    case core::presence::change::gone: engine_.say(log_level::info, name + " is gone"); break;
+    case core::presence::change::gone:
+        engine_.say(log_level::info, name + " is gone");
+        if (gossiper_) {
+            gossiper_->on_gone(node, where, engine_.now());
+        }
+        break;
     case core::presence::change::clash:
         engine_.say(log_level::warning,
                     name == engine_.node().name
@@ -155,14 +222,17 @@ void neighbours::on_peer(std::string_view node, core::presence::change what, std
     engine_.routes().on_whereabouts(name);
 }
 
-void neighbours::on_round_over() { engine_.routes().on_round_over(); }
+void neighbours::on_round_over() { engine_.on_round_over(); }
 
 std::optional<std::string_view> neighbours::find(std::string_view node) const noexcept {
     return engine_.node().others.find(node);
 }
 
 std::string neighbours::why_unknown() const {
-    return group_ == nullptr ? std::string{} : "nobody of that name has announced itself on " + interface_ + "; ";
+    if (group_ == nullptr) {
+        return gossiper_ ? "no node that it asks knows of it; " : "";
+    }
+    return "nobody of that name has announced itself on " + interface_ + "; ";
 }
 
 } // namespace cles::shell

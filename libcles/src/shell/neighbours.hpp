@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/gossip.hpp>
+
 #include "core/announcer.hpp"
 #include "core/first_round.hpp"
 #include "core/group_session.hpp"
 #include "core/presence.hpp"
+#include "shell/gossip_part.hpp"
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,8 +26,8 @@ namespace cles::shell {
 
 class group;
 
-/// The other nodes of the multicast group: hears who they are, and tells them of this one. Without a group there are
-/// none.
+/// The other nodes: hears and asks who they are, and tells them of this one, in the multicast group and by gossip.
+/// Without either there are none.
 class neighbours final : private core::group_presence,
                          private core::presence::watcher,
                          private core::announcer::voice,
@@ -34,9 +38,15 @@ class neighbours final : private core::group_presence,
     neighbours& operator=(const neighbours&) = delete;
     ~neighbours();
 
-    /// The group is there; what is said to it follows when the executor runs.
-    void start(group& through, std::string interface);
-    /// Says farewell.
+    /// The group is there.
+    void join(group& through, std::string interface);
+    /// Takes part in gossip from now on, with these seeds. \throws cles::error where one of them is no URL
+    void gossip(const gossip_options& how);
+    /// What is said follows when the executor runs.
+    void start();
+    /// Says farewell, and goes on hearing of the others. Repeating it does nothing.
+    void leave();
+    /// Leaves, and ends.
     void stop();
 
     /// As `presence::find`.
@@ -57,14 +67,19 @@ class neighbours final : private core::group_presence,
     void on_solicitation(bool by_name, time_point now) override;
     void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) override;
     void on_peer(std::string_view node, core::presence::change what, std::string_view where) override;
-    [[nodiscard]] std::vector<std::string> endpoints_to_tell() const;
+    [[nodiscard]] std::vector<std::string> endpoints_for_group() const;
+    [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
     detail::engine& engine_;
     core::announcer announcer_;
     core::first_round round_;
+    std::unique_ptr<detail::gossip_host> gossiper_; // null: it takes no part
+    std::uint32_t seed_;
     group* group_ = nullptr;
     std::string interface_;
     std::uint64_t seq_ = 0;
+    bool begun_ = false;
+    bool left_ = false;
 };
 
 } // namespace cles::shell

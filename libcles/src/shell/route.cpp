@@ -12,8 +12,9 @@ namespace {
 
 void put(connection& c, const route::request& r, detail::pending_ptr operation,
          core::outbound::progress_function progress) {
-    c.session().asking().send({.verb = r.verb, .noun = r.noun, .id = r.id, .urgent = r.urgent, .body = r.body},
-                              r.deadline, r.begun, std::move(operation), std::move(progress));
+    c.session().asking().send(
+        {.verb = r.verb, .noun = r.noun, .id = r.id, .urgent = r.urgent, .adverbs = r.adverbs, .body = r.body},
+        r.deadline, r.begun, std::move(operation), std::move(progress));
 }
 
 } // namespace
@@ -49,6 +50,7 @@ void route::send(const request& r, detail::pending_ptr operation, core::outbound
     auto w = std::make_unique<waiting>(*this);
     w->verb = r.verb;
     w->noun = r.noun;
+    w->adverbs = r.adverbs;
     w->body = r.body;
     w->id = r.id;
     w->urgent = r.urgent;
@@ -95,6 +97,15 @@ void route::forget(const core::feed_machine& feed) {
 
 void route::drop(const connection& c) {
     std::erase_if(links_, [&](const auto& held) { return held.get() == &c; });
+}
+
+void route::release() {
+    for (const auto& c : std::vector{links_}) {
+        if (c->usable() && c->at_rest()) {
+            c->finish();
+        }
+    }
+    std::erase_if(links_, [](const auto& c) { return !c->usable(); });
 }
 
 void route::dial() {

@@ -33,6 +33,7 @@ class route : public std::enable_shared_from_this<route> {
     struct request {
         cles::verb verb = verb::pull;
         std::string_view noun;
+        std::string_view adverbs{}; ///< beside those that the link itself writes
         std::string_view body;
         std::uint64_t id = 0;
         bool urgent = false;
@@ -55,6 +56,8 @@ class route : public std::enable_shared_from_this<route> {
     void fail(boost::system::error_code code, std::string_view message);
     /// A link has been lost or can no longer be used.
     void drop(const connection& c);
+    /// Closes the links over which nothing goes on.
+    void release();
     /// Gives up, and takes out the requests that wait.
     [[nodiscard]] std::vector<detail::pending_ptr> stop();
 
@@ -72,6 +75,7 @@ class route : public std::enable_shared_from_this<route> {
         [[nodiscard]] request asked(time_point now) const {
             return {.verb = verb,
                     .noun = noun,
+                    .adverbs = adverbs,
                     .body = body,
                     .id = id,
                     .urgent = urgent,
@@ -82,6 +86,7 @@ class route : public std::enable_shared_from_this<route> {
         route& owner;
         cles::verb verb = verb::pull;
         std::string noun;
+        std::string adverbs;
         std::string body;
         std::uint64_t id = 0;
         bool urgent = false;

@@ -49,7 +49,8 @@ route* routes::to(std::string_view target, std::string_view at, bool urgent, boo
 std::string routes::address_of(std::string_view target) const {
     const auto& own_name = engine_.node().name;
     const auto& listeners = engine_.listeners();
-    if (target == "self" || target == own_name) {
+    const bool routed = engine_.node().way != nullptr && protocol::is_reserved_target(target);
+    if (target == "self" || target == own_name || routed) {
         return "inproc://" + listeners.self_door();
     }
     if (const auto configured = directory_.find(target); !configured.empty()) {
@@ -154,6 +155,13 @@ void routes::forget(const core::feed_machine& feed) {
 void routes::drop(const connection& c) {
     for (const auto& [where, r] : routes_) {
         r->drop(c);
+    }
+}
+
+void routes::release(std::string_view url) {
+    if (const auto found = routes_.find(url); found != routes_.end()) {
+        const auto held = found->second;
+        held->release();
     }
 }
 

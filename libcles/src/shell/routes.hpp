@@ -49,6 +49,8 @@ class routes {
     void forget(const core::feed_machine& feed);
     /// A link has been lost or can no longer be used.
     void drop(const connection& c);
+    /// Nobody is asked at that URL for a while: a link over which nothing goes on is closed.
+    void release(std::string_view url);
     /// Gives up, and takes out the requests that wait.
     [[nodiscard]] std::vector<detail::pending_ptr> stop();
 

@@ -1,50 +1,20 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/group_port.hpp"
 
+#include "transport/group_socket_option.hpp"
+
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
-#include <boost/asio/post.hpp>
-#include <boost/system/system_error.hpp>
 
-#include <cerrno>
-
-#include <netinet/in.h>
-#include <sys/socket.h>
+#include <utility>
 
 namespace cles::transport {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-namespace {
-
-template <class T>
-void set_ip_option(asio::ip::udp::socket& socket, int option, const T& value) {
-    if (::setsockopt(socket.native_handle(), IPPROTO_IP, option, &value, sizeof value) != 0) {
-        throw boost::system::system_error{errno, boost::system::system_category()};
-    }
-}
-
-ip_mreqn membership(const asio::ip::udp::endpoint& group, int interface) {
-    ip_mreqn wanted{};
-    wanted.imr_multiaddr.s_addr = htonl(group.address().to_v4().to_uint());
-    wanted.imr_ifindex = interface;
-    return wanted;
-}
-
-} // namespace
-
 group_port::group_port(const asio::any_io_executor& executor, const ip_interface& by, const multicast_options& where)
-    : group_(asio::ip::make_address_v4(where.group), where.port), shared_(executor, udp::v4()),
+    : group_(asio::ip::make_address_v4(where.group), where.port), receiver_(group_receiver::of(executor, by, group_)),
       own_(executor, udp::v4()) {
-    shared_.set_option(asio::socket_base::reuse_address{true});
-    set_ip_option(shared_, IP_MULTICAST_ALL, 0); // else it hears groups that other programs have joined
-    shared_.bind(group_);
-    set_ip_option(shared_, IP_ADD_MEMBERSHIP, membership(group_, by.index));
-    shared_.non_blocking(true);
-    error_code ignored;
-    constexpr int room = 1 << 20; // a burst waits here while others have their turn
-    shared_.set_option(asio::socket_base::receive_buffer_size{room}, ignored);
-
     own_.bind({by.address, 0});
     set_ip_option(own_, IP_MULTICAST_IF, membership(group_, by.index));
     set_ip_option(own_, IP_MULTICAST_TTL, 1);
@@ -55,41 +25,16 @@ group_port::group_port(const asio::any_io_executor& executor, const ip_interface
 
 void group_port::start(group_events& owner) {
     owner_ = &owner;
-    receive();
+    receiver_->add(owner, source_);
 }
 
 void group_port::close() {
-    owner_ = nullptr;
+    if (const auto* const owner = std::exchange(owner_, nullptr)) {
+        receiver_->remove(*owner);
+    }
+    receiver_.reset();
     error_code ignored;
-    shared_.close(ignored);
     own_.close(ignored);
-}
-
-// -- receiving -----------------------------------------------------------------------------------------------------
-
-void group_port::receive() {
-    if (owner_ == nullptr) {
-        return;
-    }
-    shared_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
-        if (!code) {
-            self->hand_over();
-        }
-    });
-}
-
-void group_port::hand_over() {
-    try {
-        arrived_.hand_over(shared_,
-                           [this](const datagram_batch::datagram& one) { owner_->on_datagram(one.from, one.text); });
-    } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
-        asio::post(shared_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
-        throw;
-    }
-    if (owner_ != nullptr) {
-        owner_->on_batch();
-    }
-    receive();
 }
 
 // -- sending -------------------------------------------------------------------------------------------------------

@@ -3,7 +3,8 @@
 
 #include <cles/multicast.hpp>
 
-#include "transport/datagram_batch.hpp"
+#include "transport/group_events.hpp"
+#include "transport/group_receiver.hpp"
 #include "transport/ip_interface.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
@@ -16,26 +17,8 @@
 
 namespace cles::transport {
 
-/// What comes from a multicast group, on the port's executor.
-class group_events {
-  public:
-    group_events() = default;
-    group_events(const group_events&) = delete;
-    group_events& operator=(const group_events&) = delete;
-    /// What came in a datagram, its own ones too; valid for the call.
-    virtual void on_datagram(const boost::asio::ip::udp::endpoint& from, std::string_view datagram) = 0;
-    /// All that there was has been handed over.
-    virtual void on_batch() = 0;
-    /// What had to wait has been sent.
-    virtual void on_room() = 0;
-
-  protected:
-    ~group_events() = default;
-};
-
-/// A node's place in a multicast group, by one interface: the shared port, at which all nodes of the host hear the
-/// group and nothing else (no unicast, no other group or interface), and a socket of its own to send from, which tells
-/// the others who it is for as long as the node runs.
+/// A node's place in a multicast group, by one interface: where it hears the group, and a socket of its own to send
+/// from, which tells the others who it is for as long as the node runs.
 class group_port : public std::enable_shared_from_this<group_port> {
   public:
     using udp = boost::asio::ip::udp;
@@ -43,8 +26,7 @@ class group_port : public std::enable_shared_from_this<group_port> {
     /// Joins. \throws boost::system::system_error
     group_port(const boost::asio::any_io_executor& executor, const ip_interface& by, const multicast_options& where);
 
-    /// Begins to hand over what comes, up to a number of datagrams a turn; nothing is allocated for one. The owner
-    /// stays until `close`.
+    /// Begins to hand over what comes. The owner stays until `close`.
     void start(group_events& owner);
     /// Sends a line, its LF included, as one datagram; what finds no room in the socket waits for it. False where as
     /// much waits as may. A datagram that cannot be sent for another reason is as good as lost on its way.
@@ -60,17 +42,14 @@ class group_port : public std::enable_shared_from_this<group_port> {
     static constexpr std::size_t most_waiting = 1U << 16U;
 
   private:
-    void receive();
-    void hand_over();
     bool try_to_send(std::string_view line);
     void send_rest();
 
     udp::endpoint group_;
     udp::endpoint source_;
-    udp::socket shared_;
+    std::shared_ptr<group_receiver> receiver_;
     udp::socket own_;
     group_events* owner_ = nullptr; // null: closed
-    datagram_batch arrived_;
     std::string waiting_;
     std::size_t waiting_at_ = 0;
     bool waits_for_room_ = false;

@@ -31,6 +31,12 @@ if(NOT "${definitions}" MATCHES "^BOOST_ASIO_[A-Z_]+(;BOOST_ASIO_[A-Z_]+)*$")
     message(SEND_ERROR "cles::cles defines ${definitions}")
 endif()
 
+# What plugins are made with is built for those who name it.
+get_target_property(left_out cles_plugin EXCLUDE_FROM_ALL)
+if(NOT left_out)
+    message(SEND_ERROR "cles_plugin is built whether it is used or not")
+endif()
+
 # Programs, measurements and tests are there where they were asked for, and only there.
 function(targets_below folder out)
     get_property(targets DIRECTORY "${folder}" PROPERTY BUILDSYSTEM_TARGETS)
@@ -43,8 +49,8 @@ function(targets_below folder out)
 endfunction()
 targets_below("${CLES_SOURCE_DIR}" targets)
 if(NOT DEFINED EXPECTED_TARGETS)
-    set(EXPECTED_TARGETS cles)
-    if(NOT "${targets}" STREQUAL "cles")
+    set(EXPECTED_TARGETS cles cles_plugin)
+    if(NOT "${targets}" STREQUAL "cles;cles_plugin")
         message(SEND_ERROR "these targets came along: ${targets}")
     endif()
 endif()

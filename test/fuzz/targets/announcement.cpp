@@ -7,6 +7,7 @@
 #include <cles/json_reader.hpp>
 #include <cles/url.hpp>
 
+#include "core/plain_table.hpp"
 #include "core/presence.hpp"
 #include "core/reachable.hpp"
 #include "fuzz/fuzz.hpp"
@@ -51,7 +52,7 @@ void check_written(const core::announcement& said, const protocol::request_line&
 }
 
 void check_reachable(const core::announcement& said, const core::group_source& from) {
-    for (const auto& endpoint : core::reachable_endpoints(said.endpoints, from)) {
+    for (const auto& endpoint : core::reachable_endpoints(said.endpoints, core::teller::of(from))) {
         const auto where = parse_url(endpoint); // throws where it is none
         require(where.scheme != "inproc", "nobody is sent into another process", endpoint);
         require(from.is_loopback() ||
@@ -92,7 +93,7 @@ void run(std::string_view input) {
         require(table.size() <= most_peers, "the table is bounded", line);
         std::string json;
         json_writer w{json};
-        write_peers(w, table, now);
+        core::write_peers(w, table, now);
         require(is_valid_json(json), "the list of nodes is JSON", json);
     }
     deadlines.expire(now + std::chrono::hours{1});

@@ -15,6 +15,7 @@
 #include "core/group_session.hpp"
 #include "fuzz/fuzz.hpp"
 #include "protocol/datagram.hpp"
+#include "support/hear.hpp"
 #include "support/manual_clock.hpp"
 
 #include <algorithm>
@@ -125,7 +126,7 @@ class watched_group {
         const auto updates = out_.updates;
         const auto binds = out_.binds;
         const auto waiting = published_ - drained_;
-        session_.on_datagram({.address = 0x7f000001, .port = source}, datagram, clock_.now());
+        cles::test::hear(session_, {.address = 0x7f000001, .port = source}, datagram, clock_.now());
         require(out_.updates <= updates + 1 + waiting, "a datagram has one update repeated at most", datagram);
         require(out_.binds == binds, "a datagram has nothing bound", datagram);
         require(source != 0 || out_.updates == updates, "a node does not hear itself", datagram);
@@ -177,10 +178,12 @@ class watched_group {
     }
 
     test::manual_clock clock_;
-    core::node node_{core::node_setup{.name = "car1", .epoch = 1, .bounds = small_limits()}, clock_, [] {}};
+    std::shared_ptr<core::node> shared_node_ = std::make_shared<core::node>(
+        core::node_setup{.name = "car1", .epoch = 1, .bounds = small_limits()}, clock_, [] {});
+    core::node& node_ = *shared_node_;
     output out_;
     listener presence_;
-    core::group_session session_{node_, {.address = 0x7f000001, .port = 0}, out_, 1};
+    core::group_session session_{shared_node_, {.address = 0x7f000001, .port = 0}, out_, 1};
     std::vector<std::unique_ptr<core::group_feed>> feeds_;
     std::array<bool, 3> open_{};
     std::size_t published_ = 0;

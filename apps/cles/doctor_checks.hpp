@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/multicast.hpp>
+
+#include "finding.hpp"
+
+#include <boost/asio/awaitable.hpp>
+
+namespace tool {
+
+class address_book;
+class client;
+
+// Each looks at one thing and adds what it found.
+
+/// Whether `clesd` could be started with the configuration that it would use, by its own word.
+void check_config(findings& found);
+
+/// The interfaces of this host, and the one that multicast is to go by.
+void check_interfaces(const cles::multicast_options& where, findings& found);
+
+/// Sends a word to the group and listens for it. \return whether it was heard
+bool check_multicast(const cles::multicast_options& where, findings& found);
+
+/// Whether the ports that nodes use unless something else is said are free, or theirs; with --at, who is there.
+boost::asio::awaitable<void> check_ports(client& asker, const address_book& addresses, findings& found);
+
+/// Whether the nodes that can be heard can also be asked, whether their names are their own, and what time they have.
+boost::asio::awaitable<void> check_nodes(client& asker, const address_book& addresses, findings& found);
+
+/// The clock of this host.
+void check_clock(findings& found);
+
+/// How many files, and so links, a program may have open.
+void check_limits(findings& found);
+
+} // namespace tool

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "doctor_checks.hpp"
+#include "interfaces.hpp"
+
+#include <algorithm>
+#include <string>
+
+namespace tool {
+namespace {
+
+std::string names_of(const std::vector<net_interface>& all) {
+    std::string out;
+    for (const auto& each : all) {
+        if (each.up) {
+            out.append(out.empty() ? "" : ", ").append(each.name).append(" ");
+            out.append(each.address.empty() ? "without an IPv4 address" : each.address);
+        }
+    }
+    return out.empty() ? "none is up" : out;
+}
+
+// Another one, by which the network could be reached.
+std::string better_than_loopback(const std::vector<net_interface>& all) {
+    const auto at = std::find_if(all.begin(), all.end(), [](const net_interface& i) {
+        return i.up && i.multicast && !i.loopback && !i.address.empty();
+    });
+    return at == all.end() ? "" : at->name;
+}
+
+void check_chosen(const std::string& name, const std::vector<net_interface>& all, findings& found) {
+    const auto at = std::find_if(all.begin(), all.end(), [&](const net_interface& i) { return i.name == name; });
+    if (at == all.end()) {
+        found.push_back({"interfaces", verdict::failure, "multicast is to go by " + name + ", and there is none",
+                         "name one that there is by --multicast, CLES_MULTICAST or multicast.interface in clesd.yaml"});
+    } else if (!at->up) {
+        found.push_back({"interfaces", verdict::failure, "multicast is to go by " + name + ", which is down",
+                         "ip link set " + name + " up"});
+    } else if (at->address.empty()) {
+        found.push_back({"interfaces", verdict::failure,
+                         "multicast is to go by " + name + ", which has no IPv4 address",
+                         "give it one: multicast of CLES is IPv4"});
+    } else if (!at->multicast && !at->loopback) {
+        found.push_back({"interfaces", verdict::warning, name + " says that it carries no multicast",
+                         "ip link set " + name + " multicast on, or find nodes by seeds and --at"});
+    } else if (at->loopback) {
+        const auto other = better_than_loopback(all);
+        found.push_back({"interfaces", verdict::ok,
+                         "multicast goes by " + name + ": nodes of this host alone are heard",
+                         other.empty() ? "" : "CLES_MULTICAST=" + other + " for those of the network"});
+    } else {
+        found.push_back({"interfaces", verdict::ok, "multicast goes by " + name});
+    }
+}
+
+} // namespace
+
+void check_interfaces(const cles::multicast_options& where, findings& found) {
+    const auto all = interfaces_of_host();
+    found.push_back({"interfaces", verdict::ok, names_of(all)});
+    if (where.is_on()) {
+        check_chosen(where.interface, all, found);
+    }
+}
+
+} // namespace tool

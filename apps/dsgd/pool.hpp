@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/service.hpp>
+
+#include "board.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+namespace dsgd {
+
+/// The nodes, as the manager sees them: a member of their network that offers nothing.
+class pool {
+  public:
+    /// \param seeds    URLs of nodes that are asked who else is there
+    /// \param deadline of a shard
+    /// \param progress is told on stderr
+    pool(const std::vector<std::string>& seeds, std::chrono::seconds deadline, bool progress);
+
+    /// The nodes that offer the task, and what their data is made from. \throws cles::error with what is missing
+    std::map<std::string, sgd::recipe> find();
+    /// Delegates all shards at once, and returns when each has its fate.
+    void train(board& all);
+
+  private:
+    struct round;
+    boost::asio::awaitable<void> delegate(round& now, std::size_t i);
+
+    std::chrono::seconds deadline_;
+    bool progress_;
+    boost::asio::io_context io_{1};
+    cles::service node_;
+};
+
+} // namespace dsgd

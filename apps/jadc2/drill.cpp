@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "drill.hpp"
+
+#include <cles/service.hpp>
+
+#include "events.hpp"
+#include "some_run.hpp"
+#include "strike/order.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <vector>
+
+namespace jadc2 {
+namespace {
+
+using steady = std::chrono::steady_clock;
+
+struct quantiles {
+    std::uint64_t count = 0;
+    double p50_us = 0, p90_us = 0, p99_us = 0, max_us = 0;
+};
+BOOST_DESCRIBE_STRUCT(quantiles, (), (count, p50_us, p90_us, p99_us, max_us))
+
+constexpr std::uint64_t deadline_ms = 5000;
+constexpr std::uint64_t warm_up = 20; ///< orders: the first makes the link
+
+boost::asio::awaitable<void> give_orders(cles::service& from, const drill_options& wanted, std::vector<double>& took) {
+    boost::asio::steady_timer pause{from.get_executor()};
+    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).urgent().at(wanted.at);
+    const auto run = "drill-" + some_run() + "-";
+    auto next = steady::now();
+    for (std::uint64_t i = 0; i < wanted.count + warm_up; ++i) {
+        const strike::order what{.id = run + std::to_string(i),
+                                 .x = 160,
+                                 .y = 120,
+                                 .vx = 20,
+                                 .vy = -10,
+                                 .utc = utc_now(),
+                                 .deadline_ms = deadline_ms,
+                                 .drill = true};
+        const auto begun = steady::now();
+        const auto outcome = co_await from.async_delegate<strike::outcome>("self:strike", what, options);
+        if (i >= warm_up && outcome.order == what.id) {
+            took.push_back(std::chrono::duration<double, std::micro>(steady::now() - begun).count());
+        }
+        next = std::max(next, steady::now()) + std::chrono::microseconds{wanted.every_us};
+        pause.expires_at(next);
+        co_await pause.async_wait(boost::asio::use_awaitable);
+    }
+}
+
+} // namespace
+
+int drill(const drill_options& wanted) {
+    boost::asio::io_context io{1};
+    cles::service node{io, {.name = "drill"}};
+    std::vector<double> took;
+    std::exception_ptr failure;
+    boost::asio::co_spawn(io, give_orders(node, wanted, took), [&](const std::exception_ptr& thrown) {
+        failure = thrown;
+        node.stop();
+    });
+    io.run();
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+    std::sort(took.begin(), took.end());
+    const auto at = [&took](double part) {
+        return took[std::min(took.size() - 1, static_cast<std::size_t>(part * static_cast<double>(took.size())))];
+    };
+    std::puts(cles::to_json(quantiles{took.size(), at(0.5), at(0.9), at(0.99), took.back()}).c_str());
+    return 0;
+}
+
+} // namespace jadc2

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "events.hpp"
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+
+namespace jadc2 {
+namespace {
+
+struct entry {
+    double utc = 0;
+    std::string who{};
+    std::string event{};
+    std::string text{};
+    cles::json_text data{};
+};
+BOOST_DESCRIBE_STRUCT(entry, (), (utc, who, event, text, data))
+
+} // namespace
+
+double utc_now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
+
+std::string fixed(double number, int digits) {
+    std::array<char, 64> text{};
+    std::snprintf(text.data(), text.size(), "%.*f", digits, number);
+    return text.data();
+}
+
+void events::write(std::string_view event, std::string_view text, std::string_view data) const {
+    const double now = utc_now();
+    if (json_) {
+        entry out{.utc = now, .who = who_, .event = std::string{event}, .text = std::string{text}};
+        out.data.text = data;
+        std::puts(cles::to_json(out).c_str());
+    } else {
+        const auto second = static_cast<std::time_t>(now);
+        std::tm parts{};
+        ::gmtime_r(&second, &parts);
+        std::array<char, 16> clock{};
+        std::strftime(clock.data(), clock.size(), "%H:%M:%S", &parts);
+        std::printf("%s.%03d %s: %.*s\n", clock.data(), static_cast<int>((now - std::floor(now)) * 1000), who_.c_str(),
+                    static_cast<int>(text.size()), text.data());
+    }
+    std::fflush(stdout); // who reads it from a pipe wants it now
+}
+
+} // namespace jadc2

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "frame_load.hpp"
+
+#include <cles/service.hpp>
+
+#include "fmv/base64.hpp"
+#include "fmv/messages.hpp"
+#include "scene.hpp"
+#include "some_run.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <vector>
+
+namespace jadc2 {
+namespace {
+
+using steady = std::chrono::steady_clock;
+
+constexpr std::uint64_t deadline_ms = 10'000;
+constexpr std::size_t pictures = 50; ///< sent over and over: a node that works is all that is wanted
+
+struct work {
+    const load_options& wanted;
+    const std::vector<std::string>& pixels;
+    cles::service& from;
+    steady::time_point until{};
+    std::uint64_t ended = 0, answered = 0, done = 0;
+    double run_ms = 0;
+    std::exception_ptr failure{};
+};
+
+boost::asio::awaitable<void> send_stream(work& all, std::string stream) {
+    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).at(all.wanted.at);
+    for (std::uint64_t number = 0; steady::now() < all.until; ++number) {
+        const fmv::frame_message what{.stream = stream,
+                                      .frame = number,
+                                      .width = scene::size.width,
+                                      .height = scene::size.height,
+                                      .deadline_ms = deadline_ms,
+                                      .pixels = all.pixels[number % pictures]};
+        const auto seen = co_await all.from.async_delegate<fmv::found>("self:FMV_Processing", what, options);
+        ++all.done;
+        all.run_ms += seen.run_ms;
+        if (number == 0 && ++all.answered == all.wanted.streams) {
+            std::puts("loading");
+            std::fflush(stdout);
+        }
+    }
+}
+
+struct summary {
+    std::uint64_t frames = 0;
+    double frames_a_second = 0, mean_run_ms = 0;
+};
+BOOST_DESCRIBE_STRUCT(summary, (), (frames, frames_a_second, mean_run_ms))
+
+} // namespace
+
+int load_with_frames(const load_options& wanted) {
+    const scene ground{wanted.seed};
+    std::vector<std::string> pixels;
+    for (std::uint64_t number = 0; number < pictures; ++number) {
+        pixels.push_back(fmv::to_base64(ground.frame(number)));
+    }
+    boost::asio::io_context io{1};
+    cles::service node{io, {.name = "load"}};
+    const auto begun = steady::now();
+    work all{.wanted = wanted,
+             .pixels = pixels,
+             .from = node,
+             .until = wanted.duration_s > 0 ? begun + std::chrono::duration_cast<steady::duration>(
+                                                          std::chrono::duration<double>{wanted.duration_s})
+                                            : steady::time_point::max()};
+    boost::asio::signal_set signals{io, SIGINT, SIGTERM};
+    signals.async_wait([&all](boost::system::error_code code, int) {
+        if (!code) {
+            all.until = {}; // what is on its way is still waited for
+        }
+    });
+    const auto run = "load-" + some_run() + "-";
+    for (std::uint64_t i = 0; i < wanted.streams; ++i) {
+        boost::asio::co_spawn(io, send_stream(all, run + std::to_string(i)), [&](const std::exception_ptr& thrown) {
+            if (thrown && !all.failure) { // the others then end because the node does
+                all.failure = thrown;
+            }
+            if (++all.ended == wanted.streams || thrown) {
+                signals.cancel();
+                node.stop();
+            }
+        });
+    }
+    io.run();
+    if (all.failure) {
+        std::rethrow_exception(all.failure);
+    }
+    const std::chrono::duration<double> took = steady::now() - begun;
+    std::puts(cles::to_json(summary{all.done, static_cast<double>(all.done) / took.count(),
+                                    all.done == 0 ? 0 : all.run_ms / static_cast<double>(all.done)})
+                  .c_str());
+    return 0;
+}
+
+} // namespace jadc2

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "drill.hpp"
+#include "frame_load.hpp"
+#include "mission.hpp"
+#include "recon.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+
+namespace {
+
+int report_failure(const cles::error& why) {
+    const auto code = why.code();
+    std::fprintf(stderr, "cles-jadc2: %s\n", why.what());
+    const bool missing = code == cles::errc::no_target || code == cles::errc::no_task;
+    return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
+}
+
+CLI::App* add_recon(CLI::App& app, jadc2::recon_options& wanted) {
+    auto* r = app.add_subcommand("recon", "The reconnaissance aircraft: films, has it processed, publishes tracks");
+    r->add_option("--name", wanted.name, "What it is called (recon)");
+    r->add_option("-l,--listen", wanted.listen, "Where the mission centre finds it (tcp://127.0.0.1:25373)")
+        ->type_name("URL");
+    r->add_flag("--insecure", wanted.insecure, "Let it listen beyond this host, where anybody may ask for anything");
+    r->add_option("-s,--satellite", wanted.satellites, "Who is asked to process video (tcp://127.0.0.1:25370)")
+        ->type_name("URL");
+    r->add_option("--seed", wanted.seed, "Of what is filmed (1)");
+    r->add_option("--fps", wanted.fps, "Frames a second (25)")->check(CLI::Range(0.1, 200.0));
+    r->add_option("--frames", wanted.frames, "After which it ends; 0: it does not (0)");
+    r->add_option("--deadline", wanted.deadline_ms, "Of a frame, in milliseconds (1000)")->check(CLI::Range(1, 60'000));
+    r->add_flag("--json", wanted.json, "Print an object for each event");
+    return r;
+}
+
+CLI::App* add_mission(CLI::App& app, jadc2::mission_options& wanted) {
+    auto* m = app.add_subcommand("mission", "The mission centre: watches the tracks, decides, delegates strikes");
+    m->add_option("--name", wanted.name, "What it is called (mission)");
+    m->add_option("--recon-name", wanted.recon_name, "What the reconnaissance aircraft is called (recon)");
+    m->add_option("-r,--recon", wanted.recon, "Where it is (tcp://127.0.0.1:25373)")->type_name("URL");
+    m->add_option("-s,--strike", wanted.strikers, "Who is asked to strike (tcp://127.0.0.1:25374)")->type_name("URL");
+    m->add_option("--strikes", wanted.strikes, "After which it ends (1)")->check(CLI::Range(1, 1000));
+    m->add_option("--age", wanted.age, "Frames for which a target is followed before it is struck (15)")
+        ->check(CLI::Range(1, 100'000));
+    m->add_flag("--operator", wanted.by_hand, "Let an operator at the terminal decide");
+    m->add_option("--duration", wanted.duration_s, "Seconds after which it ends in any case; 0: it does not (0)")
+        ->check(CLI::Range(0.0, 86'400.0));
+    m->add_option("--deadline", wanted.deadline_ms, "Of a strike, in milliseconds (3000)")
+        ->check(CLI::Range(1, 60'000));
+    m->add_flag("--json", wanted.json, "Print an object for each event");
+    return m;
+}
+
+CLI::App* add_drill(CLI::App& app, jadc2::drill_options& wanted) {
+    auto* d = app.add_subcommand("drill", "Measures how long strike orders take, without a release");
+    d->add_option("--at", wanted.at, "Who is asked to strike (tcp://127.0.0.1:25374)")->type_name("URL");
+    d->add_option("-n,--count", wanted.count, "Orders (1000)")->check(CLI::Range(1, 10'000'000));
+    d->add_option("--every", wanted.every_us, "Microseconds between them (2000)")->check(CLI::Range(0, 10'000'000));
+    return d;
+}
+
+CLI::App* add_load(CLI::App& app, jadc2::load_options& wanted) {
+    auto* l = app.add_subcommand("load", "Sends frames to a node as fast as it answers");
+    l->add_option("--at", wanted.at, "Who is asked (tcp://127.0.0.1:25370)")->type_name("URL");
+    l->add_option("--streams", wanted.streams, "So many at once (4)")->check(CLI::Range(1, 64));
+    l->add_option("--duration", wanted.duration_s, "Seconds; 0: until it is told to end (5)")
+        ->check(CLI::Range(0.0, 3600.0));
+    l->add_option("--seed", wanted.seed, "Of what is filmed (1)");
+    return l;
+}
+
+} // namespace
+
+int main(int argc, char** argv) {
+    jadc2::recon_options recon;
+    jadc2::mission_options mission;
+    jadc2::drill_options drill;
+    jadc2::load_options load;
+    CLI::App app{"Joint command: a reconnaissance aircraft and a mission centre.", "cles-jadc2"};
+    app.footer("Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline or fate unknown, 5 another error, 6 busy.");
+    app.require_subcommand(1);
+    const auto* as_recon = add_recon(app, recon);
+    const auto* as_mission = add_mission(app, mission);
+    const auto* as_drill = add_drill(app, drill);
+    add_load(app, load);
+    try {
+        app.parse(argc, argv);
+        return as_recon->parsed()     ? jadc2::recon{recon}.run()
+               : as_mission->parsed() ? jadc2::mission{mission}.run()
+               : as_drill->parsed()   ? jadc2::drill(drill)
+                                      : jadc2::load_with_frames(load);
+    } catch (const CLI::ParseError& wrong) { // or --help
+        return app.exit(wrong) == 0 ? 0 : 2;
+    } catch (const cles::error& e) {
+        return report_failure(e);
+    }
+}

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/service.hpp>
+
+#include "commander.hpp"
+#include "events.hpp"
+#include "story.hpp"
+#include "strike/order.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include <csignal>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace jadc2 {
+
+struct mission_options {
+    std::string name = "mission";
+    std::string recon_name = "recon";
+    std::string recon = "tcp://127.0.0.1:25373";
+    std::vector<std::string> strikers{"tcp://127.0.0.1:25374"};
+    std::uint64_t strikes = 1; ///< after which it ends
+    int age = 15;              ///< frames that the scripted operator wants a target to have been followed for
+    bool by_hand = false;      ///< an operator at the terminal decides
+    double duration_s = 0;     ///< after which it ends in any case; 0: it does not
+    std::uint64_t deadline_ms = 3000;
+    bool json = false;
+};
+
+/// The mission centre: bound to what the reconnaissance aircraft finds, it lets an operator decide, and delegates the
+/// strike to whoever offers it. A plain service, which listens nowhere.
+class mission {
+  public:
+    explicit mission(const mission_options& wanted);
+
+    /// Until the strikes have their fates, or it is told to end. Gives the exit code.
+    int run();
+
+  private:
+    boost::asio::awaitable<void> watch();
+    boost::asio::awaitable<void> follow(cles::feed<picture> tracks);
+    boost::asio::awaitable<void> read_orders();
+    boost::asio::awaitable<void> give(strike::order what, story told);
+    boost::asio::awaitable<void> assess(strike::outcome what);
+    void see(picture what);
+    void decide(const fmv::track& target);
+    void obey(std::string_view line);
+    void show();
+    void tell_trouble(const std::string& text);
+    void end();
+    void end_if_all_is_done();
+    [[nodiscard]] std::string explain(const cles::error& why) const;
+
+    mission_options wanted_;
+    events tell_;
+    boost::asio::io_context io_{1};
+    cles::service node_;
+    boost::asio::signal_set signals_{io_, SIGINT, SIGTERM};
+    boost::asio::steady_timer pause_{io_};
+    boost::asio::steady_timer limit_{io_};
+    boost::asio::posix::stream_descriptor keyboard_{io_};
+    commander commander_;
+    std::string run_;         ///< no other run has the same: orders are named after it
+    std::string trouble_;     ///< told last
+    double received_utc_ = 0; ///< of the newest picture
+    double shown_utc_ = 0;
+    bool operator_gone_ = false; ///< nobody gives the orders that are left
+    bool ending_ = false;
+};
+
+} // namespace jadc2

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "assessment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace platoon {
+
+std::vector<double> spacing_errors(const std::vector<motion>& where, double spacing) {
+    std::vector<double> errors;
+    for (std::size_t i = 1; i < where.size(); ++i) {
+        errors.push_back(where[i - 1].x - where[i].x - spacing);
+    }
+    return errors;
+}
+
+double least_gap(std::vector<motion> where, double length) {
+    std::sort(where.begin(), where.end(), [](const motion& a, const motion& b) { return a.x > b.x; });
+    double least = NAN;
+    for (std::size_t i = 1; i < where.size(); ++i) {
+        least = std::fmin(least, where[i - 1].x - where[i].x - length);
+    }
+    return least;
+}
+
+assessment::assessment(std::size_t vehicles, double spacing, double length) : spacing_(spacing), length_(length) {
+    result_.error.resize(vehicles - 1);
+}
+
+void assessment::sample(const std::vector<motion>& where) {
+    const auto errors = spacing_errors(where, spacing_);
+    result_.string_ratio = 0;
+    for (std::size_t i = 0; i < errors.size(); ++i) {
+        auto& most = result_.error[i];
+        most = std::max(most, std::abs(errors[i]));
+        if (i > 0 && result_.error[i - 1] > 0) {
+            result_.string_ratio = std::max(result_.string_ratio, most / result_.error[i - 1]);
+        }
+        result_.least_gap = std::fmin(result_.least_gap, errors[i] + spacing_ - length_);
+    }
+    result_.collision = result_.least_gap <= 0;
+}
+
+} // namespace platoon

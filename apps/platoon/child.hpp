@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <sys/types.h>
+
+namespace platoon {
+
+/// This program once more, as a process of its own, whose output is kept in files without a name. It ends with us.
+class child {
+  public:
+    /// \throws std::system_error where it cannot be started
+    explicit child(const std::vector<std::string>& arguments);
+    child(child&& other) noexcept;
+    child& operator=(child&&) = delete;
+    child(const child&) = delete;
+    child& operator=(const child&) = delete;
+    /// Kills it where it still runs.
+    ~child();
+
+    [[nodiscard]] pid_t pid() const noexcept { return pid_; }
+    /// Whether it still runs. Afterwards `status` tells how it ended.
+    bool running();
+    [[nodiscard]] int status() const noexcept { return status_; }
+    void signal(int number) const;
+    [[nodiscard]] std::string output() const { return read(out_); }
+    [[nodiscard]] std::string errors() const { return read(err_); }
+
+  private:
+    static std::string read(int file);
+
+    pid_t pid_ = -1;
+    bool ended_ = false;
+    int status_ = 0;
+    int out_ = -1, err_ = -1;
+};
+
+} // namespace platoon

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "drive.hpp"
+#include "logbook.hpp"
+
+#include <string>
+#include <vector>
+
+namespace platoon {
+
+/// What a drive was like, from its logbook. \param first those that began, in their order \param all those that took
+/// part
+recording course_of(const logbook& book, const std::vector<std::string>& first, const std::vector<std::string>& all,
+                    double end, const drive_options& how);
+
+} // namespace platoon

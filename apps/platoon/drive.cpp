@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "drive.hpp"
+
+#include <cles/service.hpp>
+
+#include "child.hpp"
+#include "course.hpp"
+#include "simulation.hpp"
+#include "vehicle_node.hpp"
+#include "view.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/signal_set.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <map>
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace platoon {
+
+namespace asio = boost::asio;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr auto look = 20ms;
+constexpr auto hears_others_within = 400ms;
+constexpr double end_within = 10; // s
+
+class overseer {
+  public:
+    explicit overseer(const drive_options& options)
+        : options_(options), book_(options.like.limits.lag),
+          service_(io_, {.name = "platoon-" + std::to_string(::getpid()),
+                         .insecure = options.insecure,
+                         .multicast = options.group}),
+          signals_(io_, SIGINT, SIGTERM), open_(options.incidents) {
+        signals_.async_wait([this](boost::system::error_code failed, int) { interrupted_ = !failed; });
+    }
+
+    recording run() {
+        std::exception_ptr failure;
+        asio::co_spawn(io_, oversee(), [&](const std::exception_ptr& why) {
+            failure = why;
+            service_.stop();
+            io_.stop();
+        });
+        io_.run();
+        if (failure) {
+            std::rethrow_exception(failure);
+        }
+        return conclude();
+    }
+
+  private:
+    asio::awaitable<void> pause(std::chrono::milliseconds time) {
+        asio::steady_timer timer{io_, time};
+        co_await timer.async_wait(asio::use_awaitable);
+    }
+
+    [[nodiscard]] double now() const { return static_cast<double>(monotonic_ns() - start_ns_) * 1e-9; }
+
+    asio::awaitable<void> hear() {
+        auto feed = co_await service_.async_bind<state>("all:state");
+        for (;;) {
+            const auto item = co_await feed.async_next();
+            if (item.has_value()) {
+                book_.take(item.publisher, item.value);
+                stranger_ = children_.contains(item.publisher) ? stranger_ : item.publisher;
+            }
+        }
+    }
+
+    asio::awaitable<void> oversee() {
+        asio::co_spawn(io_, hear(), [this](const std::exception_ptr& why) { deaf_ = why; });
+        co_await pause(hears_others_within);
+        if (!stranger_.empty()) {
+            throw cles::error(cles::errc::busy, "another platoon drives in this group (" + stranger_ +
+                                                    " is heard): choose a port of your own with --multicast");
+        }
+        const std::size_t n = options_.vehicles;
+        start_ns_ = monotonic_ns() + 1'500'000'000 + 200'000'000 * static_cast<std::int64_t>(n);
+        for (std::size_t i = 0; i < n; ++i) {
+            if (!joins(i)) {
+                start(i, first_.empty() ? std::vector<std::string>{"--lead"}
+                                        : std::vector<std::string>{"--ahead", first_.back()});
+                first_.push_back(name_of(i));
+            }
+        }
+        co_await until_all_are_heard();
+        double shown = 0;
+        const double late = std::max(0.0, now()); // where processes take long to start, the drive is no shorter for it
+        end_ = late + (options_.seconds > 0 ? options_.seconds : options_.like.plan.end() + 5);
+        while (!interrupted_ && now() < end_) {
+            co_await pause(look);
+            throw_if_deaf();
+            check_children();
+            let_happen();
+            if (now() >= shown + (options_.in_place ? 0.2 : 1)) {
+                shown = now();
+                show();
+            }
+        }
+        end_ = std::min(end_, now()) - 2 / options_.like.hz;
+        co_await end_all();
+    }
+
+    void throw_if_deaf() const {
+        if (deaf_) {
+            std::rethrow_exception(deaf_);
+        }
+    }
+
+    asio::awaitable<void> until_all_are_heard() {
+        for (;;) {
+            co_await pause(look);
+            throw_if_deaf();
+            check_children();
+            const auto missing = std::find_if(first_.begin(), first_.end(),
+                                              [this](const auto& name) { return book_.last(name) == nullptr; });
+            if (missing == first_.end() || interrupted_) {
+                co_return;
+            }
+            if (book_.has_gone(*missing)) {
+                throw cles::error(cles::errc::unavailable, *missing + " did not start: " + last_line(*missing));
+            }
+            if (now() > end_within) {
+                throw cles::error(cles::errc::deadline,
+                                  *missing + " is not heard: does " + options_.group.interface + " carry multicast?");
+            }
+        }
+    }
+
+    [[nodiscard]] bool joins(std::size_t i) const {
+        return std::any_of(options_.incidents.begin(), options_.incidents.end(),
+                           [i](const incident& e) { return e.what == incident::join && e.vehicle == i; });
+    }
+
+    void start(std::size_t i, const std::vector<std::string>& whither) {
+        const auto& like = options_.like;
+        const auto place = place_of(first_.size(), like.spacing, like.plan.speed);
+        std::vector<std::string> words{"vehicle", "--name", name_of(i), "--report"};
+        words.insert(words.end(), whither.begin(), whither.end());
+        const auto add = [&](const char* option, const auto& value) {
+            words.emplace_back(option);
+            words.push_back(std::to_string(value));
+        };
+        add("--x", place.x);
+        add("--turn", i);
+        add("--turns", options_.vehicles);
+        add("--start-ns", start_ns_);
+        add("--hz", like.hz);
+        add("--loss", options_.loss * 100);
+        add("--delay", options_.delay * 1000);
+        add("--seed", options_.seed * 1000 + i);
+        words.insert(words.end(), {"--controller", like.uses_leader ? "leader" : "predecessor"});
+        words.insert(words.end(), {"--multicast", options_.group.interface + "," + options_.group.group + ":" +
+                                                      std::to_string(options_.group.port)});
+        if (options_.insecure) {
+            words.emplace_back("--insecure");
+        }
+        children_.try_emplace(name_of(i), words);
+    }
+
+    void let_happen() {
+        const double t = now();
+        std::erase_if(open_, [&](const incident& e) {
+            if (e.at > t) {
+                return false;
+            }
+            const auto name = name_of(e.vehicle);
+            const auto who = children_.find(name);
+            if (e.what == incident::join) {
+                start(e.vehicle, {"--join"});
+            } else if (who != children_.end() && e.what == incident::vanish) {
+                who->second.signal(SIGKILL);
+                note(name, "killed", "as was asked for");
+            } else if (who != children_.end()) {
+                service_.async_push(name + ":leave", cles::json_text{"{}"},
+                                    [this, name](boost::system::error_code failed, const cles::json_text&) {
+                                        if (failed) {
+                                            note(name, "stays", "it could not be told to leave: " + failed.message());
+                                        }
+                                    });
+            }
+            return true;
+        });
+    }
+
+    void check_children() {
+        for (auto& [name, process] : children_) {
+            if (process.running() || book_.has_gone(name)) {
+                continue;
+            }
+            const int status = process.status();
+            const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
+            book_.gone(name, now(), well);
+            unsteady_ = true;
+            note(name, well ? "left" : "gone", well ? "in good order" : how_ended(status) + last_line(name));
+        }
+    }
+
+    static std::string how_ended(int status) {
+        return WIFSIGNALED(status) ? "its process was ended by signal " + std::to_string(WTERMSIG(status)) + " "
+                                   : "its process ended with " + std::to_string(WEXITSTATUS(status)) + " ";
+    }
+
+    [[nodiscard]] std::string last_line(const std::string& name) const {
+        auto text = children_.at(name).errors();
+        while (!text.empty() && text.back() == '\n') {
+            text.pop_back();
+        }
+        return text.substr(text.rfind('\n') + 1);
+    }
+
+    void note(const std::string& vehicle, const std::string& what, const std::string& why) {
+        events_.push_back({now(), vehicle, what, why});
+        if (!options_.quiet && !options_.in_place) {
+            std::printf("%6.1f s  %s  %s: %s\n", now(), vehicle.c_str(), what.c_str(), why.c_str());
+        }
+    }
+
+    void show() {
+        if (options_.quiet) {
+            return;
+        }
+        std::vector<std::string> names;
+        for (const auto& [name, process] : children_) {
+            names.push_back(name);
+        }
+        const double silent = driver::silent_after / options_.like.hz;
+        if (!options_.in_place) {
+            std::fputs(line_of(book_, names, now(), options_.like.spacing, silent).c_str(), stdout);
+        } else {
+            std::printf("\x1b[H\x1b[J%s", table_of(book_, names, now(), options_.like.spacing, silent).c_str());
+        }
+        std::fflush(stdout);
+    }
+
+    asio::awaitable<void> end_all() {
+        for (auto& [name, process] : children_) {
+            process.signal(SIGTERM);
+        }
+        const auto running = [this] {
+            return std::any_of(children_.begin(), children_.end(), [](auto& one) { return one.second.running(); });
+        };
+        for (const double until = now() + end_within; running() && now() < until;) {
+            co_await pause(look);
+        }
+    }
+
+    recording conclude() {
+        recording out = course_of(book_, first_, children_names(), end_, options_);
+        out.steady = !unsteady_ && options_.incidents.empty();
+        out.events = events_;
+        std::vector<double> latencies;
+        for (const auto& [name, process] : children_) {
+            vehicle_report report;
+            try {
+                report = cles::from_json<vehicle_report>(process.output());
+            } catch (const cles::error&) {
+                continue; // it was killed, and its recorder with it
+            }
+            out.sent += report.sent;
+            out.received += report.received;
+            out.lost += report.lost;
+            out.missed += report.missed;
+            out.events.insert(out.events.end(), report.events.begin(), report.events.end());
+            latencies.insert(latencies.end(), report.latency_us.begin(), report.latency_us.end());
+        }
+        std::sort(out.events.begin(), out.events.end(), [](const event& a, const event& b) { return a.t < b.t; });
+        out.fallbacks = static_cast<std::uint64_t>(
+            std::count_if(out.events.begin(), out.events.end(), [](const event& e) { return e.mode == "fallback"; }));
+        out.latency = summarise(std::move(latencies));
+        return out;
+    }
+
+    [[nodiscard]] std::vector<std::string> children_names() const {
+        std::vector<std::string> names;
+        for (const auto& [name, process] : children_) {
+            names.push_back(name);
+        }
+        return names;
+    }
+
+    const drive_options& options_;
+    asio::io_context io_{1};
+    logbook book_;
+    cles::service service_;
+    asio::signal_set signals_;
+    std::vector<incident> open_;
+    std::map<std::string, child> children_;
+    std::vector<std::string> first_; ///< those that begin, the leader first
+    std::vector<event> events_;
+    std::string stranger_;
+    std::exception_ptr deaf_; ///< why vehicles are not heard any more
+    std::int64_t start_ns_ = 0;
+    double end_ = 0;
+    bool interrupted_ = false, unsteady_ = false;
+};
+
+} // namespace
+
+recording drive(const drive_options& options) { return overseer{options}.run(); }
+
+} // namespace platoon

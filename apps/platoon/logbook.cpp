@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "logbook.hpp"
+
+#include "simulation.hpp"
+
+#include <algorithm>
+
+namespace platoon {
+namespace {
+
+// Between two states, by the cubic that fits places and speeds at both.
+motion between(const state& a, const state& b, double t) {
+    const double h = b.t - a.t;
+    const double s = (t - a.t) / h;
+    const double slope = (b.x - a.x) / h;
+    const double c2 = (3 * slope - 2 * a.v - b.v) * h;
+    const double c3 = (a.v + b.v - 2 * slope) * h;
+    return {.x = a.x + s * (a.v * h + s * (c2 + s * c3)),
+            .v = a.v + s * (2 * c2 + 3 * s * c3) / h,
+            .a = a.a + s * (b.a - a.a)};
+}
+
+} // namespace
+
+void logbook::take(const std::string& vehicle, const state& told) {
+    auto& all = told_[vehicle];
+    if (all.empty() || told.t > all.back().t) {
+        all.push_back(told);
+    }
+}
+
+void logbook::gone(const std::string& vehicle, double t, bool left) { gone_.try_emplace(vehicle, departure{t, left}); }
+
+bool logbook::has_left(const std::string& vehicle) const {
+    const auto found = gone_.find(vehicle);
+    return found != gone_.end() && found->second.left;
+}
+
+const state* logbook::last(const std::string& vehicle) const {
+    const auto found = told_.find(vehicle);
+    return found == told_.end() ? nullptr : &found->second.back();
+}
+
+std::optional<motion> logbook::where(const std::string& vehicle, double t) const {
+    const auto found = told_.find(vehicle);
+    if (found == told_.end() || t < found->second.front().t) {
+        return std::nullopt;
+    }
+    const auto& all = found->second;
+    const auto next = std::upper_bound(all.begin(), all.end(), t, [](double at, const state& s) { return at < s.t; });
+    const auto& before = *(next - 1);
+    if (next != all.end()) {
+        return between(before, *next, t);
+    }
+    const auto end = gone_.find(vehicle);
+    if (end != gone_.end() && end->second.left) {
+        return std::nullopt;
+    }
+    return advance(before.where(), end != gone_.end() ? without_driver(before.u) : before.u, lag_, t - before.t);
+}
+
+} // namespace platoon

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+namespace platoon {
+
+/// What the leader does: it drives at a constant speed, brakes hard, drives slowly, and takes up speed again.
+struct manoeuvre {
+    double speed = 25;   ///< m/s
+    double slow = 10;    ///< m/s, after braking
+    double brake_at = 5; ///< s
+    double brake = 5;    ///< m/s²
+    double speed_up = 1; ///< m/s²
+    double slow_for = 5; ///< s
+    double jerk = 5;     ///< m/s³, at which its commands change at most
+
+    /// The acceleration commanded at that time.
+    [[nodiscard]] double command(double t) const;
+    /// When it drives at its first speed again.
+    [[nodiscard]] double end() const;
+};
+
+} // namespace platoon

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "recording.hpp"
+
+#include <cles/convert.hpp>
+#include <cles/error.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+
+namespace platoon {
+namespace {
+
+constexpr double budget_us = 100'000;
+
+[[noreturn]] void cannot_write(const std::string& path, int why) {
+    const boost::system::error_code code{why, boost::system::system_category()};
+    throw cles::error(code, "cannot write " + path + ": " + code.message());
+}
+
+} // namespace
+
+latency_summary summarise(std::vector<double> latencies_us) {
+    latency_summary out{.count = latencies_us.size()};
+    if (latencies_us.empty()) {
+        return out;
+    }
+    std::sort(latencies_us.begin(), latencies_us.end());
+    const auto at = [&](double part) {
+        return latencies_us[static_cast<std::size_t>(std::lround(part * static_cast<double>(latencies_us.size() - 1)))];
+    };
+    out.p50_us = at(0.5);
+    out.p99_us = at(0.99);
+    out.p999_us = at(0.999);
+    out.max_us = latencies_us.back();
+    out.late = static_cast<std::uint64_t>(latencies_us.end() -
+                                          std::upper_bound(latencies_us.begin(), latencies_us.end(), budget_us));
+    for (int i = 0; i <= 1000; ++i) {
+        out.curve.push_back(at(i * 0.001));
+    }
+    return out;
+}
+
+std::string summary_of(const recording& drive) {
+    const auto& v = drive.verdict;
+    std::string text;
+    std::array<char, 256> line{};
+    const auto add = [&](int length) {
+        text.append(line.data(), std::min(line.size() - 1, static_cast<std::size_t>(length)));
+    };
+    add(std::snprintf(line.data(), line.size(), "platoon   %zu vehicles at %g Hz, %g %% lost, up to %g ms late\n",
+                      drive.vehicles, drive.hz, drive.loss * 100, drive.delay_ms));
+    if (drive.steady && !std::isnan(v.least_gap)) {
+        const auto most = std::max_element(v.error.begin(), v.error.end());
+        add(std::snprintf(line.data(), line.size(), "spacing   %.3f m off at most, behind v%td; string ratio %.4f\n",
+                          *most, most - v.error.begin(), v.string_ratio));
+    }
+    if (std::isnan(v.least_gap)) {
+        text += "gap       not seen: it ended before all were on the road\n";
+    } else {
+        add(std::snprintf(line.data(), line.size(), "gap       %.3f m at least%s\n", v.least_gap,
+                          v.collision ? ": A COLLISION" : ""));
+    }
+    add(std::snprintf(line.data(), line.size(), "fallback  %ju times for want of updates\n",
+                      std::uintmax_t{drive.fallbacks}));
+    if (drive.latency.count != 0) {
+        const auto& l = drive.latency;
+        add(std::snprintf(line.data(), line.size(),
+                          "latency   p50 %.3f ms, p99 %.3f, p99.9 %.3f, max %.3f of %ju updates; %ju over 100 ms\n",
+                          l.p50_us / 1e3, l.p99_us / 1e3, l.p999_us / 1e3, l.max_us / 1e3, std::uintmax_t{l.count},
+                          std::uintmax_t{l.late}));
+    }
+    return text;
+}
+
+void check_writable(const std::string& path) {
+    auto* file = std::fopen(path.c_str(), "a");
+    if (file == nullptr) {
+        cannot_write(path, errno);
+    }
+    std::fclose(file);
+}
+
+void write(const recording& drive, const std::string& path) {
+    const auto text = cles::to_json(drive) + "\n";
+    auto* file = std::fopen(path.c_str(), "w");
+    if (file == nullptr) {
+        cannot_write(path, errno);
+    }
+    int why = std::fwrite(text.data(), 1, text.size(), file) == text.size() ? 0 : errno;
+    if (std::fclose(file) != 0 && why == 0) {
+        why = errno;
+    }
+    if (why != 0) {
+        cannot_write(path, why);
+    }
+}
+
+} // namespace platoon

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "assessment.hpp"
+#include "report.hpp"
+
+#include <boost/describe/class.hpp>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace platoon {
+
+/// One vehicle over the time of a drive; null (NaN) where it is not on the lane.
+struct course {
+    std::string vehicle{};
+    std::vector<double> speed{}, error{}; ///< m/s; m, of the distance to the one ahead (the leader has none)
+};
+BOOST_DESCRIBE_STRUCT(course, (), (vehicle, speed, error))
+
+/// How long updates took, in microseconds.
+struct latency_summary {
+    std::uint64_t count = 0;
+    double p50_us = 0, p99_us = 0, p999_us = 0, max_us = 0;
+    std::uint64_t late = 0;      ///< more than the 100 ms that platooning allows
+    std::vector<double> curve{}; ///< the quantiles 0, 0.001 ... 1
+};
+BOOST_DESCRIBE_STRUCT(latency_summary, (), (count, p50_us, p99_us, p999_us, max_us, late, curve))
+
+latency_summary summarise(std::vector<double> latencies_us);
+
+/// All there is to know of a drive, simulated or not.
+struct recording {
+    std::string source{};
+    std::size_t vehicles = 0;
+    double hz = 0, loss = 0, delay_ms = 0, spacing = 0;
+    std::uint64_t seed = 0;
+    bool steady = true; ///< nobody joined, left or vanished, so that `verdict.error` and `string_ratio` mean something
+    struct verdict verdict {};
+    std::uint64_t fallbacks = 0; ///< how often a vehicle fell back for want of updates
+    std::uint64_t sent = 0, received = 0, lost = 0, missed = 0;
+    latency_summary latency{};
+    std::vector<event> events{};
+    std::vector<double> t{};
+    std::vector<course> courses{};
+};
+BOOST_DESCRIBE_STRUCT(recording, (),
+                      (source, vehicles, hz, loss, delay_ms, spacing, seed, steady, verdict, fallbacks, sent, received,
+                       lost, missed, latency, events, t, courses))
+
+/// For people, a few lines.
+std::string summary_of(const recording& drive);
+/// Whether a file can be opened for writing: it is made where there is none, and left as it is otherwise.
+/// \throws cles::error where it cannot
+void check_writable(const std::string& path);
+/// \throws cles::error where the file cannot be written
+void write(const recording& drive, const std::string& path);
+
+} // namespace platoon

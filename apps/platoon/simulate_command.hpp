@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "recording.hpp"
+#include "simulation.hpp"
+
+#include <string>
+
+namespace platoon {
+
+/// Drives the scenario in virtual time from seeds 1 to `seeds`, and prints what came out of each.
+/// \param record a file for the first of them; empty: none
+/// \return 1 where vehicles collided
+int simulate_command(scenario what, unsigned seeds, bool json, const std::string& record);
+
+} // namespace platoon

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "track.hpp"
+
+#include <algorithm>
+
+namespace platoon {
+namespace {
+
+constexpr double horizon = 1;         // s: what is older says nothing about the present
+constexpr double trend_horizon = 0.3; // s: no command changes at the same pace for long; two missed at 10 Hz
+constexpr double drift = 1e-4;        // s/s, by which two clocks may differ in their pace
+
+} // namespace
+
+void track::take(const state& heard, double now) {
+    const bool restarted = last_ && heard.t < last_->t - horizon;
+    if (last_ && !restarted && heard.t <= last_->t) {
+        return; // overtaken on its way
+    }
+    // The clocks have nothing in common, but what an update took longer than the fastest shows in their difference.
+    const double difference = now - heard.t;
+    offset_ = !last_ || restarted ? difference : std::min(difference, offset_ + drift * (now - received_));
+    last_ = heard;
+    received_ = now;
+}
+
+double track::age(double now) const { return std::clamp(now - offset_ - last_->t, 0.0, horizon); }
+
+double track::command_at(double now) const { return last_->u + last_->j * std::min(age(now), trend_horizon); }
+
+motion track::at(double now) const {
+    const double command = command_at(now);
+    const double ramp = std::min(age(now), trend_horizon);
+    const auto then = advance(last_->where(), (last_->u + command) / 2, lag_, ramp);
+    return advance(then, command, lag_, age(now) - ramp);
+}
+
+} // namespace platoon

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "vehicle_node.hpp"
+
+#include "own_address.hpp"
+#include "simulation.hpp"
+
+#include <boost/asio/co_spawn.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/describe/enum_to_string.hpp>
+
+#include <cmath>
+#include <csignal>
+#include <cstdio>
+
+namespace platoon {
+
+namespace asio = boost::asio;
+using steady = std::chrono::steady_clock;
+
+namespace {
+
+constexpr std::size_t most_latencies = 1'000'000; // kept of one drive
+constexpr double leaves_for = 1;                  // s for which it tells that it leaves
+
+std::string reason_of(const std::exception_ptr& failure) {
+    try {
+        std::rethrow_exception(failure);
+    } catch (const std::exception& e) {
+        return e.what();
+    }
+}
+
+} // namespace
+
+std::int64_t monotonic_ns() { return std::chrono::nanoseconds{steady::now().time_since_epoch()}.count(); }
+
+vehicle_node::vehicle_node(vehicle_options options)
+    : options_(std::move(options)), service_(io_, {.name = options_.setup.name,
+                                                   .listen = {"tcp://" + own_address(options_.group.interface) + ":0"},
+                                                   .insecure = options_.insecure,
+                                                   .multicast = options_.group}),
+      signals_(io_, SIGTERM, SIGINT), radio_(options_.loss, options_.delay, options_.seed) {
+    report_.vehicle = options_.setup.name;
+    service_.on_push("join", [this](const applicant& who) { be_followed(who); },
+                     {.description = "Follow this vehicle, the last one", .parameters = {}});
+    service_.on_push("leave",
+                     [this] {
+                         if (driver_ && !left_at_) {
+                             driver_->leave();
+                             left_at_ = now() + leaves_for;
+                         }
+                     },
+                     {.description = "Leave the platoon", .parameters = {}, .idempotent = true});
+}
+
+double vehicle_node::now() const { return static_cast<double>(monotonic_ns() - options_.start_ns) * 1e-9; }
+
+void vehicle_node::end() {
+    service_.stop();
+    io_.stop();
+}
+
+vehicle_report vehicle_node::run() {
+    signals_.async_wait([this](boost::system::error_code, int) { end(); });
+    if (!options_.joins) {
+        auto setup = options_.setup;
+        setup.start.x += setup.start.v * now();
+        begin(setup);
+    }
+    const auto ended = [this](const std::exception_ptr& failure) {
+        failure_ = failure;
+        end();
+    };
+    if (options_.joins) {
+        asio::co_spawn(io_, join(), [this, ended](const std::exception_ptr& failure) {
+            if (failure) {
+                ended(failure);
+            } else {
+                asio::co_spawn(io_, drive(), ended);
+            }
+        });
+    } else {
+        asio::co_spawn(io_, drive(), ended);
+    }
+    io_.run();
+    if (failure_) {
+        std::rethrow_exception(failure_);
+    }
+    return std::move(report_);
+}
+
+void vehicle_node::begin(const driver_setup& setup) {
+    driver_.emplace(setup, now());
+    driver_->on_change = [this](double at, role mode, const std::string& why) {
+        note(at, boost::describe::enum_to_string(mode, ""), why);
+    };
+}
+
+void vehicle_node::note(double at, const std::string& mode, const std::string& why) {
+    std::fprintf(stderr, "%8.3f s  %s  %s: %s\n", at, report_.vehicle.c_str(), mode.c_str(), why.c_str());
+    report_.events.push_back({at, report_.vehicle, mode, why});
+}
+
+asio::awaitable<void> vehicle_node::drive() {
+    const double hz = options_.setup.hz;
+    const auto decisions = std::int64_t{decisions_per_update(hz)};
+    const double pace = 1 / (hz * static_cast<double>(decisions));
+    const double first = turn_of(options_.turn, options_.turns, hz);
+    asio::steady_timer timer{io_};
+    for (auto count = static_cast<std::int64_t>(std::ceil((now() - first) / pace)); !left_at_ || now() < *left_at_;
+         ++count) {
+        const double at = first + pace * static_cast<double>(count);
+        const std::chrono::nanoseconds due{options_.start_ns + std::llround(at * 1e9)};
+        timer.expires_at(steady::time_point{due});
+        co_await timer.async_wait(asio::use_awaitable);
+        driver_->step(at);
+        if (count % decisions == 0) {
+            tell();
+        }
+        if (options_.seconds > 0 && at >= options_.seconds) {
+            break;
+        }
+    }
+}
+
+void vehicle_node::tell() {
+    auto told = driver_->report();
+    told.sent_ns = monotonic_ns();
+    service_.update("state", told);
+    ++report_.sent;
+    for (const auto& whom : driver_->wanted()) {
+        if (bound_.insert(whom).second) {
+            asio::co_spawn(io_, hear(whom), [this, whom](const std::exception_ptr& failure) {
+                bound_.erase(whom); // and is tried again with the next update, where it is still wanted
+                const auto why = failure ? whom + " cannot be heard: " + reason_of(failure) : "";
+                if (failure && unheard_.insert(why).second) {
+                    note(now(), "unheard", why);
+                }
+            });
+        }
+    }
+}
+
+asio::awaitable<void> vehicle_node::hear(std::string whom) {
+    auto feed = co_await service_.async_bind<state>(whom + ":state", cles::bind_options{}.multicast());
+    bool first = true; // which may be an older one, repeated for us
+    while (driver_->wants(whom)) {
+        const auto item = co_await feed.async_next();
+        if (item.has_value()) {
+            take(whom, item.value, !first);
+            first = false;
+        } else if (item.kind == cles::feed_event::gap) {
+            report_.missed += item.missed;
+        }
+    }
+}
+
+void vehicle_node::take(const std::string& from, const state& heard, bool timely) {
+    const bool counts = timely && heard.t >= 0; // of the drive: they hear each other before it begins
+    if (counts) {
+        ++report_.received;
+        if (report_.latency_us.size() < most_latencies) {
+            report_.latency_us.push_back(static_cast<double>(monotonic_ns() - heard.sent_ns) * 1e-3);
+        }
+    }
+    const auto later = radio_.next();
+    if (!later) {
+        report_.lost += counts ? 1 : 0;
+    } else if (*later == 0) {
+        driver_->take(from, heard, now());
+    } else {
+        auto timer = std::make_shared<asio::steady_timer>(
+            io_, std::chrono::duration_cast<steady::duration>(std::chrono::duration<double>{*later}));
+        timer->async_wait([this, timer, from, heard](boost::system::error_code failed) {
+            if (!failed) {
+                driver_->take(from, heard, now());
+            }
+        });
+    }
+}
+
+} // namespace platoon

@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/plugin_abi.h>
+#include <cles/plugin_config.hpp>
+#include <cles/plugin_registrar.hpp>
+#include <cles/registrar.hpp>
+
+#include <boost/callable_traits/args.hpp>
+
+#include <exception>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+
+/// A plugin for `clesd` in C++ (paper, section 3.6): a function that registers tasks, and one line.
+///
+///     void register_tasks(cles::registrar& to) {
+///         to.on_pull("answer", [] { return 42; });
+///     }
+///     CLES_PLUGIN("answers", "1.0", register_tasks)
+///
+/// The same function serves an application's service and a test. It may take settings as a second argument, of any type
+/// that `<cles/convert.hpp>` reads; they are what the daemon's configuration says of the plugin under `config`. With a
+/// described struct whose members are `std::optional`, all may be left out, and one of another name is refused.
+///
+///     void register_tasks(cles::registrar& to, const settings& wanted);
+///
+/// What it throws keeps the plugin from being loaded, with its words in the daemon's log.
+///
+/// Threads. The function runs once, on the daemon's main thread. Handlers run on threads of a pool, several at once,
+/// and so guard what they share; those that are `inline_ok` run on the I/O thread, which they hold up. Responders may
+/// be used on any thread.
+///
+/// Lifetime. What handlers hold goes when the daemon stops and the last job that uses it has ended: let a thread or a
+/// device of yours be owned by the handlers that need it. The library itself stays loaded until the process ends.
+///
+/// Link `cles::plugin`, or use `cles_add_plugin` of the CMake package, which also hides all symbols but the entry. Only
+/// the C structures of <cles/plugin_abi.h> cross, so that compiler and Boost may be others than the daemon's.
+///
+/// \param name         of the plugin, as text
+/// \param version      of the plugin, as text
+/// \param registration the function's name; not overloaded
+#define CLES_PLUGIN(name, version, registration)                                                                       \
+    extern "C" CLES_PLUGIN_EXPORT const cles_plugin* cles_plugin_v1() {                                                \
+        return ::cles::detail::plugin_entry<&(registration)>::describe(name, version);                                 \
+    }
+
+namespace cles::detail {
+
+/// What the host calls, for a plugin whose tasks `Register` registers.
+template <auto Register>
+class plugin_entry {
+  public:
+    static const cles_plugin* describe(std::string_view name, std::string_view version) noexcept {
+        static const cles_plugin description{.size = sizeof(cles_plugin),
+                                             .abi_major = CLES_PLUGIN_ABI_MAJOR,
+                                             .abi_minor = CLES_PLUGIN_ABI_MINOR,
+                                             .reserved = 0,
+                                             .name = abi_text(name),
+                                             .version = abi_text(version),
+                                             .start = &start,
+                                             .stop = &stop};
+        return &description;
+    }
+
+  private:
+    // Never destroyed: a job that does not end may use them while the process exits.
+    static plugin_registrar::task_list& tasks() {
+        static auto* const list = new plugin_registrar::task_list;
+        return *list;
+    }
+
+    static int32_t start(const cles_host* host, cles_text config) noexcept {
+        try {
+            plugin_registrar to{*host, tasks()};
+            using arguments = boost::callable_traits::args_t<decltype(Register), std::tuple>;
+            if constexpr (std::tuple_size_v<arguments> == 1) {
+                expect_no_config(view_of(config));
+                Register(to);
+            } else {
+                using settings = std::remove_cvref_t<std::tuple_element_t<1, arguments>>;
+                Register(to, plugin_config<settings>(view_of(config)));
+            }
+            return 0;
+        } catch (const error& e) {
+            host->refuse(host, abi_text(e.message()));
+        } catch (const std::exception& e) {
+            host->refuse(host, abi_text(e.what()));
+        } catch (...) {
+            host->refuse(host, abi_text("it threw something that is no exception"));
+        }
+        stop();
+        return 1;
+    }
+
+    static void stop() noexcept {
+        for (const auto& task : tasks()) {
+            task->stop();
+        }
+    }
+};
+
+} // namespace cles::detail

@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+#include <cles/plugin_text.hpp>
+#include <cles/responder.hpp>
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+
+/// The plugin's side of a job. Not for applications.
+
+namespace cles::detail {
+
+/// What a responder holds inside a plugin: the job's handle. When the last copy goes, the job has been answered one way
+/// or another. Any thread may use it, since the host's functions take any.
+class plugin_call final : public call_control {
+  public:
+    plugin_call(const cles_host& host, cles_job job) noexcept : host_(host), job_(job) {}
+    plugin_call(const plugin_call&) = delete;
+    plugin_call& operator=(const plugin_call&) = delete;
+    ~plugin_call() override {
+        if (!answered_) {
+            plugin_call::fail(errc::failed, "the handler ended without an answer");
+        }
+    }
+
+    void done(std::string_view json) override {
+        answered_ = true;
+        host_.done(&host_, job_, abi_text(json));
+    }
+    void fail(errc code, std::string_view message) override {
+        answered_ = true;
+        host_.fail(&host_, job_, abi_text(wire_name(code)), abi_text(message));
+    }
+    void refuse(std::string_view message, std::chrono::milliseconds retry) override {
+        answered_ = true;
+        constexpr std::chrono::milliseconds::rep most = 86'400'000;
+        const auto ms = std::clamp<std::chrono::milliseconds::rep>(retry.count(), 0, most);
+        host_.busy(&host_, job_, abi_text(message), static_cast<std::uint32_t>(ms));
+    }
+    bool progress(double fraction, std::string_view json) override {
+        return host_.progress(&host_, job_, fraction, abi_text(json)) != 0;
+    }
+    [[nodiscard]] bool stopped() const noexcept override { return host_.stopped(&host_, job_) != 0; }
+    void log(log_level level, std::string_view text) override {
+        host_.job_log(&host_, job_, static_cast<std::uint32_t>(level), abi_text(text));
+    }
+
+    void on_stop(std::function<void()> callback) override {
+        auto owned = std::make_unique<std::function<void()>>(std::move(callback));
+        const cles_callback crossing{.call =
+                                         [](void* user) {
+                                             try {
+                                                 (*static_cast<std::function<void()>*>(user))();
+                                             } catch (...) { // no exception may leave; the job goes on unstopped
+                                             }
+                                         },
+                                     .drop = [](void* user) { delete static_cast<std::function<void()>*>(user); },
+                                     .user = owned.get()};
+        host_.on_stop(&host_, job_, &crossing);
+        static_cast<void>(owned.release());
+    }
+
+    void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
+        auto owned = std::make_unique<asked>(asked{host_, job_, std::move(answered), options.on_progress_});
+        const cles_ask crossing{.size = sizeof(cles_ask),
+                                .urgent = options.urgent_ ? 1U : 0U,
+                                .deadline_ms = options.deadline_.count(),
+                                .at = abi_text(options.at_),
+                                .answered = &asked::answer,
+                                .progress = options.on_progress_ ? &asked::report : nullptr,
+                                .user = owned.get()};
+        static_cast<void>(owned.release()); // the answer lets go of it, and may come before the next line
+        host_.delegate(&host_, job_, abi_text(command), &crossing);
+    }
+
+    [[nodiscard]] boost::asio::any_io_executor executor() const override {
+        throw error(errc::failed, "a plugin has no executor");
+    }
+
+  private:
+    // A request of this job on its way.
+    struct asked {
+        static void answer(void* user, cles_text code, cles_text json, cles_text message) {
+            const std::unique_ptr<asked> self{static_cast<asked*>(user)};
+            try {
+                const auto failed = code.size == 0 ? boost::system::error_code{} : errc_from_wire(view_of(code));
+                self->answered(failed, view_of(json), view_of(message));
+            } catch (...) {
+                plugin_call job{self->host, self->job};
+                fail_with(job, std::current_exception());
+            }
+        }
+        static void report(void* user, double fraction, cles_text json) {
+            try {
+                static_cast<asked*>(user)->progress(fraction, view_of(json));
+            } catch (...) { // a report that is lost harms nobody
+            }
+        }
+
+        const cles_host& host;
+        cles_job job;
+        answer_callback answered;
+        std::function<void(double, std::string_view)> progress;
+    };
+
+    const cles_host& host_;
+    cles_job job_;
+    std::atomic<bool> answered_{false};
+};
+
+} // namespace cles::detail

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/convert.hpp>
+#include <cles/error.hpp>
+
+#include <boost/describe/members.hpp>
+#include <boost/mp11/algorithm.hpp>
+
+#include <string>
+#include <string_view>
+
+/// A plugin's part of the configuration. Not for applications.
+
+namespace cles::detail {
+
+/// The first member of the object that C has none of; empty where there is none such.
+template <described_struct C>
+std::string unknown_setting(std::string_view json) {
+    json_reader reader{json};
+    std::string_view key;
+    std::string unknown;
+    if (reader.begin_object()) {
+        while (reader.next_key(key)) {
+            bool known = false;
+            boost::mp11::mp_for_each<boost::describe::describe_members<C, boost::describe::mod_any_access>>(
+                [&](auto member) { known = known || key == member.name; });
+            if (!known) {
+                return std::string{key};
+            }
+            reader.skip();
+        }
+    }
+    return unknown;
+}
+
+/// Reads it as a C. A slip of the pen in a setting's name is an error, lest it be taken for the default.
+/// \throws cles::error with `conversion`
+template <class C>
+C plugin_config(std::string_view json) {
+    C config{};
+    std::string why;
+    if (!from_json(json, config, &why)) {
+        throw error(errc::conversion, "its configuration does not fit: " + why);
+    }
+    if constexpr (described_struct<C>) {
+        if (const auto unknown = unknown_setting<C>(json); !unknown.empty()) {
+            throw error(errc::conversion, "it has no setting '" + unknown + "'");
+        }
+    }
+    return config;
+}
+
+/// For a plugin that has no settings. \throws cles::error with `conversion`
+inline void expect_no_config(std::string_view json) {
+    json_reader reader{json};
+    std::string_view key;
+    if (!reader.begin_object() || reader.next_key(key)) {
+        throw error(errc::conversion, "it has no settings, but was given some");
+    }
+}
+
+} // namespace cles::detail

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "protocol/reply_line.hpp"
+
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+/// The answer to a request for `all`: what each node said, in the order of their names.
+class all_answer {
+  public:
+    void add_result(std::string_view node, std::string_view json);
+    void add_failure(std::string_view node, const protocol::failure& why);
+    [[nodiscard]] std::string whole() const { return results_ + R"(},"errors":{)" + errors_ + "}}"; }
+
+  private:
+    static void begin_member(std::string& in, std::string_view node);
+
+    std::string results_ = R"({"results":{)";
+    std::string errors_;
+};
+
+/// When it is to leave, so that it comes before the time runs out.
+time_point answer_by(time_point due, time_point now);
+/// What is said for a node that has not answered by then.
+protocol::failure late(std::string_view node);
+
+} // namespace cles::core

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "core/announcement.hpp"
+#include "core/group_source.hpp"
+#include "core/teller.hpp"
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// Something that is said of a run of a node. It borrows what it refers to.
+struct word {
+    const announcement& said;
+    std::uint32_t epoch;
+    std::uint64_t seq; ///< 0: nobody said
+    time_point spoken; ///< by the node itself
+    group_source from; ///< nothing but zeros: it was told by another
+    const teller& by;
+
+    [[nodiscard]] bool told() const noexcept { return from == group_source{}; }
+};
+
+/// A node from one start to the next, as far as it is known.
+struct known_run {
+    std::uint32_t epoch = 0;
+    group_source from;     ///< nothing but zeros: only others have told of it
+    std::uint64_t seq = 0; ///< 0: never told
+    time_point heard{};
+    std::uint64_t news = 0;      ///< the number of the last thing that was heard of it
+    std::uint64_t described = 0; ///< and of the last that was more than that it lives
+    announcement said{};
+    std::vector<std::string> endpoints; ///< as they can be used here
+    std::vector<std::string> passed_on; ///< as they are told to others
+
+    /// The first that is heard of it; takes the next of the `numbers` of news.
+    static known_run first(const word& w, std::uint64_t& numbers);
+    /// Takes what is newer.
+    void take(const word& w, std::uint64_t& numbers);
+    /// Takes where it can be asked. Whether it could not be asked there before.
+    bool place(const word& w);
+
+    [[nodiscard]] bool is(std::uint32_t e, const group_source& f) const noexcept {
+        return epoch == e && (from == f || from == group_source{} || f == group_source{});
+    }
+    /// Whether what was said is newer than all that is known of it.
+    [[nodiscard]] bool is_older_than(std::uint64_t s, time_point spoken) const noexcept {
+        return seq != 0 && s != 0 ? s > seq : spoken >= (s != 0 ? heard : heard + said.interval / 2);
+    }
+    [[nodiscard]] std::string_view where() const noexcept {
+        return endpoints.empty() ? std::string_view{} : std::string_view{endpoints.front()};
+    }
+};
+
+} // namespace cles::core

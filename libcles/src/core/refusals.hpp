@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "core/node.hpp"
+#include "protocol/message.hpp"
+
+#include <cstddef>
+#include <string>
+
+/// What requests are refused with.
+
+namespace cles::core {
+
+protocol::failure busy(std::string message);
+protocol::failure no_such_task(const node& n, const protocol::request_line& request);
+/// A line over the limit; `datagram`: bytes of one, 0 on a stream.
+protocol::failure overlong(const node& n, std::size_t datagram);
+/// A failure once the handler has begun: whoever repeats what was too large has to know.
+protocol::failure after_run(protocol::failure why);
+
+std::string failure_text(const protocol::failure& why);
+
+} // namespace cles::core

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+
+namespace cles::core {
+
+/// Whether updates go out in this turn of the executor, or wait for more to come with the next, so that one write
+/// carries them all. They wait while each turn brings more, until there are `most` or the first has waited `longest`.
+class update_gathering {
+  public:
+    static constexpr std::chrono::microseconds longest{100};
+    static constexpr std::uint64_t most = 32; // half of what is kept for a binder unless it asks for more or less
+
+    /// `published`: how many there have been so far, of which some have not gone out.
+    [[nodiscard]] bool waits(std::uint64_t published, time_point now) noexcept {
+        if (published == seen_) {
+            return false;
+        }
+        if (!since_) {
+            since_ = now;
+        }
+        seen_ = published;
+        return now - *since_ < longest && published - gone_ < most;
+    }
+    /// All have gone out, `published` of them.
+    void gone(std::uint64_t published) noexcept {
+        seen_ = published;
+        gone_ = published;
+        since_.reset();
+    }
+
+  private:
+    std::uint64_t seen_ = 0;
+    std::uint64_t gone_ = 0;
+    std::optional<time_point> since_; // when the first was let wait
+};
+
+} // namespace cles::core

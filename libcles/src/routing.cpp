@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/routing.hpp"
+
+#include <cles/routing.hpp>
+
+#include "shell/engine.hpp"
+#include "shell/routing_part.hpp"
+#include "shell/ways.hpp"
+
+#include <memory>
+#include <random>
+
+namespace cles {
+namespace {
+
+class host final : public detail::routing_host {
+  public:
+    explicit host(detail::engine& engine)
+        : ways_(engine), routing_(std::make_shared<core::routing>(engine.shared_node(), ways_, std::random_device{}(),
+                                                                  [&engine] { engine.ask_for_turn(); })) {}
+
+    void hold() override { routing_->hold(); }
+    void release(time_point now) override { routing_->release(now); }
+    void drain(time_point now) override { routing_->drain(now); }
+    void stop() override {
+        routing_->stop();
+        ways_.stop();
+    }
+
+  private:
+    shell::ways ways_;
+    std::shared_ptr<core::routing> routing_;
+};
+
+} // namespace
+
+const detail::routing_part* routing() noexcept {
+    static constexpr detail::routing_part part{
+        [](detail::engine& engine) -> std::unique_ptr<detail::routing_host> { return std::make_unique<host>(engine); }};
+    return &part;
+}
+
+} // namespace cles

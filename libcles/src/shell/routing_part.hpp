@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include <memory>
+
+namespace cles::detail {
+
+class engine;
+
+/// A service's routing, as the rest of the service sees it.
+class routing_host {
+  public:
+    routing_host() = default;
+    routing_host(const routing_host&) = delete;
+    routing_host& operator=(const routing_host&) = delete;
+    virtual ~routing_host() = default;
+
+    /// Who is there is still being asked: `any` and `all` wait.
+    virtual void hold() = 0;
+    /// Whoever is to be heard of has been.
+    virtual void release(time_point now) = 0;
+    /// Passes updates on that have come since the last time.
+    virtual void drain(time_point now) = 0;
+    virtual void stop() = 0;
+};
+
+/// How it is made for a service, which has its node ask it from then on.
+struct routing_part {
+    std::unique_ptr<routing_host> (*make)(engine& host);
+};
+
+} // namespace cles::detail

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "shell/service_call.hpp"
+
+#include <cles/reply_operation.hpp>
+
+#include "shell/command.hpp"
+#include "shell/engine.hpp"
+
+#include <algorithm>
+
+namespace cles::shell {
+
+service_call::~service_call() {
+    if (asked_) {
+        call_->forget_on_stop(); // which refers to this object
+    }
+    if (!call_->ended()) {
+        fail(errc::failed, "the handler ended without an answer");
+    }
+}
+
+void service_call::refuse(std::string_view message, std::chrono::milliseconds retry) {
+    const auto ms = std::max<std::chrono::milliseconds::rep>(retry.count(), 0);
+    call_->fail({.code = errc::busy, .message = std::string{message}, .retry_ms = static_cast<std::uint64_t>(ms)});
+}
+
+void service_call::on_stop(std::function<void()> callback) {
+    if (asked_ && !call_->stopped()) {
+        asked_->then = std::move(callback);
+    } else {
+        call_->on_stop(std::move(callback));
+    }
+}
+
+void service_call::log(log_level level, std::string_view text) {
+    if (!service_.expired()) { // the log may have gone with it
+        call_->say(level, text);
+    }
+}
+
+void service_call::delegate(std::string_view command, const call_options& options, answer_callback answered) {
+    const auto by = service_.lock();
+    if (!by || by->stopped()) {
+        answered(errc::stopped, "{}", "the service has been stopped");
+    } else if (call_->ended()) {
+        answered(errc::cancelled, "{}", "nobody waits for the job that asks");
+    } else if (const auto left = std::chrono::floor<std::chrono::milliseconds>(call_->due() - by->now());
+               left.count() <= 0) {
+        answered(errc::deadline, "{}", "the job that asks has no time left");
+    } else {
+        send(*by, command, options, std::move(answered), left);
+    }
+}
+
+void service_call::send(detail::engine& by, std::string_view command, const call_options& options,
+                        answer_callback answered, std::chrono::milliseconds left) {
+    if (!asked_) {
+        asked_ = std::make_unique<asked>();
+        follow_stop();
+    }
+    const auto key = ++asked_->last;
+    asked_->tickets.emplace(key, 0);
+    const auto why = std::make_shared<std::string>();
+    auto completed = [weak = weak_from_this(), key, why, answered = std::move(answered)](boost::system::error_code code,
+                                                                                         const json_text& reply) {
+        const auto self = weak.lock();
+        if (self) {
+            self->asked_->tickets.erase(key);
+        }
+        try {
+            answered(code, reply.text, *why);
+        } catch (...) {
+            if (self) {
+                detail::fail_with(*self, std::current_exception());
+            }
+        }
+    };
+    auto chosen = options;
+    chosen.diagnostics(*why);
+    using operation = detail::reply_operation<json_text, false, decltype(completed)>;
+    const auto ticket = send_command(
+        by, command, chosen,
+        detail::pending_ptr{detail::make_operation<operation>(std::move(completed), executor_, why.get())}, left);
+    if (const auto found = asked_->tickets.find(key); found != asked_->tickets.end()) {
+        found->second = ticket;
+    }
+}
+
+// The call tells one: this object, which then tells the handler too.
+void service_call::follow_stop() {
+    asked_->then = call_->forget_on_stop();
+    call_->on_stop([this] { withdraw_asked(); });
+}
+
+void service_call::withdraw_asked() {
+    const auto keep = weak_from_this().lock();
+    const auto by = service_.lock();
+    const auto then = std::exchange(asked_->then, nullptr);
+    const auto tickets = std::exchange(asked_->tickets, {});
+    if (by) {
+        for (const auto& [key, ticket] : tickets) {
+            by->cancel(ticket);
+        }
+    }
+    if (then) {
+        then();
+    }
+}
+
+} // namespace cles::shell

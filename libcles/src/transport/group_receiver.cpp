@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "transport/group_receiver.hpp"
+
+#include "protocol/group_message.hpp"
+#include "transport/group_socket_option.hpp"
+#include "transport/source_filter.hpp"
+
+#include <boost/asio/execution/context.hpp>
+#include <boost/asio/execution_context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/query.hpp>
+
+#include <algorithm>
+#include <mutex>
+
+namespace cles::transport {
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+namespace {
+
+/// Those of one context.
+class group_receivers final : public asio::execution_context::service {
+  public:
+    using key_type = group_receivers;
+    static inline asio::execution_context::id id;
+
+    explicit group_receivers(asio::execution_context& context) : service(context) {}
+
+    std::shared_ptr<group_receiver> find(const asio::any_io_executor& executor, const ip_interface& by,
+                                         const asio::ip::udp::endpoint& group) {
+        const std::lock_guard lock{mutex_}; // executors of one context may be used by several threads
+        std::erase_if(all_, [](const auto& each) { return each.expired(); });
+        for (const auto& each : all_) {
+            if (auto one = each.lock(); one && one->is_for(executor, by, group)) {
+                return one;
+            }
+        }
+        auto made = std::make_shared<group_receiver>(executor, by, group);
+        all_.push_back(made);
+        return made;
+    }
+
+  private:
+    void shutdown() noexcept override {}
+
+    std::mutex mutex_;
+    std::vector<std::weak_ptr<group_receiver>> all_;
+};
+
+} // namespace
+
+std::shared_ptr<group_receiver> group_receiver::of(const asio::any_io_executor& executor, const ip_interface& by,
+                                                   const udp::endpoint& group) {
+    auto& context = asio::query(executor, asio::execution::context);
+    return asio::use_service<group_receivers>(context).find(executor, by, group);
+}
+
+group_receiver::group_receiver(const asio::any_io_executor& executor, const ip_interface& by,
+                               const udp::endpoint& group)
+    : group_(group), interface_(by.index), socket_(executor, udp::v4()) {
+    socket_.set_option(asio::socket_base::reuse_address{true});
+    set_ip_option(socket_, IP_MULTICAST_ALL, 0); // else it hears groups that other programs have joined
+    socket_.bind(group_);
+    set_ip_option(socket_, IP_ADD_MEMBERSHIP, membership(group_, interface_));
+    socket_.non_blocking(true);
+    error_code ignored;
+    constexpr int room = 1 << 20; // a burst waits here while others have their turn
+    socket_.set_option(asio::socket_base::receive_buffer_size{room}, ignored);
+}
+
+// Only its own executor may ask whether the socket is open; from others the executor differs.
+bool group_receiver::is_for(const asio::any_io_executor& executor, const ip_interface& by, const udp::endpoint& group) {
+    return socket_.get_executor() == executor && interface_ == by.index && group_ == group && socket_.is_open();
+}
+
+void group_receiver::add(group_events& listener, const udp::endpoint& source) {
+    listeners_.push_back({&listener, source});
+    ++hearing_;
+    filter();
+    if (hearing_ == 1) {
+        receive();
+    }
+}
+
+void group_receiver::remove(const group_events& listener) {
+    const auto found =
+        std::find_if(listeners_.begin(), listeners_.end(), [&](const auto& each) { return each.events == &listener; });
+    if (found == listeners_.end()) {
+        return;
+    }
+    if (telling_) {
+        found->events = nullptr; // the others keep their places
+    } else {
+        listeners_.erase(found);
+    }
+    if (--hearing_ == 0) {
+        error_code ignored;
+        socket_.close(ignored);
+    } else {
+        filter();
+    }
+}
+
+// What one sends the others are to hear.
+void group_receiver::filter() {
+    if (hearing_ == 1) {
+        const auto alone =
+            std::find_if(listeners_.begin(), listeners_.end(), [](const auto& each) { return each.events != nullptr; });
+        drop_from(socket_, alone->source);
+    } else {
+        drop_nothing(socket_);
+    }
+}
+
+void group_receiver::receive() {
+    socket_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
+        if (!code) {
+            self->hand_over();
+        }
+    });
+}
+
+void group_receiver::hand_over() {
+    telling_ = true;
+    try {
+        tell_others();
+        arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) {
+            said_ = {};
+            const bool good = protocol::parse_group_message(one.text, said_);
+            said_.reading = hearing_ > 1 ? &reading_ : nullptr;
+            told_.emplace(group_datagram{one.from, one.text, good ? &said_ : nullptr});
+            next_ = 0;
+            tell_others();
+        });
+    } catch (...) { // a handler's, for whoever runs the context; it is none of the business of all else that has come
+        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+        throw;
+    }
+    // NOLINTNEXTLINE(modernize-loop-convert): each may add others, which may move them all
+    for (std::size_t i = 0; i < listeners_.size(); ++i) {
+        if (auto* const events = listeners_[i].events; events != nullptr) {
+            events->on_batch();
+        }
+    }
+    telling_ = false;
+    std::erase_if(listeners_, [](const auto& each) { return each.events == nullptr; });
+    if (hearing_ != 0) {
+        receive();
+    }
+}
+
+void group_receiver::tell_others() {
+    while (told_ && next_ < listeners_.size()) {
+        if (auto* const each = listeners_[next_++].events; each != nullptr) {
+            each->on_datagram(*told_);
+        }
+    }
+    told_.reset();
+    reading_.clear();
+}
+
+} // namespace cles::transport

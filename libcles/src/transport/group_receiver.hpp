@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/shared_reading.hpp>
+
+#include "transport/datagram_batch.hpp"
+#include "transport/group_events.hpp"
+#include "transport/ip_interface.hpp"
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/ip/udp.hpp>
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+namespace cles::transport {
+
+/// The socket at which a multicast group is heard by one interface: that group and nothing else (no unicast, no other
+/// group or interface), beside the other programs of the host that hear it. All nodes on one executor share it, so that
+/// the system copies each datagram once for them all.
+class group_receiver : public std::enable_shared_from_this<group_receiver> {
+  public:
+    using udp = boost::asio::ip::udp;
+
+    /// The one that nodes on this executor have, or a new one, which joins. \throws boost::system::system_error
+    static std::shared_ptr<group_receiver> of(const boost::asio::any_io_executor& executor, const ip_interface& by,
+                                              const udp::endpoint& group);
+    /// Joins anew. \throws boost::system::system_error
+    group_receiver(const boost::asio::any_io_executor& executor, const ip_interface& by, const udp::endpoint& group);
+
+    /// Begins to hand over what comes to this one too, up to a number of datagrams a turn; nothing is allocated for
+    /// one but what a reading of it keeps. The listener stays until it is removed. What it sends itself, from `source`,
+    /// it need not hear; where it is alone, the system does not even bring it here.
+    void add(group_events& listener, const udp::endpoint& source);
+    /// It hears nothing more, from inside a call as well. With the last the socket is closed.
+    void remove(const group_events& listener);
+
+    [[nodiscard]] bool is_for(const boost::asio::any_io_executor& executor, const ip_interface& by,
+                              const udp::endpoint& group);
+
+  private:
+    void filter();
+    void receive();
+    void hand_over();
+    void tell_others();
+
+    udp::endpoint group_;
+    int interface_;
+    udp::socket socket_;
+    datagram_batch arrived_;
+    struct place {
+        group_events* events; // null: removed while others were told
+        udp::endpoint source;
+    };
+    std::vector<place> listeners_;
+    std::size_t hearing_ = 0; // those that are not null
+    bool telling_ = false;
+    std::optional<group_datagram> told_; // not yet to all
+    protocol::request_line said_;        // in it
+    detail::shared_reading reading_;     // of its body
+    std::size_t next_ = 0;               // the first that it has not been told to
+};
+
+} // namespace cles::transport

@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <boost/asio/ip/udp.hpp>
+#include <boost/system/system_error.hpp>
+
+#include <cerrno>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+namespace cles::transport {
+
+/// Sets what Asio has no name for, or takes an address for where an interface's number is meant.
+/// \throws boost::system::system_error
+template <class T>
+void set_ip_option(boost::asio::ip::udp::socket& socket, int option, const T& value) {
+    if (::setsockopt(socket.native_handle(), IPPROTO_IP, option, &value, sizeof value) != 0) {
+        throw boost::system::system_error{errno, boost::system::system_category()};
+    }
+}
+
+inline ip_mreqn membership(const boost::asio::ip::udp::endpoint& group, int interface) noexcept {
+    ip_mreqn wanted{};
+    wanted.imr_multiaddr.s_addr = htonl(group.address().to_v4().to_uint());
+    wanted.imr_ifindex = interface;
+    return wanted;
+}
+
+} // namespace cles::transport

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "ordered_fan_out.hpp"
+
+#include "perf/stream_socket.hpp"
+#include "perf/wait_until.hpp"
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+
+#include <poll.h>
+
+namespace cles::perf::peers {
+namespace {
+
+// Subscriptions take hold at their own pace. Whoever is not reached by then never will be.
+constexpr std::chrono::milliseconds between_attempts{10};
+constexpr int most_attempts = 1000;
+// What has not come so long after all was published is lost. Only where something is does this take time.
+constexpr std::chrono::milliseconds patience{1000};
+
+} // namespace
+
+void publish_by_order(const std::string& where, const announce& tell,
+                      const std::function<void(const publication&)>& publish) {
+    const auto orders = listen_on(parse_url("tcp://127.0.0.1:0"));
+    tell(to_string(orders.where) + ' ' + where);
+    const auto control = accept_from(orders);
+    fan_out_order order;
+    while (receive_all(control.get(), std::as_writable_bytes(std::span{&order, 1}))) {
+        auto next = monotonic_ns();
+        for (std::uint64_t i = 0; i < order.updates; ++i) {
+            if (order.interval_ns != 0) {
+                next += static_cast<std::int64_t>(order.interval_ns);
+                wait_until(next);
+            }
+            publish(publish_sample(i));
+        }
+        send_all(control.get(), std::array{std::byte{1}});
+    }
+}
+
+ordered_fan_out::ordered_fan_out(const std::string& announced, std::size_t subscribers, const subscribe& how)
+    : inbox_(subscribers) {
+    const auto space = announced.find(' ');
+    control_ = connect_to(parse_url(announced.substr(0, space)));
+    subscriptions_ = how(announced.substr(space + 1), inbox_);
+    reach_all();
+}
+
+fan_out_tally ordered_fan_out::run(const fan_out_order& what, latency_recorder* record) {
+    inbox_.begin(what, record);
+    order(what);
+    for (bool all_sent = false;;) {
+        const auto before = inbox_.look();
+        if (before.complete && all_sent) {
+            return inbox_.tally();
+        }
+        if (before.complete) {
+            pollfd word{.fd = control_.get(), .events = POLLIN, .revents = 0};
+            checked(::poll(&word, 1, -1), "poll");
+        } else {
+            subscriptions_->take_for(patience, inbox_);
+        }
+        const bool was_sent = all_sent;
+        all_sent = all_sent || published();
+        // Where datagrams may be lost, the rest will not come.
+        if (was_sent && inbox_.look().count == before.count) {
+            return inbox_.tally();
+        }
+    }
+}
+
+void ordered_fan_out::reach_all() {
+    for (int attempt = 0; attempt < most_attempts; ++attempt) {
+        order({.binders = 1, .updates = 1});
+        pollfd word{.fd = control_.get(), .events = POLLIN, .revents = 0};
+        checked(::poll(&word, 1, -1), "poll");
+        (void)published();
+        subscriptions_->take_for(between_attempts, inbox_);
+        if (inbox_.all_reached()) {
+            return;
+        }
+    }
+    throw std::runtime_error("not all subscribers are reached");
+}
+
+void ordered_fan_out::order(const fan_out_order& what) { send_all(control_.get(), std::as_bytes(std::span{&what, 1})); }
+
+bool ordered_fan_out::published() {
+    pollfd word{.fd = control_.get(), .events = POLLIN, .revents = 0};
+    if (checked(::poll(&word, 1, 0), "poll") == 0) {
+        return false;
+    }
+    std::array<std::byte, 1> byte{};
+    if (!receive_all(control_.get(), byte)) {
+        throw std::runtime_error("the publisher has gone");
+    }
+    return true;
+}
+
+} // namespace cles::perf::peers

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: BSL-1.0
+"""Pictures of what perf/evaluate/latency.py timed across links: how long, over the share that took longer."""
+
+from .series_pictures import quantiles
+
+EXCHANGES = (("icd-pull", "round trip by hand"), ("pull", "PULL"), ("icd-update", "one way by hand"),
+             ("update", "UPDATE, one way"))
+
+
+def kinds(raw, note):
+    return [(f"link_{name}", f"Round trips and ways of the localization, {meaning}: all that were timed.",
+             _drawer(name, raw["series"], note)) for name, meaning in raw["links"].items()]
+
+
+def _drawer(name, series, note):
+    def drawn():
+        labelled = {label: [us for a_round in series[name][kind] for us in a_round] for kind, label in EXCHANGES}
+        return quantiles(f"link_{name}", labelled, note, "\u00b5s")
+
+    return drawn

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: BSL-1.0
+"""What is measured: a script of perf/evaluate for each section of the report, in the order in which they are told."""
+
+import os
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Section:
+    name: str  # of the script, without its suffix
+    title: str
+    paper: str  # what the paper reports there; empty where nothing
+    targets: tuple = ()  # of the build, as patterns; as far as there are such
+    programs: str = "apps"  # where in the build its script looks for them
+
+
+SECTIONS = (
+    Section("bench", "Point to point against a hand-written exchange",
+            "Section 4.1, Fig. 3: a PULL of the localization takes about 1.5 ms longer than the traditional packet by a "
+            "minimal TCP client and server; its 132 bytes are three times as many, and fit into a frame of 1500. Parsing "
+            "is constant for a request whose length is, and O(n) of the message.", ("cles_command",)),
+    Section("latency", "Latency across links, packet size and effort",
+            "Section 4 and 4.1: at most 100 ms for platooning, of which the overhead should be within a tenth; BIND and UPDATE "
+            "save half of the round trip; measured on one machine and across WiFi. 30 lines of code with CLES, a tenth of "
+            "what the packet with its own TCP client and server takes.", ("cles_command", "cles_link_*", "*_localization")),
+    Section("dsgd", "Distributed stochastic gradient descent",
+            "Section 4.2, Table 2: a classifier trained by threads, and by daemons to which shards are delegated; 10 ms of "
+            "overhead on one machine, less than 0.5 % of the whole.", ("clesd", "cles_dsgd", "cles_plugin_sgd")),
+    Section("platoon", "Platooning", "Section 4.2, the first case study: each vehicle BINDs to the localization of its leader "
+            "and of the one ahead.", ("cles_command", "clesd", "cles_platoon")),
+    Section("strike_latency", "Allocation of tasks: from track to strike",
+            "Section 4.2, the second case study: DELEGATE of video processing to whoever offers it, tracks to all that are "
+            "bound, and DELEGATE of a strike.", ("clesd", "cles_jadc2", "cles_plugin_fmv", "cles_plugin_strike")),
+    Section("peers", "Beside other middleware", "", ("cles_command", "clesd", "cles_peer_*"), "perf/peers"),
+)
+
+
+def known(folder):
+    """Those of the table, then what else in the folder can be run."""
+    names = {section.name for section in SECTIONS}
+    others = sorted(entry[:-3] for entry in os.listdir(folder)
+                    if entry.endswith(".py") and entry[:-3] not in names and os.access(os.path.join(folder, entry), os.X_OK))
+    return [*SECTIONS, *(Section(name, name.replace("_", " ").capitalize(), "") for name in others)]

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "image.hpp"
+
+#include <vector>
+
+namespace fmv {
+
+/// What stands still. At first the median of some frames that lie apart: of what moves, no place sees more than a few
+/// of them. Then it follows slowly, so that light may change, and more slowly still where something has been detected.
+class background {
+  public:
+    static constexpr int samples = 9; ///< of the median
+    static constexpr int apart = 3;   ///< frames from one to the next
+    /// Frames until it is known.
+    static constexpr int learning = (samples - 1) * apart + 1;
+
+    explicit background(extent size);
+
+    /// The first frame, with which the others are to be aligned until the background is known.
+    [[nodiscard]] const grey& reference() const noexcept { return reference_; }
+    [[nodiscard]] bool known() const noexcept { return seen_ >= learning; }
+    /// A frame to learn from, aligned. \pre not known
+    void learn(const grey& aligned);
+    /// Follows an aligned frame; `moving` is not 0 where something has been detected. \pre known
+    void follow(const grey& aligned, const grey& moving);
+    /// Of each pixel.
+    [[nodiscard]] const std::vector<float>& values() const noexcept { return values_; }
+
+  private:
+    void take_medians();
+
+    extent size_;
+    int seen_ = 0;
+    grey reference_;
+    std::vector<grey> kept_;
+    std::vector<float> values_;
+};
+
+} // namespace fmv

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "stream.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+namespace fmv {
+
+/// A stream, and how far it is. It is used under its lock.
+struct kept_stream {
+    explicit kept_stream(extent size) : video(size) {}
+
+    std::mutex lock;
+    stream video;
+    std::uint64_t next = 0; ///< the frame that would follow
+};
+
+/// The streams that are being worked on: so many at most, and none that has been idle for long. Thread-safe; time is
+/// the caller's.
+class streams {
+  public:
+    using time_point = std::chrono::steady_clock::time_point;
+
+    streams(std::size_t most, std::chrono::milliseconds idle) : most_(most), idle_(idle) {}
+
+    /// The stream of that name, which begins where there is none; null where there are too many.
+    std::shared_ptr<kept_stream> find(const std::string& name, extent size, time_point now);
+    [[nodiscard]] std::size_t count() const;
+
+  private:
+    struct entry {
+        std::shared_ptr<kept_stream> what;
+        time_point used;
+    };
+
+    std::size_t most_;
+    std::chrono::milliseconds idle_;
+    mutable std::mutex lock_;
+    std::map<std::string, entry> all_;
+};
+
+} // namespace fmv

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/registrar.hpp>
+
+#include <boost/describe/class.hpp>
+
+#include <cstdint>
+#include <optional>
+
+namespace fmv {
+
+struct settings {
+    std::optional<std::uint64_t> streams{}; ///< 1 to 64, 8 unless set: each takes some megabytes while it begins
+    std::optional<std::uint64_t> idle_s{};  ///< 1 to 3600, 10 unless set: after which a stream is forgotten
+};
+BOOST_DESCRIBE_STRUCT(settings, (), (streams, idle_s))
+
+/// Finds what moves in full motion video (paper, sections 2.2 and 4.3).
+///
+/// - DELEGATE FMV_Processing {"stream","frame","width","height","deadline_ms","pixels"}: the tracks after that frame;
+/// see
+///   `frame_message` and `found`. A frame that has been taken already changes nothing.
+/// - PULL FMV_Processing: streams, and what became of the frames
+void register_tasks(cles::registrar& to, const settings& wanted);
+
+} // namespace fmv

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "detector.hpp"
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace fmv {
+
+/// A target, followed over several frames.
+struct tracked {
+    std::uint64_t id = 0; ///< the same as long as it is followed
+    point at{};
+    point velocity{};     ///< pixels per frame
+    point first{};        ///< where it was first seen
+    unsigned history = 1; ///< a bit for each look since, the lowest being the latest: 1 where it was seen
+    int age = 0;          ///< frames
+    int looks = 0;        ///< since it was first seen
+    int missed = 0;       ///< looks since it was last seen
+    bool confirmed = false;
+};
+
+/// Puts detections of consecutive frames together. Each track has a predictor of constant velocity (an alpha-beta
+/// filter); a detection belongs to the nearest one within a gate. One that has been seen in M of N frames, and has
+/// moved, is confirmed; noise does the first seldom, and what a false background shows does not do the second.
+class tracker {
+  public:
+    /// The detections of the frame that comes so many after the last one.
+    void step(std::span<const detection> seen, int frames = 1);
+    /// Those that are confirmed.
+    [[nodiscard]] std::vector<tracked> confirmed() const;
+
+  private:
+    void predict(int frames);
+    void associate(std::span<const detection> seen, int frames);
+    void judge();
+
+    std::vector<tracked> all_;
+    std::vector<std::uint8_t> taken_; ///< of the detections
+    std::uint64_t next_id_ = 1;
+};
+
+} // namespace fmv

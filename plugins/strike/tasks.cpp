@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "tasks.hpp"
+
+#include "intercept.hpp"
+#include "magazine.hpp"
+#include "order.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+namespace strike {
+namespace {
+
+using cles::errc;
+using cles::error;
+using steady = std::chrono::steady_clock;
+using milliseconds = std::chrono::duration<double, std::milli>;
+
+struct inventory {
+    std::uint64_t left = 0;
+    std::vector<std::string> orders{};
+};
+BOOST_DESCRIBE_STRUCT(inventory, (), (left, orders))
+
+struct aircraft {
+    explicit aircraft(const settings& wanted)
+        : weapons(wanted.weapons.value_or(4)), at{wanted.x.value_or(-100), wanted.y.value_or(120)},
+          speed(wanted.speed.value_or(400)), oldest_s(wanted.oldest_s.value_or(2)) {}
+
+    std::mutex lock; // in an application, a test or a daemon: whoever calls
+    magazine weapons;
+    place at;
+    double speed;
+    double oldest_s;
+};
+
+double utc_now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
+
+void check(const order& what, double age, const aircraft& own) {
+    if (what.id.empty() || what.id.size() > 64) {
+        throw error(errc::bad_request, "id: 1 to 64 characters");
+    }
+    for (const double number : {what.x, what.y, what.vx, what.vy, what.utc}) {
+        if (!std::isfinite(number)) {
+            throw error(errc::bad_request, "x, y, vx, vy and utc: numbers");
+        }
+    }
+    if (std::abs(age) > own.oldest_s) {
+        throw error(errc::failed,
+                    "the track is " + std::to_string(age) + " s old: " + std::to_string(own.oldest_s) + " at most");
+    }
+    if (own.weapons.has_carried_out(what.id)) {
+        throw error(errc::failed, "the order " + what.id + " has been carried out already");
+    }
+}
+
+void carry_out(const cles::request& asked, const cles::responder& answer, aircraft& own) {
+    const auto begun = steady::now();
+    const auto what = asked.as<order>();
+    const std::scoped_lock guard{own.lock};
+    const double now = utc_now();
+    const double age = now - what.utc;
+    check(what, age, own);
+    const auto hit = intercept(own.at, own.speed, {what.x + what.vx * age, what.y + what.vy * age}, {what.vx, what.vy});
+    if (!hit) {
+        throw error(errc::failed, "the target is too fast");
+    }
+    if (own.weapons.left() == 0) {
+        answer.refuse("no weapon is left", std::chrono::hours{1}); // another aircraft may have one
+        return;
+    }
+    if (!what.drill.value_or(false)) {
+        own.weapons.release(what.id);
+    }
+    const auto whole = milliseconds{static_cast<double>(what.deadline_ms)};
+    answer.done(outcome{.node = std::string{asked.node()},
+                        .order = what.id,
+                        .aim_x = hit->where.x,
+                        .aim_y = hit->where.y,
+                        .impact_utc = now + hit->after_s,
+                        .flight_s = hit->after_s,
+                        .left = own.weapons.left(),
+                        .queue_ms = std::max(0.0, (whole - milliseconds{asked.deadline() - begun}).count()),
+                        .run_ms = milliseconds{steady::now() - begun}.count()});
+}
+
+void require(bool fits, const char* what) {
+    if (!fits) {
+        throw error(errc::bad_request, what);
+    }
+}
+
+} // namespace
+
+void register_tasks(cles::registrar& to, const settings& wanted) {
+    require(wanted.weapons.value_or(4) <= 1000, "weapons: 1000 at most");
+    require(std::isfinite(wanted.x.value_or(0)) && std::isfinite(wanted.y.value_or(0)), "x and y: numbers");
+    require(wanted.speed.value_or(400) > 0 && std::isfinite(wanted.speed.value_or(400)), "speed: more than 0");
+    require(wanted.oldest_s.value_or(2) > 0 && std::isfinite(wanted.oldest_s.value_or(2)), "oldest_s: more than 0");
+    const auto own = std::make_shared<aircraft>(wanted);
+    to.on_pull("strike",
+               [own] {
+                   const std::scoped_lock guard{own->lock};
+                   return inventory{own->weapons.left(), {own->weapons.orders().begin(), own->weapons.orders().end()}};
+               },
+               {.description = "Weapons that are left, and orders that were carried out",
+                .idempotent = true,
+                .inline_ok = true});
+    to.on_delegate("strike",
+                   [own](const cles::request& asked, const cles::responder& answer) { carry_out(asked, answer, *own); },
+                   {.description = "Strikes a target: where it was, when, and how it moves", .inline_ok = true});
+}
+
+} // namespace strike

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/registrar.hpp>
+
+#include <boost/describe/class.hpp>
+
+#include <cstdint>
+#include <optional>
+
+namespace strike {
+
+struct settings {
+    std::optional<std::uint64_t> weapons{}; ///< 0 to 1000, 4 unless set
+    std::optional<double> x{}, y{};         ///< where the aircraft is, in pixels of the ground; -100, 120 unless set
+    std::optional<double> speed{};          ///< of what it releases, in pixels a second; 400 unless set
+    std::optional<double> oldest_s{};       ///< a track that is older is refused; 2 unless set
+};
+BOOST_DESCRIBE_STRUCT(settings, (), (weapons, x, y, speed, oldest_s))
+
+/// A strike aircraft's ability (paper, sections 2.2 and 4.3).
+///
+/// - DELEGATE strike {"id","x","y","vx","vy","utc","deadline_ms"}: see `order` and `outcome`. Not idempotent: where the
+///   answer is lost nobody repeats it. So quick that it runs on the I/O thread, and waits for no worker.
+/// - PULL strike: what is left, and the orders that were carried out
+void register_tasks(cles::registrar& to, const settings& wanted);
+
+} // namespace strike

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/registrar.hpp>
+
+#include <boost/describe/class.hpp>
+
+#include <cstdint>
+#include <optional>
+
+namespace sysinfo {
+
+struct settings {
+    std::optional<std::uint32_t>
+        interval_ms; ///< between updates to those that are bound, 10 to 86400000; 1000 unless set
+    std::optional<std::uint32_t> processes; ///< how many are listed, at most 1000; 10 unless set
+};
+BOOST_DESCRIBE_STRUCT(settings, (), (interval_ms, processes))
+
+/// What the machine knows of itself, by PULL and BIND, for all who are on it (paper, section 3.5): `utc`, `load`,
+/// `memory`, `disk`, `network` and `processes`, from the kernel's own files. What their members mean stands with the
+/// structures of that name.
+void register_tasks(cles::registrar& to, const settings& wanted);
+
+} // namespace sysinfo

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "clesd.hpp"
+
+#include <cles/error.hpp>
+#include <cles/run.hpp>
+
+#include "config_error.hpp"
+#include "config_sources.hpp"
+#include "config_text.hpp"
+#include "daemon.hpp"
+#include "daemon_log.hpp"
+#include "notify.hpp"
+#include "options.hpp"
+#include "plugin_places.hpp"
+#include "plugin_search.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <string>
+#include <thread>
+#include <utility>
+#include <variant>
+
+#include <unistd.h>
+
+namespace cles::runtime {
+namespace {
+
+constexpr int success = 0;
+constexpr int cannot_run = 1;
+constexpr int wrong_usage = 2;
+
+void print(std::FILE* to, const std::string& text) {
+    std::fwrite(text.data(), 1, text.size(), to);
+    std::fflush(to);
+}
+
+int complain(const std::string& text, int code) {
+    print(stderr, "clesd: " + text + "\n");
+    return code;
+}
+
+std::string host_name() {
+    std::array<char, 256> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+config_sources sources_of(const options& wanted) {
+    return {.file = wanted.config,
+            .flags = wanted.flags,
+            .variable = [](const char* name) -> const char* { return std::getenv(name); },
+            .host = host_name(),
+            .cores = std::thread::hardware_concurrency()};
+}
+
+// Plugins are looked for, not loaded: that would run their code.
+int check_plugins(const config& setup) {
+    for (std::size_t i = 0; i < setup.plugins.size(); ++i) {
+        try {
+            find_plugin(plugin_file(setup, setup.plugins[i]), plugin_folders(setup));
+        } catch (const plugin_error& missing) {
+            const auto text = setup.place_of("plugins[" + std::to_string(i) + "].path") + ": " + missing.what();
+            if (setup.plugins[i].required) {
+                return complain(text, wrong_usage);
+            }
+            complain(text + " (it is not required)", success);
+        }
+    }
+    print(stdout, (setup.file.empty() ? "without a file: " : setup.file + ": ") + "can be used\n");
+    return success;
+}
+
+// Of a system error first what could not be done, then why; not the other way round, and not twice.
+std::string words_of(const error& e) {
+    const auto why = e.code().message();
+    if (e.code().category() == error_category() || e.message().empty()) {
+        return e.what();
+    }
+    return e.message().find(why) != std::string::npos ? e.message() : e.message() + ": " + why;
+}
+
+// Children are not to tell the service manager anything.
+std::string take_notify_socket() {
+    const char* socket = std::getenv("NOTIFY_SOCKET");
+    std::string taken = socket == nullptr ? "" : socket;
+    ::unsetenv("NOTIFY_SOCKET");
+    return taken;
+}
+
+int run(config setup, config_sources sources) {
+    const auto node = setup.node;
+    const run_options how{.busy_poll = setup.busy_poll,
+                          .fifo_priority = static_cast<int>(setup.real_time),
+                          .lock_memory = setup.real_time != 0};
+    daemon_log log{node, setup.log};
+    const notifier tell{take_notify_socket()};
+    boost::asio::io_context io{1};
+    daemon running{io, std::move(setup), std::move(sources), log, tell};
+    for (const auto& endpoint : running.endpoints()) {
+        std::string line{node};
+        line.append(" listening on ").append(endpoint).push_back('\n');
+        print(stdout, line);
+    }
+    if (!tell.ready()) {
+        log.warning("the service manager could not be told");
+    }
+    cles::run(io, how);
+    if (running.leaves_something()) {
+        std::_Exit(success); // it cannot be waited for
+    }
+    return success;
+}
+
+int start(int argc, const char* const* argv) {
+    const auto asked = parse_options(argc, argv);
+    if (const auto* text = std::get_if<std::string>(&asked)) {
+        print(stdout, *text);
+        return success;
+    }
+    const auto& wanted = std::get<options>(asked);
+    auto sources = sources_of(wanted);
+    auto setup = load(sources);
+    if (wanted.print_config) {
+        print(stdout, to_yaml(setup));
+    }
+    if (wanted.check) {
+        return check_plugins(setup);
+    }
+    return wanted.print_config ? success : run(std::move(setup), std::move(sources));
+}
+
+} // namespace
+
+int clesd(int argc, const char* const* argv) {
+    std::signal(SIGPIPE, SIG_IGN); // a reader of its output that goes away
+    try {
+        return start(argc, argv);
+    } catch (const usage_error& wrong) {
+        return complain(std::string{wrong.what()} + "\nclesd: clesd --help says what there is", wrong_usage);
+    } catch (const config_error& wrong) {
+        return complain(wrong.what(), wrong_usage);
+    } catch (const error& failed) {
+        return complain(words_of(failed), cannot_run);
+    } catch (const boost::system::system_error& failed) {
+        return complain(failed.code().message(), cannot_run); // what() may hold the path of a header
+    } catch (const std::exception& failed) {
+        return complain(failed.what(), cannot_run);
+    }
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,319 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "crew.hpp"
+
+#include "job_record.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <iterator>
+#include <mutex>
+#include <system_error>
+#include <thread>
+#include <utility>
+
+namespace cles::runtime {
+namespace {
+
+using clock = std::chrono::steady_clock;
+
+constexpr std::size_t most_workers = 1024;
+constexpr std::int64_t longest_told = 1'000'000'000; // microseconds
+constexpr std::size_t most_replacements = 1024;
+// How long free workers have at the end for what is called back, whatever those are at that are not free.
+constexpr std::chrono::milliseconds last_turn{500};
+
+std::size_t workers_of(const pool_options& options) {
+    const std::size_t wanted = options.workers != 0 ? options.workers : std::thread::hardware_concurrency();
+    return std::clamp<std::size_t>(wanted, 1, most_workers);
+}
+
+} // namespace
+
+crew::crew(const pool_options& options, result_box& box)
+    : box_(box), threads_(workers_of(options)), queue_(std::max<std::size_t>(options.queue, 1)),
+      watch_(workers_of(options), std::min<std::size_t>(options.replacements, most_replacements), options.grace) {
+    mirror();
+}
+
+// -- what waits ----------------------------------------------------------------------------------------------------
+
+bool crew::wants_worker() const noexcept {
+    // Those that are awake and have no job yet are about to take one.
+    return !ended_ && awake_ < watch_.allowed() && queue_.size() > awake_ - at_work_;
+}
+
+void crew::mirror() noexcept {
+    queued_.store(static_cast<std::uint32_t>(queue_.size()), std::memory_order_relaxed);
+    running_.store(at_work_, std::memory_order_relaxed);
+    usable_.store(static_cast<std::uint32_t>(watch_.usable()), std::memory_order_relaxed);
+    // Rounded up, since zero says that nothing is known.
+    service_us_.store(
+        static_cast<std::uint32_t>(std::min<std::int64_t>((service_time_.value().count() + 999) / 1000, longest_told)),
+        std::memory_order_relaxed);
+}
+
+crew::admission crew::push(job_record& job) {
+    const std::lock_guard lock{mutex_};
+    if (closed_ || watch_.usable() == 0) {
+        return admission::no_workers;
+    }
+    if (!queue_.push(job)) {
+        return admission::full;
+    }
+    job.where = job_record::place::queued;
+    job.begun = false;
+    mirror();
+    return wants_worker() ? admission::wants_workers : admission::queued;
+}
+
+void crew::resume(job_record& job, std::function<void()> part) {
+    bool wanted = false;
+    {
+        const std::lock_guard lock{mutex_};
+        if (ended_) {
+            return;
+        }
+        job.called_back.push_back(std::move(part));
+        if (job.where != job_record::place::nowhere) {
+            return; // it comes to it
+        }
+        job.add_reference();
+        job.where = job_record::place::queued;
+        queue_.push_begun(job);
+        mirror();
+        wanted = wants_worker();
+        awake_ += wanted ? 1 : 0;
+    }
+    if (wanted) {
+        enlist();
+    }
+}
+
+bool crew::take_back(job_record& job) {
+    const std::lock_guard lock{mutex_};
+    if (job.where != job_record::place::queued || job.begun) {
+        return false;
+    }
+    queue_.remove(job);
+    job.where = job_record::place::nowhere;
+    mirror();
+    return true;
+}
+
+void crew::hurry(const job_record& job, time_point now) {
+    const std::lock_guard lock{mutex_};
+    if (job.where == job_record::place::at_work) {
+        watch_.stop(job.worker, &job, now);
+    }
+}
+
+void crew::close(const std::function<void(job_record&)>& dropped) {
+    std::vector<job_record*> left;
+    {
+        const std::lock_guard lock{mutex_};
+        closed_ = true;
+        std::vector<job_record*> begun;
+        while (auto* next = queue_.pop()) {
+            auto& job = static_cast<job_record&>(*next);
+            if (job.begun) {
+                begun.push_back(&job);
+            } else {
+                job.where = job_record::place::nowhere;
+                left.push_back(&job);
+            }
+        }
+        for (auto* job : begun) {
+            queue_.push_begun(*job);
+        }
+        mirror();
+    }
+    for (auto* job : left) {
+        dropped(*job);
+    }
+}
+
+std::size_t crew::join(std::chrono::milliseconds limit) {
+    const auto end = clock::now() + limit;
+    wake();
+    {
+        std::unique_lock lock{mutex_};
+        at_rest_.wait_until(lock, end, [this] { return queue_.empty() && at_work_ == 0; });
+        at_rest_.wait_for(lock, last_turn, [this] { return queue_.empty() || at_work_ >= watch_.allowed(); });
+        ended_ = true;
+    }
+    const auto left =
+        threads_.stop(std::max(std::chrono::ceil<std::chrono::milliseconds>(end - clock::now()), {}), running());
+    if (left == 0) {
+        drop_called_back();
+    }
+    return left;
+}
+
+// Of jobs that no worker came to.
+void crew::drop_called_back() {
+    std::vector<std::function<void()>> parts;
+    std::vector<job_record*> left;
+    {
+        const std::lock_guard lock{mutex_};
+        while (auto* next = queue_.pop()) {
+            auto& job = static_cast<job_record&>(*next);
+            job.where = job_record::place::nowhere;
+            std::move(job.called_back.begin(), job.called_back.end(), std::back_inserter(parts));
+            job.called_back.clear();
+            left.push_back(&job);
+        }
+        mirror();
+    }
+    parts.clear();
+    for (auto* job : left) {
+        job->release();
+    }
+}
+
+// -- workers -------------------------------------------------------------------------------------------------------
+
+void crew::wake() {
+    for (;;) {
+        {
+            const std::lock_guard lock{mutex_};
+            if (!wants_worker()) {
+                return;
+            }
+            ++awake_;
+        }
+        enlist();
+    }
+}
+
+void crew::enlist() {
+    boost::asio::post(threads_.get_executor(), [weak = self_] {
+        if (const auto self = weak.lock()) {
+            self->work();
+        }
+    });
+}
+
+// What a worker does with a job when it no longer counts as being at it.
+void crew::part_with(job_record* job, bool may_keep, streak& so_far, time_point now,
+                     std::vector<std::function<void()>>& dropped) {
+    dropped.clear();
+    if (job != nullptr && job->settle(may_keep) && may_keep) {
+        so_far.keep(now);
+    }
+    if (!may_keep && so_far.release()) {
+        box_.hurry();
+    }
+}
+
+void crew::work() {
+    std::vector<std::function<void()>> parts;
+    job_record* done = nullptr;
+    streak so_far;
+    job_record::at_work here;
+    job_record::set_at_work(&here);
+    std::unique_lock lock{mutex_};
+    const auto place = watch_.enter();
+    auto now = clock::now();
+    while (awake_ <= watch_.allowed()) {
+        auto* next = queue_.pop();
+        if (next == nullptr) {
+            break;
+        }
+        auto& job = static_cast<job_record&>(*next);
+        const bool begins = !std::exchange(job.begun, true);
+        job.where = job_record::place::at_work;
+        job.worker = place;
+        watch_.begin(place, &job, now, job.request().deadline());
+        ++at_work_;
+        mirror();
+        std::vector<std::function<void()>> now_due;
+        now_due.swap(job.called_back);
+        const bool may_keep_last = so_far.goes_on(job.task());
+        here = {.job = &job, .may_keep = false, .kept = false};
+        const bool more_wait = !queue_.empty();
+        const auto usual = service_time_.value();
+        lock.unlock();
+
+        part_with(done, may_keep_last, so_far, now, parts);
+        here.may_keep = so_far.begin(job.task(), more_wait, usual, now);
+        if (begins) {
+            job.run();
+        }
+        for (const auto& part : now_due) {
+            job.run(part);
+        }
+        parts.swap(now_due);
+
+        const auto ended = clock::now();
+        if (here.kept) {
+            so_far.keep(ended);
+        }
+        lock.lock();
+        service_time_.add(ended - now);
+        now = ended;
+        --at_work_;
+        figures_.revived += watch_.end(place) ? 1 : 0;
+        done = &job;
+        job.where = job_record::place::nowhere;
+        if (!job.called_back.empty()) {
+            job.where = job_record::place::queued;
+            queue_.push_begun(job); // with the worker's reference
+            done = nullptr;
+        }
+        mirror();
+        if (closed_) {
+            at_rest_.notify_all();
+        }
+    }
+    watch_.leave(place);
+    --awake_;
+    lock.unlock();
+    part_with(done, false, so_far, now, parts);
+    job_record::set_at_work(nullptr);
+}
+
+void crew::watch(time_point now, const std::function<void(const worker_watch::finding&, const job_record&)>& found) {
+    struct lost {
+        worker_watch::finding what;
+        job_record* job;
+    };
+    std::vector<lost> all;
+    std::size_t threads = 0;
+    {
+        const std::lock_guard lock{mutex_};
+        watch_.check(now, [&](const worker_watch::finding& what) {
+            auto* job = const_cast<job_record*>(static_cast<const job_record*>(what.job)); // NOLINT
+            job->add_reference();
+            all.push_back({what, job});
+            ++figures_.stuck;
+            figures_.replaced += what.replaced ? 1 : 0;
+        });
+        threads = watch_.allowed();
+        mirror();
+    }
+    for (const auto& each : all) {
+        try {
+            while (threads_.count() < threads) {
+                threads_.add();
+            }
+        } catch (const std::system_error&) {
+            // It is one less, then; what waits is told at its deadline.
+        }
+        found(each.what, *each.job);
+        each.job->release();
+    }
+    if (!all.empty()) {
+        wake();
+    }
+}
+
+crew::figures crew::count() const {
+    const std::lock_guard lock{mutex_};
+    auto result = figures_;
+    result.stuck_now = static_cast<std::uint32_t>(watch_.stuck());
+    result.service_time = service_time_.value();
+    return result;
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "brief_mutex.hpp"
+#include "job_queue.hpp"
+#include "pool_options.hpp"
+#include "result_box.hpp"
+#include "service_time.hpp"
+#include "streak.hpp"
+#include "worker_threads.hpp"
+#include "worker_watch.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+namespace cles::runtime {
+
+class job_record;
+
+/// The workers and what waits for them.
+///
+/// A worker that is awake takes one job after another until there is none; so a worker is only woken where there is
+/// more to do than are awake, and a burst of jobs costs one wake-up, not one for each.
+class crew {
+  public:
+    crew(const pool_options& options, result_box& box);
+    crew(const crew&) = delete;
+    crew& operator=(const crew&) = delete;
+    ~crew() = default;
+
+    /// To be called first, with what keeps this alive while a worker is in it.
+    void start(std::weak_ptr<crew> self) { self_ = std::move(self); }
+
+    // From the service's executor:
+    enum class admission : std::uint8_t {
+        queued,
+        wants_workers, ///< queued; `wake` has something to do, which may wait until more has come
+        full,
+        no_workers, ///< they are stuck, all of them
+    };
+    /// Queues a new job.
+    [[nodiscard]] admission push(job_record& job);
+    /// Wakes as many workers as have something to do.
+    void wake();
+    /// Takes out a job that has not begun. False where it has.
+    bool take_back(job_record& job);
+    /// A job that is to stop had better end soon.
+    void hurry(const job_record& job, time_point now);
+    /// Calls `found` for each worker that has become stuck, once replacements are at work.
+    void watch(time_point now, const std::function<void(const worker_watch::finding&, const job_record&)>& found);
+    /// No job begins any more. Those that have not are handed over.
+    void close(const std::function<void(job_record&)>& dropped);
+    /// After `close`: waits so long for the workers, which still run what is called back of jobs that have begun. With
+    /// that, those that are free go on for a moment in any case. Returns how many workers are left behind in a job;
+    /// one that comes back from it after all still runs what was called back.
+    std::size_t join(std::chrono::milliseconds limit);
+
+    // From anywhere:
+    /// Has a part of a job that has begun run when it is its turn; dropped after `join`.
+    void resume(job_record& job, std::function<void()> part);
+
+    [[nodiscard]] std::uint32_t queued() const noexcept { return queued_.load(std::memory_order_relaxed); }
+    [[nodiscard]] std::uint32_t running() const noexcept { return running_.load(std::memory_order_relaxed); }
+    [[nodiscard]] std::uint32_t usable() const noexcept { return usable_.load(std::memory_order_relaxed); }
+    /// How long a job holds a worker, smoothed, in microseconds; zero where there has been none.
+    [[nodiscard]] std::uint32_t service_us() const noexcept { return service_us_.load(std::memory_order_relaxed); }
+    struct figures {
+        std::uint64_t stuck = 0;
+        std::uint64_t replaced = 0;
+        std::uint64_t revived = 0;
+        std::uint32_t stuck_now = 0;
+        std::chrono::nanoseconds service_time{0};
+    };
+    [[nodiscard]] figures count() const;
+
+  private:
+    void work();
+    void part_with(job_record* job, bool may_keep, streak& so_far, time_point now,
+                   std::vector<std::function<void()>>& dropped);
+    void enlist();
+    void drop_called_back();
+    [[nodiscard]] bool wants_worker() const noexcept;
+    void mirror() noexcept;
+
+    result_box& box_;
+    worker_threads threads_;
+    std::weak_ptr<crew> self_;
+    mutable brief_mutex mutex_; // of all that follows
+    job_queue queue_;
+    worker_watch watch_;
+    std::size_t awake_ = 0; // workers that look for jobs or are about to
+    std::uint32_t at_work_ = 0;
+    service_time service_time_;
+    figures figures_;
+    bool closed_ = false; // no job begins
+    bool ended_ = false;  // nothing is called back
+    std::condition_variable_any at_rest_;
+    // The same for those who only look.
+    std::atomic<std::uint32_t> queued_{0};
+    std::atomic<std::uint32_t> running_{0};
+    std::atomic<std::uint32_t> usable_{0};
+    std::atomic<std::uint32_t> service_us_{0};
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "daemon.hpp"
+
+#include "config_error.hpp"
+#include "config_text.hpp"
+#include "config_values.hpp"
+#include "plugin_places.hpp"
+#include "pooled_registrar.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <csignal>
+#include <utility>
+
+namespace cles::runtime {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+service_options options_of(const config& setup, const daemon_log& log) {
+    service_options options{.name = setup.node};
+    options.listen = setup.listen;
+    options.peers = setup.peers;
+    options.insecure = setup.insecure;
+    options.networks = setup.networks;
+    options.multicast = setup.multicast;
+    options.limits = setup.limits;
+    options.log = log.sink();
+    options.routing = cles::routing();
+    options.gossip = cles::gossip(setup.seeds); // without any it may be another's
+    return options;
+}
+
+pool_options pool_options_of(const config& setup, const daemon_log& log) {
+    pool_options options;
+    options.workers = setup.workers;
+    options.queue = setup.queue;
+    options.replacements = setup.replacements;
+    options.grace = std::chrono::ceil<milliseconds>(setup.stuck_after);
+    options.log = log.sink();
+    return options;
+}
+
+plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
+    plugin_host_options options{.node = setup.node};
+    options.folders = plugin_folders(setup);
+    options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
+        log.write(level, std::string{plugin} + ": " + std::string{text});
+    };
+    return options;
+}
+
+std::string counted(std::size_t count, const char* what) {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+// What a reload does not change, as text to compare.
+std::string lasting_part(config setup) {
+    setup.seeds.clear();
+    setup.log = {};
+    setup.origins.clear();
+    return to_yaml(setup);
+}
+
+} // namespace
+
+daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log, const notifier& tell)
+    : io_(io), setup_(std::move(setup)), sources_(std::move(sources)), log_(log), tell_(tell),
+      service_(io,
+               [this] {
+                   auto options = options_of(setup_, log_);
+                   options.load = [this] { return has_pool_ ? pool_.load() : node_load{}; };
+                   options.metrics = [this](json_writer& w) { write_metrics(w); };
+                   return options;
+               }()),
+      pool_(service_, pool_options_of(setup_, log)), plugins_(host_options_of(setup_, log)),
+      signals_(
+          io.get_executor(), [this](int signal) { stop(signal); }, [this] { reload(); }) {
+    has_pool_ = true;
+    try {
+        load_plugins();
+    } catch (...) {
+        service_.stop(); // while there is all that it asks for
+        throw;
+    }
+}
+
+daemon::~daemon() { service_.stop(); }
+
+void daemon::load_plugins() {
+    pooled_registrar tasks{service_, pool_};
+    for (std::size_t i = 0; i < setup_.plugins.size(); ++i) {
+        const auto& wanted = setup_.plugins[i];
+        try {
+            plugins_.load(plugin_file(setup_, wanted), wanted.config, tasks);
+        } catch (const plugin_error& wrong) {
+            const auto place = setup_.place_of("plugins[" + std::to_string(i) + "].path");
+            if (wanted.required) {
+                throw config_error(place, wrong.what());
+            }
+            log_.warning(place + ": goes on without it: " + wrong.what());
+            continue;
+        }
+        const auto& loaded = plugins_.plugins().back();
+        log_.info("plugin " + loaded.name + " " + loaded.version + " with " + counted(loaded.tasks.size(), "task") +
+                  " from " + loaded.path);
+    }
+}
+
+void daemon::write_metrics(json_writer& w) const {
+    w.key("pool");
+    write_json(w, pool_.figures());
+    const auto figures = plugins_.figures();
+    w.key("plugins");
+    w.begin_object();
+    w.key("loaded");
+    w.value(std::uint64_t{plugins_.plugins().size()});
+    w.key("jobs");
+    w.value(std::uint64_t{figures.jobs});
+    w.key("answered_twice");
+    w.value(figures.answered_twice);
+    w.end_object();
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void daemon::stop(int signal) {
+    const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
+    if (std::exchange(stopping_, true)) {
+        log_.warning("stopping at once, on a second signal");
+        leaves_something_ = true; // nobody has looked
+        finish({});
+        return;
+    }
+    stop_begun_ = steady_clock::now();
+    const auto load = pool_.load();
+    log_.info("stopping on " + name + "; " + counted(load.running, "job") + " running, " + std::to_string(load.queued) +
+              " waiting");
+    if (!tell_.stopping()) {
+        log_.warning("the service manager could not be told");
+    }
+    service_.leave(); // nobody is to send jobs that would be refused
+    pool_.drain(std::chrono::ceil<milliseconds>(setup_.drain), [this](const drain_report& how) { finish(how); });
+}
+
+void daemon::finish(const drain_report& how) {
+    if (std::exchange(finished_, true)) {
+        return;
+    }
+    if (how.abandoned > 0) {
+        log_.warning(counted(how.abandoned, "job") + " did not end in time");
+    }
+    leaves_something_ = leaves_something_ || how.stuck > 0;
+    // A plugin gets what is left of the time to let go of what it holds.
+    const auto left = std::chrono::floor<milliseconds>(stop_begun_ + setup_.drain - steady_clock::now());
+    const auto late = plugins_.stop(std::clamp<milliseconds>(leaves_something_ ? 0ms : left, 100ms, 2000ms));
+    for (const auto& name : late) {
+        log_.warning("plugin " + name + " did not stop in time");
+        leaves_something_ = true;
+    }
+    service_.stop();
+    signals_.close();
+    log_.info("stopped");
+    // A job that does not end is still watched, and keeps the context at work.
+    boost::asio::post(io_, [this] { io_.stop(); });
+}
+
+// -- reading again -------------------------------------------------------------------------------------------------
+
+void daemon::reload() {
+    bool told = tell_.reloading(steady_clock::now());
+    try {
+        auto fresh = load(sources_);
+        log_.set(fresh.log);
+        log_.info("read the configuration again: " + counted(fresh.seeds.size(), "seed") + ", log " +
+                  std::string{to_string(fresh.log.level)});
+        if (lasting_part(fresh) != lasting_part(setup_)) {
+            log_.warning("what else has changed in the configuration takes effect at the next start");
+        }
+        service_.set_gossip(cles::gossip(fresh.seeds));
+        setup_.seeds = fresh.seeds;
+        setup_.log = fresh.log;
+    } catch (const config_error& wrong) {
+        log_.error(std::string{"all stays as it was, since the configuration cannot be used: "} + wrong.what());
+    }
+    told = tell_.ready() && told;
+    if (!told) {
+        log_.warning("the service manager could not be told");
+    }
+}
+
+} // namespace cles::runtime

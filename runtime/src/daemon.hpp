@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/service.hpp>
+
+#include "config.hpp"
+#include "config_sources.hpp"
+#include "daemon_log.hpp"
+#include "job_pool.hpp"
+#include "notify.hpp"
+#include "plugin_host.hpp"
+#include "signals.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+namespace cles::runtime {
+
+/// A node that runs plugins on its workers until it is told to stop: what `clesd` is, put together.
+///
+/// Used on the thread that runs the context. It ends by itself: after SIGTERM or SIGINT it admits no more jobs, lets
+/// those that run end within `config::drain`, and stops the context; a second signal cuts that short.
+class daemon {
+  public:
+    /// Loads the plugins and listens. \param log, tell have to outlive it
+    /// \throws config_error naming the plugin that is required and cannot be used; cles::error as `service` does
+    daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log, const notifier& tell);
+    daemon(const daemon&) = delete;
+    daemon& operator=(const daemon&) = delete;
+    ~daemon();
+
+    [[nodiscard]] std::vector<std::string> endpoints() const { return service_.endpoints(); }
+    /// Whether something is left that does not end, a job or a plugin: the process then has to go without waiting for
+    /// it, by `std::_Exit`.
+    [[nodiscard]] bool leaves_something() const noexcept { return leaves_something_; }
+
+  private:
+    void load_plugins();
+    void write_metrics(json_writer& w) const;
+    void stop(int signal);
+    void finish(const drain_report& how);
+    void reload();
+
+    boost::asio::io_context& io_;
+    config setup_;
+    const config_sources sources_;
+    daemon_log& log_;
+    const notifier& tell_;
+    bool has_pool_ = false; // the service asks for its load
+    service service_;
+    job_pool pool_;
+    plugin_host plugins_;
+    signals signals_;
+    std::chrono::steady_clock::time_point stop_begun_;
+    bool stopping_ = false;
+    bool finished_ = false;
+    bool leaves_something_ = false;
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "plugin_host.hpp"
+
+#include <cles/error.hpp>
+#include <cles/plugin_abi.h>
+#include <cles/plugin_text.hpp>
+
+#include "plugin_search.hpp"
+#include "plugin_trial.hpp"
+
+// The standard library's file system, so that no further library of Boost is linked.
+#define BOOST_DLL_USE_STD_FS
+#include <boost/dll/shared_library.hpp>
+
+#include <algorithm>
+#include <condition_variable>
+#include <cstddef>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include <dlfcn.h>
+
+namespace cles::runtime {
+namespace {
+
+using entry_function = const cles_plugin*();
+
+// All hosts' plugins, kept until the process ends, whoever goes first. A host's destructor cannot know whether a plugin
+// is at rest.
+template <class T>
+void keep_for_ever(T kept) {
+    static std::mutex mutex;
+    static auto* const all = new std::vector<T>;
+    const std::scoped_lock lock{mutex};
+    all->push_back(std::move(kept));
+}
+
+boost::dll::shared_library open_library(const std::string& path, const std::filesystem::path& file) {
+    boost::dll::shared_library library;
+    std::error_code failed;
+    library.load(file, failed, boost::dll::load_mode::rtld_now);
+    if (failed) {
+        const char* why = ::dlerror();
+        throw plugin_error(path, std::string{"it cannot be loaded: "} + (why == nullptr ? "" : why));
+    }
+    return library;
+}
+
+std::string other_version(const boost::dll::shared_library& library) {
+    constexpr unsigned newest_imaginable = 16;
+    for (unsigned version = 2; version <= newest_imaginable; ++version) {
+        if (library.has("cles_plugin_v" + std::to_string(version))) {
+            return "it was made for version " + std::to_string(version) + " of the plugin ABI, this host has version " +
+                   std::to_string(CLES_PLUGIN_ABI_MAJOR);
+        }
+    }
+    return std::string{"it is no plugin: it has no function '"} + CLES_PLUGIN_ENTRY + "'";
+}
+
+const cles_plugin& describe(const std::string& path, const boost::dll::shared_library& library) {
+    if (!library.has(CLES_PLUGIN_ENTRY)) {
+        throw plugin_error(path, other_version(library));
+    }
+    const cles_plugin* described = nullptr;
+    try {
+        described = library.get<entry_function>(CLES_PLUGIN_ENTRY)();
+    } catch (const std::exception& e) {
+        throw plugin_error(path, std::string{"its entry threw: "} + e.what());
+    } catch (...) {
+        throw plugin_error(path, "its entry threw something that is no exception");
+    }
+    if (described == nullptr) {
+        throw plugin_error(path, "its entry describes nothing");
+    }
+    return *described;
+}
+
+void check(const std::string& path, const cles_plugin& described) {
+    if (described.size < offsetof(cles_plugin, name)) {
+        throw plugin_error(path, "its description is too short to be one");
+    }
+    const auto wanted = std::to_string(described.abi_major) + "." + std::to_string(described.abi_minor);
+    if (described.abi_major != CLES_PLUGIN_ABI_MAJOR || described.abi_minor > CLES_PLUGIN_ABI_MINOR) {
+        throw plugin_error(path, "it needs version " + wanted + " of the plugin ABI, this host has " +
+                                     std::to_string(CLES_PLUGIN_ABI_MAJOR) + "." +
+                                     std::to_string(CLES_PLUGIN_ABI_MINOR));
+    }
+    if (described.size < sizeof(cles_plugin) || described.start == nullptr) {
+        throw plugin_error(path, "its description lacks what version " + wanted + " of the plugin ABI has");
+    }
+}
+
+} // namespace
+
+struct plugin_host::state {
+    plugin_jobs jobs;
+    std::vector<std::unique_ptr<loaded_plugin>> plugins;
+    std::vector<boost::dll::shared_library> libraries;
+    std::vector<const cles_plugin*> descriptions; ///< of those that were loaded, to know one again
+
+    // Of the thread that stops them.
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool all_stopped = false;
+};
+
+plugin_host::plugin_host(plugin_host_options options)
+    : options_(std::move(options)), state_(std::make_shared<state>()) {
+    keep_for_ever(state_);
+}
+
+plugin_host::~plugin_host() { stop(std::chrono::seconds{2}); }
+
+void plugin_host::load(const std::string& path, const std::string& config, registrar& into) {
+    const auto file = find_plugin(path, options_.folders);
+    if (options_.trial.count() > 0) {
+        if (const auto why = try_library(file, options_.trial); !why.empty()) {
+            throw plugin_error(path, why);
+        }
+    }
+    auto library = open_library(path, file);
+    const auto& described = describe(path, library);
+    check(path, described);
+    if (std::find(state_->descriptions.begin(), state_->descriptions.end(), &described) != state_->descriptions.end()) {
+        throw plugin_error(path, "it is loaded already");
+    }
+    auto owned =
+        std::make_unique<loaded_plugin>(detail::known_part(&described), options_.node, state_->jobs, options_.log);
+    auto& plugin = *owned;
+    state_->libraries.push_back(std::move(library));
+    state_->plugins.push_back(std::move(owned));
+    state_->descriptions.push_back(&described);
+
+    const auto taken = [this](cles::verb verb, std::string_view task) -> std::optional<std::string> {
+        const auto wanted = std::string{to_string(verb)} + " " + std::string{task};
+        for (const auto& p : plugins_) {
+            if (std::find(p.tasks.begin(), p.tasks.end(), wanted) != p.tasks.end()) {
+                return "the plugin '" + p.name + "' (" + p.path + ")";
+            }
+        }
+        return std::nullopt;
+    };
+    if (const auto why = plugin.start(config, into.make_publisher(), taken); !why.empty()) {
+        throw plugin_error(path, why);
+    }
+    plugin_info info{.path = path, .name = plugin.name(), .version = plugin.version()};
+    try {
+        for (auto& task : plugin.tasks()) {
+            info.tasks.push_back(std::string{to_string(task.verb)} + " " + task.task);
+            into.add(std::move(task));
+        }
+    } catch (const error& e) {
+        // Those registered before are answered `unavailable` from now on.
+        plugin.close();
+        plugin.stop();
+        throw plugin_error(path, e.what());
+    }
+    plugins_.push_back(std::move(info));
+}
+
+plugin_figures plugin_host::figures() const {
+    return {.jobs = state_->jobs.size(), .answered_twice = state_->jobs.unknown()};
+}
+
+std::vector<std::string> plugin_host::stop(std::chrono::milliseconds limit) {
+    if (std::exchange(stopped_, true)) {
+        return {};
+    }
+    for (const auto& plugin : state_->plugins) {
+        plugin->close();
+    }
+    auto told =
+        state_->jobs.close([&](const responder& to) { to.fail(errc::unavailable, options_.node + " has stopped"); });
+    // A plugin's code may take its time, or never return: it runs where nobody has to wait for it.
+    std::thread{[state = state_, told = std::move(told)]() mutable {
+        for (auto& callback : told) {
+            callback();
+        }
+        told.clear();
+        for (auto left = state->plugins.size(); left > 0; --left) {
+            state->plugins[left - 1]->stop();
+        }
+        const std::scoped_lock lock{state->mutex};
+        state->all_stopped = true;
+        state->changed.notify_all();
+    }}.detach();
+    std::unique_lock lock{state_->mutex};
+    state_->changed.wait_for(lock, limit, [this] { return state_->all_stopped; });
+    std::vector<std::string> late;
+    for (const auto& plugin : state_->plugins) {
+        if (!plugin->has_stopped()) {
+            late.push_back(plugin->name());
+        }
+        plugin->silence(); // whoever made the log may go before a plugin that does not end
+    }
+    return late;
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+#include <cles/responder.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace cles::runtime {
+
+/// Something that a plugin wants to be called: once or never, and dropped in the end.
+class plugin_callback {
+  public:
+    using function = void (*)(void*);
+
+    plugin_callback() = default;
+    plugin_callback(function call, function drop, void* user) noexcept : call_(call), drop_(drop), user_(user) {}
+    plugin_callback(plugin_callback&& other) noexcept
+        : call_(std::exchange(other.call_, nullptr)), drop_(std::exchange(other.drop_, nullptr)), user_(other.user_) {}
+    plugin_callback& operator=(plugin_callback other) noexcept {
+        std::swap(call_, other.call_);
+        std::swap(drop_, other.drop_);
+        std::swap(user_, other.user_);
+        return *this;
+    }
+    ~plugin_callback();
+
+    void operator()();
+
+  private:
+    function call_ = nullptr;
+    function drop_ = nullptr;
+    void* user_ = nullptr;
+};
+
+/// The jobs of plugins that have not been answered, by their handles.
+///
+/// What a plugin holds is a number, never a pointer: where it answers twice, or what never was, the number names
+/// nothing, which is counted.
+///
+/// A responder belongs to an executor, a plugin answers from any thread. While a task's `start` runs, its own thread
+/// may use the responder, as whoever called it does; from elsewhere, what a plugin says is posted. All functions may be
+/// called from any thread, but for `close`, which belongs on the executor of all the responders.
+class plugin_jobs {
+  public:
+    using id = std::uint64_t;
+
+    static constexpr std::size_t most = 65536;
+
+    /// A handle for a request, whose `start` is about to be called in this thread. 0 where there are too many, or after
+    /// `close`.
+    id open(responder answer);
+    /// `start` has returned.
+    void started(id job);
+
+    /// Ends a job where its responder may be used in this thread: the responder. Nothing where it may not, or where
+    /// there is no such job.
+    std::optional<responder> take_here(id job);
+    /// Ends a job: `answer` is called with its responder, once, now or soon. False where there is no such job.
+    bool finish(id job, std::function<void(const responder&)> answer);
+    /// Uses the responder of a job, now or soon. False where there is no such job.
+    bool use(id job, std::function<void(const responder&)> use);
+    /// Whether nobody waits for it.
+    [[nodiscard]] bool stopped(id job) const;
+    /// Has it called when nobody waits any more; at once where that is so.
+    void on_stop(id job, plugin_callback callback);
+    /// Nobody waits for it any more.
+    void stop(id job);
+
+    /// Ends all jobs, by `answer`, and has no further ones. What the plugins wanted to be told then is returned: call
+    /// it where it may take its time. After it, nothing is posted.
+    std::vector<plugin_callback> close(const std::function<void(const responder&)>& answer);
+
+    [[nodiscard]] std::size_t size() const;
+    /// How often a job was answered that was not there.
+    [[nodiscard]] std::uint64_t unknown() const;
+
+  private:
+    struct slot {
+        std::uint32_t generation = 0;
+        bool stopped = false;
+        std::thread::id starter{};
+        std::optional<responder> answer{};
+        plugin_callback on_stop{};
+    };
+    [[nodiscard]] slot* find(id job) noexcept;
+    [[nodiscard]] const slot* find(id job) const noexcept;
+    [[nodiscard]] static bool is_direct(const slot& s) noexcept { return s.starter == std::this_thread::get_id(); }
+    /// Empties the slot; what it held is to be destroyed without the lock.
+    slot release(id job);
+
+    mutable std::mutex mutex_;
+    std::vector<slot> slots_;
+    std::vector<std::uint32_t> free_;
+    std::size_t open_ = 0;
+    std::uint64_t unknown_ = 0;
+    bool closed_ = false;
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "pool_state.hpp"
+
+#include "retry_delay.hpp"
+
+#include <boost/asio/execution/outstanding_work.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/prefer.hpp>
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+
+namespace cles::runtime {
+
+namespace asio = boost::asio;
+using clock = std::chrono::steady_clock;
+using namespace std::chrono_literals;
+
+namespace {
+
+// Jobs of one burst past which further workers are woken at once, instead of when the burst has been read.
+constexpr std::size_t most_unwoken = 32;
+
+std::string seconds(std::chrono::nanoseconds span) {
+    const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(span).count() / 100;
+    return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " s";
+}
+
+} // namespace
+
+pool_state::pool_state(asio::any_io_executor executor, pool_options options)
+    : executor_(std::move(executor)), options_(std::move(options)), box_([this] {
+          // Whoever wakes holds a job, and so this.
+          asio::post(executor_, [weak = weak_from_this()] {
+              if (const auto self = weak.lock()) {
+                  self->collect();
+              }
+          });
+      }),
+      crew_(options_, box_), onward_(crew_), tick_(std::in_place, executor_), drain_(executor_),
+      patience_(options_.patience) {}
+
+pool_state::~pool_state() = default;
+
+asio::any_io_executor pool_state::executor() const {
+    const std::lock_guard lock{executor_mutex_};
+    return executor_;
+}
+
+void pool_state::start() { crew_.start(std::shared_ptr<crew>{shared_from_this(), &crew_}); }
+
+void pool_state::say(log_level level, const log_entry& what) const {
+    if (options_.log) {
+        options_.log(level, what);
+    }
+}
+
+// -- records -------------------------------------------------------------------------------------------------------
+
+job_record& pool_state::take_record() {
+    auto& r = records_.take(shared_from_this());
+    if (records_.size() == 1) {
+        busy_ = asio::prefer(executor_, asio::execution::outstanding_work.tracked);
+        arm_tick();
+    }
+    return r;
+}
+
+void pool_state::recycle(job_record& r) {
+    records_.recycle(r);
+    if (records_.size() == 0) {
+        busy_ = {};
+    }
+}
+
+void pool_state::give_back(job_record& r) noexcept {
+    if (!box_.put({&r, result_box::news::gone}, !draining_.load(std::memory_order_relaxed))) {
+        const std::unique_ptr<job_record> owned{&r};
+        const auto keep = std::move(r.pool_);
+    }
+}
+
+// -- admission -----------------------------------------------------------------------------------------------------
+
+void pool_state::submit(job what) {
+    if (closed_) {
+        what.answer.fail(errc::unavailable, "its workers have gone");
+        return;
+    }
+    if (draining_) {
+        refuse(what.answer, crew::admission::no_workers);
+        return;
+    }
+    auto& r = take_record();
+    r.requester = reinterpret_cast<std::uintptr_t>(&what.what.peer());
+    r.request_.keep(what.what, peers_.copy_of(what.what.peer()));
+    r.work_ = std::move(what.work);
+    const auto admission = crew_.push(r);
+    if (admission == crew::admission::full || admission == crew::admission::no_workers) {
+        r.answered_ = true;
+        recycle(r);
+        refuse(what.answer, admission);
+        return;
+    }
+    ++figures_.admitted;
+    // The worker may have it by now, and does not look at what is set here.
+    answers_.add(r, std::move(what.answer));
+    r.answer_->on_stop([this, &r] { stop(r); });
+    if (admission == crew::admission::wants_workers) {
+        wake_workers();
+    }
+}
+
+// A job alone is begun at once. With others, more may come with the same read, and workers are woken for all.
+void pool_state::wake_workers() {
+    if (answers_.size() == 1 || ++unwoken_ >= most_unwoken) {
+        unwoken_ = 0;
+        crew_.wake();
+    } else if (!std::exchange(wake_asked_, true)) {
+        asio::post(executor_, [self = shared_from_this()] {
+            self->wake_asked_ = false;
+            self->unwoken_ = 0;
+            self->crew_.wake();
+        });
+    }
+}
+
+void pool_state::refuse(responder& answer, crew::admission why) {
+    ++figures_.refused;
+    const auto retry = retry_delay(crew_.queued(), crew_.usable(), crew_.count().service_time);
+    if (draining_) {
+        answer.refuse("it is shutting down", 1s);
+    } else if (why == crew::admission::no_workers) {
+        answer.refuse("all its workers are stuck", std::max<std::chrono::milliseconds>(retry, 1s));
+    } else {
+        answer.refuse("its queue is full", retry);
+    }
+}
+
+// -- results -------------------------------------------------------------------------------------------------------
+
+void pool_state::collect() {
+    auto items = std::move(items_);
+    auto errands = std::move(errands_);
+    items.clear();
+    errands.clear();
+    box_.take(items, errands);
+    for (const auto& [record, what] : items) {
+        if (what == result_box::news::gone) {
+            recycle(*record);
+            continue;
+        }
+        answers_.tell_progress(*record);
+        if (what == result_box::news::ended) {
+            figures_.answered += answers_.give(*record) ? 1 : 0;
+        }
+        let_go(*record);
+    }
+    for (const auto& errand : errands) {
+        errand();
+    }
+    items_ = std::move(items);
+    errands_ = std::move(errands);
+    errands_.clear();
+    follow_drain(false);
+}
+
+void pool_state::let_go(job_record& r) {
+    // Who comes here has seen to its answer.
+    if (r.references_.fetch_sub(1, std::memory_order_acq_rel) == 1) {
+        r.answered_.load() ? recycle(r) : (r.add_reference(), r.release());
+    }
+}
+
+// -- stopping ------------------------------------------------------------------------------------------------------
+
+void pool_state::stop(job_record& r) {
+    std::function<void()> callback;
+    {
+        const std::lock_guard lock{r.mutex_};
+        r.stopped_.store(true, std::memory_order_release);
+        callback.swap(r.on_stop_);
+    }
+    answers_.give_up(r);
+    if (crew_.take_back(r)) {
+        ++figures_.withdrawn;
+        r.answered_ = true;
+        answers_.conclude(r);
+        let_go(r);
+        return;
+    }
+    crew_.hurry(r, clock::now());
+    if (callback) {
+        r.add_reference();
+        stop_teller_.tell(job_context{r}, std::move(callback));
+    }
+}
+
+// -- asking others -------------------------------------------------------------------------------------------------
+
+void pool_state::delegate(job_context asks, std::string command, call_options options, answer_callback answered) {
+    const auto asked = std::make_shared<answer_callback>(std::move(answered));
+    const auto put = box_.put([this, asks = std::move(asks), command = std::move(command), options, asked] {
+        const auto& by = asks.record_->answer_;
+        onward_.send(asks, by ? &*by : nullptr, command, options, *asked);
+    });
+    if (!put) {
+        draining_ ? (*asked)(errc::unavailable, "{}", "the node is stopping")
+                  : (*asked)(errc::busy, "{}", "too much is asked at once");
+    }
+}
+
+// -- figures -------------------------------------------------------------------------------------------------------
+
+node_load pool_state::load() const noexcept {
+    const auto queued = crew_.queued();
+    const auto open = static_cast<std::uint32_t>(answers_.size());
+    const auto begun = open - std::min(queued, open);
+    return {.queued = queued,
+            .running = std::max(begun, crew_.running()),
+            .workers = crew_.usable(),
+            .service_us = crew_.service_us()};
+}
+
+pool_figures pool_state::figures() const {
+    const auto now = load();
+    const auto workers = crew_.count();
+    auto all = figures_;
+    all.threw = counts_.threw.load(std::memory_order_relaxed);
+    all.answerless = counts_.answerless.load(std::memory_order_relaxed);
+    all.answered_twice = counts_.answered_twice.load(std::memory_order_relaxed);
+    all.logs_dropped = counts_.logs_dropped.load(std::memory_order_relaxed);
+    all.stuck = workers.stuck;
+    all.replaced = workers.replaced;
+    all.revived = workers.revived;
+    all.queued = now.queued;
+    all.running = crew_.running();
+    all.waiting = now.running - std::min(now.running, all.running);
+    all.workers = now.workers;
+    all.stuck_now = workers.stuck_now;
+    all.service_time_us =
+        static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(workers.service_time).count());
+    return all;
+}
+
+// -- talking -------------------------------------------------------------------------------------------------------
+
+void pool_state::log(job_context says, log_level level, std::string text) {
+    const auto put = box_.put([this, says = std::move(says), level, text = std::move(text)] {
+        const auto& r = *says.record_;
+        if (r.answer_) {
+            r.answer_->log(level, text); // which knows the request's id
+        } else {
+            say(level, {text, r.request().peer().address});
+        }
+    });
+    if (!put) {
+        counts_.logs_dropped.fetch_add(1, std::memory_order_relaxed);
+    }
+}
+
+void pool_state::note_inline(std::string_view task, std::chrono::nanoseconds took) {
+    ++figures_.inline_calls;
+    const auto us = static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(took).count());
+    figures_.inline_worst_us = std::max(figures_.inline_worst_us, us);
+    if (took > options_.slow_inline) {
+        ++figures_.inline_slow;
+        say(log_level::warning, "the task '" + std::string{task} + "' held up everything else for " +
+                                    std::to_string(us / 1000) + " ms: it should not be marked as quick");
+    }
+}
+
+// -- watching ------------------------------------------------------------------------------------------------------
+
+void pool_state::arm_tick() {
+    if (ticking_ || closed_) {
+        return;
+    }
+    ticking_ = true;
+    tick_->expires_after(std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms));
+    tick_->async_wait([weak = weak_from_this()](boost::system::error_code code) {
+        if (const auto self = weak.lock(); self && !code) {
+            self->tick();
+        }
+    });
+}
+
+void pool_state::tick() {
+    ticking_ = false;
+    if (closed_) {
+        return;
+    }
+    report_stuck();
+    collect(); // what went without a word
+    if (records_.size() != 0) {
+        arm_tick();
+    }
+}
+
+void pool_state::report_stuck() {
+    crew_.watch(clock::now(), [this](const worker_watch::finding& found, const job_record& r) {
+        say(log_level::error,
+            {"worker " + std::to_string(found.place + 1) + " is stuck in " +
+                 std::string{to_string(r.request().verb())} + " '" + std::string{r.request().task()} + "' since " +
+                 seconds(found.busy_for) +
+                 (found.replaced ? ": another takes its place" : ": there is nobody to take its place"),
+             r.request().peer().address});
+    });
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void pool_state::drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done) {
+    draining_ = true;
+    drain_.begin(
+        limit,
+        [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->follow_drain(true);
+            }
+        },
+        std::move(done));
+    asio::post(executor_, [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) {
+            self->follow_drain(false);
+        }
+    });
+}
+
+void pool_state::follow_drain(bool over) {
+    if (!drain_.under_way() || !(over || (answers_.awaited() == 0 && crew_.running() == 0))) {
+        return;
+    }
+    drain_report report;
+    if (over) {
+        abandon(report);
+        patience_ = 0ms;
+    }
+    report.stuck = crew_.running();
+    drain_.end(report);
+}
+
+// Answers whatever is open, and tells it to stop.
+void pool_state::abandon(drain_report& report) {
+    for (std::size_t i = 0; i < records_.size();) {
+        auto& r = records_[i];
+        if (!r.answer_) {
+            ++i;
+            continue; // what is taken back leaves the list, and another is in its place
+        }
+        auto told = *r.answer_;
+        const auto before = figures_.withdrawn;
+        stop(r);
+        if (figures_.withdrawn != before) {
+            ++report.refused;
+            told.refuse("it is shutting down", 1s);
+        } else {
+            ++report.abandoned;
+            told.fail(errc::unavailable, "it shut down before the job had ended");
+            answers_.conclude(r);
+        }
+    }
+}
+
+void pool_state::close() {
+    if (closed_) {
+        return;
+    }
+    draining_ = true;
+    drain_report unheard;
+    abandon(unheard);
+    closed_ = true;
+    drain_.forget();
+    tick_.reset();
+    crew_.close([](job_record& r) { r.release(); });
+    std::vector<result_box::item> items;
+    std::vector<result_box::errand> errands;
+    box_.close(items, errands);
+    for (const auto& errand : errands) { // what is asked has to be answered
+        errand();
+    }
+    onward_.close();
+    records_.disown();
+    busy_ = {};
+    for (const auto& [record, what] : items) {
+        if (what == result_box::news::gone) {
+            const std::unique_ptr<job_record> owned{record};
+            record->pool_.reset();
+        } else {
+            record->release();
+        }
+    }
+    errands.clear();
+    {
+        const std::lock_guard lock{executor_mutex_};
+        executor_ = {};
+    }
+    const auto left = crew_.join(patience_) + stop_teller_.end(patience_);
+    if (left != 0) {
+        say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(left));
+    }
+    records_.drop_spare();
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,307 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Shows four daemons that are one pool: they find each other, share jobs, and lose one of them in the middle of it.
+
+    demo_cluster.py [FOLDER]
+
+FOLDER is where `clesd` and `cles` are, build/release/apps unless said. Nothing is left behind, neither process nor file.
+"""
+
+import collections
+import json
+import os
+import re
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+
+INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+NAMES = ["sat1", "sat2", "sat3", "sat4"]
+FIRST, ASKED = "sat1", "sat2"  # whose address the others are given; who is asked for everything
+PATIENCE = 30  # seconds, for whatever takes far less
+SPREAD, UNDER_FIRE = 60, 80  # jobs
+JOB_SECONDS = 0.1  # what one is to take
+BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
+
+CONFIG = """\
+node: {name}
+listen: [tcp://127.0.0.1:0]         # a free port
+multicast: off                      # with it they need no seeds
+seeds: [{seeds}]{padding}# who is asked for the others
+workers: 2
+plugins: [libcles-primes.so]
+"""
+
+# A job is done, or was refused before it began, or has failed, or nobody knows.
+FATES = {"busy": "refused", "no_target": "refused", "no_task": "refused", "unavailable": "unknown",
+         "deadline": "unknown"}
+
+
+class Trouble(Exception):
+    pass
+
+
+class Interrupted(BaseException):
+    pass
+
+
+def heading(text):
+    print(f"\n{BOLD}{text}{PLAIN}", flush=True)
+
+
+def show(text):
+    for line in text.splitlines():
+        print(f"  {line.rstrip()}", flush=True)
+
+
+def patient(question, what):
+    """The first answer to the question that is not nothing."""
+    until = time.monotonic() + PATIENCE
+    while not (answer := question()):
+        if time.monotonic() > until:
+            raise Trouble(f"waited in vain: {what}")
+        time.sleep(0.01)
+    return answer
+
+
+class Link:
+    """A client of one socket: lines out, lines in."""
+
+    def __init__(self, url):
+        host, _, port = url.removeprefix("tcp://").rpartition(":")
+        self.socket = socket.create_connection((host, int(port)), PATIENCE)
+        self.lines = self.socket.makefile("r", encoding="utf-8", newline="\n")
+
+    def send(self, *lines):
+        self.socket.sendall("".join(line + "\n" for line in lines).encode())
+
+    def receive(self):
+        try:
+            line = self.lines.readline().rstrip("\n")
+        except TimeoutError:
+            raise Trouble(f"no answer came within {PATIENCE} s") from None
+        if not line:
+            raise Trouble("a node has closed the link")
+        return line
+
+    def ask(self, line):
+        self.send(line)
+        return json.loads(self.receive())
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.lines.close()
+        self.socket.close()
+
+
+class Cluster:
+    """The daemons, and the folder with their files."""
+
+    def __init__(self, programs):
+        self.programs = programs
+        self.folder = tempfile.mkdtemp(prefix="cles-demo-")
+        self.started = []  # every process
+        self.daemons = {}
+        self.urls = {}
+        # Free of what the user's own may say.
+        self.environment = {k: v for k, v in os.environ.items() if not k.startswith("CLES_") and k != "NOTIFY_SOCKET"}
+
+    def start(self, name):
+        config = self.config_of(name)
+        with open(self.file(name + ".yaml"), "w", encoding="utf-8") as file:
+            file.write(config)
+        with open(self.file(name + ".log"), "w", encoding="utf-8") as log:
+            self.daemons[name] = self.begin("clesd", "--config", self.file(name + ".yaml"), stderr=log)
+        said = self.first_line_of(self.daemons[name].stdout)
+        found = re.search(r"listening on (tcp://\S+)", said)
+        if not found:
+            with open(self.file(name + ".log"), encoding="utf-8") as log:
+                raise Trouble(f"{name} did not start: {said}{log.read()}")
+        self.urls[name] = found[1]
+        show(said)
+
+    def begin(self, program, *arguments, **streams):
+        """Starts a program. Who interrupts it has to wait until it is known what was started."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+        try:
+            self.started.append(subprocess.Popen(
+                [os.path.join(self.programs, program), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                env=self.environment, preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, before), **streams))
+            return self.started[-1]
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def config_of(self, name):
+        seeds = self.urls.get(FIRST, "")
+        return CONFIG.format(name=name, seeds=seeds, padding=" " * max(1, 27 - len(seeds)))
+
+    @staticmethod
+    def first_line_of(stream):
+        line = b""
+        until = time.monotonic() + PATIENCE
+        while not line.endswith(b"\n"):
+            if not select.select([stream], [], [], max(0, until - time.monotonic()))[0]:
+                break
+            data = os.read(stream.fileno(), 4096)
+            if not data:
+                break
+            line += data
+        return line.decode(errors="replace")
+
+    def file(self, name):
+        return os.path.join(self.folder, name)
+
+    def kill(self, name):
+        self.daemons[name].kill()
+        self.daemons[name].wait()
+
+    def command(self, *arguments):
+        running = self.begin("cles", *arguments, "--at", self.urls[ASKED], stderr=subprocess.PIPE)
+        out, err = running.communicate(timeout=PATIENCE)
+        if running.returncode != 0:
+            raise Trouble(f"cles {' '.join(arguments)} ended with {running.returncode}: {err.decode()}")
+        return out.decode()
+
+    def known_to(self, name):
+        with Link(self.urls[name]) as link:
+            peers = link.ask("PULL self:cles/peers")["peers"]
+        return {peer["node"] for peer in peers if peer["state"] == "live"}
+
+    def close(self):
+        for process in self.started:
+            process.terminate()
+        for process in self.started:
+            try:
+                process.wait(3)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            process.stdout.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def jobs_done(link):
+    """How many jobs each has answered since its start, of those that say."""
+    tables = link.ask("PULL all:cles/metrics")["results"]
+    return {name: tables[name]["pool"]["answered"] for name in sorted(tables)}
+
+
+def shares_of(before, after):
+    """How many jobs each has answered meanwhile, of those that are there afterwards."""
+    return {name: after[name] - before[name] for name in after}
+
+
+def show_share(name, share, remark=""):
+    show(f"{name} {share:4} {'#' * share}{remark}")
+
+
+def run_jobs(link, count, below, after_answer=lambda answers: None):
+    """Sends the jobs, and gives their fates, the time that all took, and a line each way."""
+    command = "DELEGATE any:primes id={} {{\"below\":" + str(below) + "}}"
+    open_ones = set(range(1, count + 1))
+    begun = time.monotonic()
+    link.send(*[command.format(number) for number in sorted(open_ones)])
+    fates, last = collections.Counter(), ""
+    while open_ones:
+        last = link.receive()
+        number, _, body = last.removeprefix("id=").partition(" ")
+        open_ones.remove(int(number))
+        fates[FATES.get(json.loads(body)["error"], "failed") if body.startswith('{"error":') else "done"] += 1
+        after_answer(fates.total())
+    return fates, time.monotonic() - begun, command.format(1), last
+
+
+def show_demo(cluster):
+    heading("Four daemons, one pool without a leader")
+    for name in NAMES:
+        cluster.start(name)
+    begun = time.monotonic()
+    for name in NAMES:
+        patient(lambda name=name: cluster.known_to(name) == set(NAMES) - {name}, f"{name} knows the others")
+    show(f"{time.monotonic() - begun:.1f} s later each knows the three others. This is what {ASKED} was started with "
+         "(clesd --config FILE):")
+    for line in cluster.config_of(ASKED).splitlines():
+        show(f"    {line}")
+
+    heading("Who is there, what they have to do and what they offer: cles ls --tasks")
+    show(cluster.command("ls", "--tasks", "--output", "table"))
+
+    heading("A job for any of them: cles delegate any:primes -d '{\"below\":5000000}'")
+    begun = time.monotonic()
+    show(cluster.command("delegate", "any:primes", "-d", '{"below":5000000}', "-o", "json"))
+    below = int(5_000_000 * min(4, JOB_SECONDS / (time.monotonic() - begun)))
+
+    with Link(cluster.urls[ASKED]) as link, Link(cluster.urls[ASKED]) as observer:
+        heading(f"{SPREAD} jobs at once, on one connection to {ASKED}: it chooses by load who does what")
+        before = jobs_done(observer)
+        fates, seconds, sent, received = run_jobs(link, SPREAD, below)
+        show(f"> {sent}\n  ... and {SPREAD - 1} more\n< {received}\n  ... and {SPREAD - 1} more, in {seconds:.1f} s")
+        after = jobs_done(observer)
+        shares = shares_of(before, after)
+        for name, share in shares.items():
+            show_share(name, share)
+        if fates["done"] != SPREAD or sum(shares.values()) != SPREAD or min(shares.values()) == 0:
+            raise Trouble(f"{SPREAD} jobs were to be done by all: {dict(fates)}, {shares}")
+
+        heading(f"{UNDER_FIRE} more, and in the middle of it kill -9 for {FIRST}, whose address the others were given")
+
+        def fire(answers):
+            if answers == UNDER_FIRE // 4:
+                cluster.kill(FIRST)
+                show(f"{FIRST} is dead; {answers} of {UNDER_FIRE} jobs have been answered by now")
+
+        before = after
+        fates, seconds, _, _ = run_jobs(link, UNDER_FIRE, below, fire)
+        show(f"{UNDER_FIRE} sent: " + ", ".join(f"{fates[fate]} {fate}" for fate in ("done", "refused", "failed", "unknown"))
+             + f", in {seconds:.1f} s")
+        shares = shares_of(before, jobs_done(observer))
+        show_share(FIRST, fates.total() - sum(shares.values()), " and its end")
+        for name, share in shares.items():
+            show_share(name, share)
+        show(f"What {FIRST} left unanswered others began again, since primes is registered as idempotent; of another task "
+             "it would be unknown.")
+        if fates.total() != UNDER_FIRE or fates["done"] != UNDER_FIRE:
+            raise Trouble(f"{UNDER_FIRE} jobs were to be done: {dict(fates)}")
+
+        heading("Who answers, and who does not: all")
+        question = "PULL all:prime/97"
+        link.send(question)
+        answer = link.receive()
+        show(f"> {question}\n< {answer}")
+        answer = json.loads(answer)
+        if set(answer["results"]) != set(NAMES) - {FIRST} or set(answer["errors"]) != {FIRST}:
+            raise Trouble(f"all but {FIRST} were to answer")
+
+
+def interrupt(number, _):
+    raise Interrupted(number)
+
+
+def main():
+    for number in INTERRUPTS:
+        signal.signal(number, interrupt)
+    programs = sys.argv[1] if len(sys.argv) > 1 else "build/release/apps"
+    cluster = Cluster(programs)
+    try:
+        show_demo(cluster)
+        return 0
+    except (Trouble, OSError, ValueError, KeyError, subprocess.TimeoutExpired) as problem:
+        print(f"cles: {problem}", file=sys.stderr)
+        return 1
+    except Interrupted as interrupted:
+        return 128 + interrupted.args[0]
+    finally:
+        for number in INTERRUPTS:
+            signal.signal(number, signal.SIG_IGN)
+        cluster.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

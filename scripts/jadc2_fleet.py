@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: BSL-1.0
+"""The four roles of joint command as processes, and the only ways that are between them (section 2.2 of the paper): the
+satellite and the reconnaissance aircraft, that and the mission centre, the mission centre and the strike aircraft."""
+
+import json
+import os
+import re
+import select
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+sys.path.append(os.path.join(os.path.dirname(__file__), "..", "perf", "evaluate"))
+from clean_environment import clean_environment  # noqa: E402
+from in_one_piece import InOnePiece  # noqa: E402
+
+PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
+CONFIG = """\
+node: {name}
+listen: ["tcp://{address}:{port}"]
+insecure: {insecure}
+multicast: off
+drain: 500ms
+plugins: [{plugins}]
+"""
+
+
+class Trouble(Exception):
+    pass
+
+
+class Loopback:
+    """All on this host: who talks to whom is what each is told."""
+
+    insecure = False
+
+    def address(self, _role, _towards):
+        return "127.0.0.1"
+
+    def command(self, _role, *words):
+        return list(words)
+
+    def close(self):
+        pass
+
+
+class Namespaces:
+    """A host for each role, with a cable where there is a link, and no way where there is none. It takes root."""
+
+    insecure = True
+    # Each cable: the one that is listened to, and the one that asks.
+    CABLES = [("satellite", "recon"), ("spare", "recon"), ("recon", "mission"), ("strike", "mission")]
+
+    def __init__(self):
+        self.keepers, self.addresses = {}, {}
+        try:
+            for role in ("satellite", "spare", "recon", "mission", "strike"):
+                self._keep(role)
+                self._ip(role, "link", "set", "lo", "up")
+            for number, (listens, asks) in enumerate(self.CABLES, 1):
+                self._ip(listens, "link", "add", f"to{number}", "type", "veth", "peer", "name", f"to{number}", "netns",
+                         str(self.keepers[asks].pid))
+                for end, role in enumerate((listens, asks), 1):
+                    self.addresses[role, (asks, listens)[end - 1]] = f"10.78.{number}.{end}"
+                    self._ip(role, "address", "add", f"10.78.{number}.{end}/24", "dev", f"to{number}")
+                    self._ip(role, "link", "set", f"to{number}", "up")
+        except BaseException as failure:
+            self.close()
+            if not isinstance(failure, (OSError, subprocess.CalledProcessError, Trouble)):
+                raise
+            words = getattr(failure, "stderr", None) or b""
+            raise Trouble(f"no network namespaces here, which take root: {failure} "
+                          f"{words.decode(errors='replace').strip()}") from None
+
+    def _keep(self, role):
+        """A process that keeps a namespace until its input ends, and so no longer than this one lives."""
+        with InOnePiece():
+            keeper = subprocess.Popen(["unshare", "--net", "sh", "-c", "echo up; exec cat"], stdin=subprocess.PIPE,
+                                      stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            self.keepers[role] = keeper
+        if keeper.stdout.readline() != b"up\n":
+            raise Trouble(keeper.stderr.read().decode(errors="replace").strip())
+
+    def _ip(self, role, *words):
+        subprocess.run(self.command(role, "ip", *words), check=True, capture_output=True)
+
+    def address(self, role, towards):
+        return self.addresses[role, towards]
+
+    def command(self, role, *words):
+        return ["nsenter", "--net", f"--target={self.keepers[role].pid}", *words]
+
+    def close(self):
+        for keeper in self.keepers.values():
+            keeper.kill()
+            keeper.communicate()
+        self.keepers = {}
+
+
+class Process:
+    """The fleet has it from the first moment, so that it ends with the fleet even where it is never ready."""
+
+    def __init__(self, fleet, name, command, stdin=subprocess.DEVNULL):
+        self.name = name
+        self.errors = os.path.join(fleet.folder, f"{name}-{time.monotonic_ns()}.err")
+        with open(self.errors, "w", encoding="utf-8") as err, InOnePiece():
+            self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=err, text=True,
+                                            env=clean_environment())
+            fleet.started.append(self)
+
+    def said_wrong(self):
+        with open(self.errors, encoding="utf-8") as err:
+            return err.read()
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait()
+
+    def send_signal(self, number):
+        self.process.send_signal(number)
+
+    def wait(self):
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            raise Trouble(f"{self.name} did not end; {self.said_wrong()}") from None
+
+    def stop(self, number=signal.SIGTERM):
+        if self.process.poll() is None:
+            self.send_signal(number)
+        return self.wait()
+
+    def close(self):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        if self.process.stdin:
+            self.process.stdin.close()
+        self.process.stdout.close()
+
+
+class Daemon(Process):
+    """A clesd with plugins. `url` is where it listens."""
+
+    def __init__(self, fleet, role, name, plugins, towards, port=0, more=""):
+        config = os.path.join(fleet.folder, name + ".yaml")
+        with open(config, "w", encoding="utf-8") as file:
+            file.write(CONFIG.format(name=name, address=fleet.hosts.address(role, towards), port=port,
+                                     insecure=str(fleet.hosts.insecure).lower(), plugins=", ".join(plugins)) + more)
+        self.fleet, self.role = fleet, role
+        super().__init__(fleet, name, fleet.hosts.command(role, fleet.program("clesd"), "--config", config))
+        line = self.process.stdout.readline() if select.select([self.process.stdout], [], [], PATIENCE)[0] else ""
+        found = re.search(r"listening on (tcp://\S+:(\d+))", line)
+        if not found:
+            self.close()
+            raise Trouble(f"{name} did not start: {line}{self.said_wrong()}")
+        self.url, self.port = found[1], int(found[2])
+
+    def pull(self, noun):
+        """Asked on its own host, so that no way is needed that is not there."""
+        done = subprocess.run(self.fleet.hosts.command(self.role, self.fleet.program("cles"), "pull", noun, "--at", self.url,
+                                                       "-o", "json"), stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              env={**clean_environment(), "CLES_MULTICAST": "off"}, timeout=PATIENCE, check=False)
+        if done.returncode != 0:
+            raise Trouble(f"{self.name} did not answer {noun}: {done.stderr}")
+        return json.loads(done.stdout)
+
+    def peers(self):
+        return {peer["node"] for peer in self.pull("self:cles/peers")["peers"]}
+
+
+class Teller(Process):
+    """A cles-jadc2 that tells events, which are kept in their order."""
+
+    def __init__(self, fleet, role, *arguments, stdin=subprocess.DEVNULL, listener=None):
+        self.events, self.news, self.listener = [], threading.Condition(), listener
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        super().__init__(fleet, role, fleet.hosts.command(role, fleet.program("cles-jadc2"), role, "--json", *arguments), stdin)
+        self.reader.start()
+
+    def _read(self):
+        for line in self.process.stdout:
+            event = json.loads(line)
+            if self.listener:
+                self.listener(event)
+            with self.news:
+                self.events.append(event)
+                self.news.notify_all()
+        with self.news:
+            self.events.append({"event": "ended"})
+            self.news.notify_all()
+
+    def wait_for(self, event, words="", after=0):
+        """The first such event since so many were told; `event` may be several."""
+        kinds = (event,) if isinstance(event, str) else event
+        until = time.monotonic() + PATIENCE
+        with self.news:
+            while True:
+                for one in self.events[after:]:
+                    if one["event"] in kinds and words in one.get("text", ""):
+                        return one
+                ended = bool(self.events) and self.events[-1]["event"] == "ended"
+                if ended or not self.news.wait(max(0, until - time.monotonic())):
+                    raise Trouble(f"{self.name} did not tell '{' or '.join(kinds)} {words}', but {self.events}; "
+                                  f"{self.said_wrong()}")
+
+    def order_by_hand(self, by=""):
+        """What an operator (--operator) does: he orders a strike on a target that he is shown, as that node saw it, and on
+        another one where it is out of sight by then. Gives the decision."""
+        after = self.told()
+        while True:
+            picture = self.wait_for("picture", after=after)
+            after = self.events.index(picture, after) + 1
+            targets = picture["data"]["tracks"] if by in ("", picture["data"]["by"]) else []
+            if targets:
+                after = self.told()
+                self.process.stdin.write(f"strike {targets[0]['id']}\n")
+                self.process.stdin.flush()
+                answer = self.wait_for(("decided", "operator"), after=after)
+                if answer["event"] == "decided":
+                    return answer
+
+    def told(self):
+        with self.news:
+            return len(self.events)
+
+    def all(self, event):
+        with self.news:
+            return [one for one in self.events if one["event"] == event]
+
+    def end(self):
+        """Waits for its end; gives the exit code."""
+        code = self.wait()
+        self.reader.join(PATIENCE)
+        return code
+
+    def close(self):
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.wait()
+        if self.reader.is_alive():
+            self.reader.join(PATIENCE)
+        super().close()
+
+
+class Fleet:
+    """All that was started, which goes when this does."""
+
+    def __init__(self, programs, hosts=None, listener=None):
+        self.programs, self.hosts, self.listener = programs, hosts or Loopback(), listener
+        self.folder = tempfile.mkdtemp(prefix="cles-jadc2-")
+        self.started = []
+
+    def program(self, name):
+        return os.path.join(self.programs, name)
+
+    def plugin(self, name):
+        return os.path.abspath(os.path.join(self.programs, "..", "plugins", f"libcles-{name}.so"))
+
+    def satellite(self, name="sat1", role="satellite", plugins=None, port=0, more=""):
+        plugins = [self.plugin("fmv")] if plugins is None else plugins
+        return Daemon(self, role, name, plugins, "recon", port, more)
+
+    def striker(self, name="strike1", plugins=None, port=0, more=""):
+        """One that takes old tracks too: a machine that has much else to do is no reason to refuse an order."""
+        plugins = [f"{{path: {self.plugin('strike')}, config: {{oldest_s: 60}}}}"] if plugins is None else plugins
+        return Daemon(self, "strike", name, plugins, "mission", port, more)
+
+    def recon(self, satellites, *arguments, listen=None):
+        """Where it listens is its attribute `url`."""
+        asked = [word for satellite in satellites for word in ("--satellite", getattr(satellite, "url", satellite))]
+        at = listen or f"tcp://{self.hosts.address('recon', 'mission')}:0"
+        open_to_all = ["--insecure"] if self.hosts.insecure else []
+        recon = Teller(self, "recon", "--listen", at, *open_to_all, *asked, *arguments, listener=self.listener)
+        recon.url = recon.wait_for("listening")["text"].removeprefix("listening on ")
+        return recon
+
+    def mission(self, recon, strikers, *arguments, stdin=subprocess.DEVNULL):
+        asked = [word for striker in strikers for word in ("--strike", getattr(striker, "url", striker))]
+        return Teller(self, "mission", "--recon", getattr(recon, "url", recon), *asked, *arguments, stdin=stdin,
+                      listener=self.listener)
+
+    def reaches(self, role, url):
+        """Whether a connection can be made from there."""
+        host, _, port = url.removeprefix("tcp://").rpartition(":")
+        code = f"import socket; socket.create_connection(({host!r}, {port}), 2)"
+        return subprocess.run(self.hosts.command(role, "python3", "-c", code), stdin=subprocess.DEVNULL,
+                              capture_output=True, check=False).returncode == 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        for process in reversed(self.started):
+            process.close()
+        self.hosts.close()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]

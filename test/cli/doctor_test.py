@@ -1,0 +1,279 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""`cles doctor`: on hosts of its own, each with another illness."""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+
+from support import CLES, PATIENCE, environment, read_line, wait_until
+from two_hosts import Hosts
+
+CLESD = os.environ.get("CLESD", "")
+
+# Announces a node called ghost, again and again, at a port of the loopback where it listens itself, if it is to.
+GHOST = """
+import json, socket, sys, threading, time
+answers, clock = sys.argv[1] == "answers", float(sys.argv[2])
+server = socket.create_server(("127.0.0.1", 0))
+port = server.getsockname()[1]
+if not answers:
+    server.close()
+
+def serve():
+    while True:
+        client = server.accept()[0]
+        threading.Thread(target=talk, args=(client,), daemon=True).start()
+
+def talk(client):
+    for line in client.makefile("r"):
+        id = "".join(word + " " for word in line.split() if word.startswith("id="))
+        if "self:utc" in line:
+            reply = {"seconds": time.time() + clock}
+        elif "peers" in line:
+            reply = {"peers": []}
+        else:
+            reply = {"node": "ghost", "version": "1", "protocol": 1, "tasks": [{"verb": "PULL", "task": "utc"}]}
+        client.sendall((id + json.dumps(reply) + "\\n").encode())
+
+if answers:
+    threading.Thread(target=serve, daemon=True).start()
+sender = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+sender.bind(("127.0.0.1", 0))
+sender.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
+print("up", flush=True)
+seq = 0
+while True:
+    seq += 1
+    body = json.dumps({"node": "ghost", "endpoints": [f"tcp://127.0.0.1:{port}"], "interval_ms": 1000})
+    sender.sendto(f"UPDATE ghost:cles seq={seq} epoch=01020304 {body}".encode(), ("239.255.25.37", 25370))
+    time.sleep(0.05)
+"""
+
+STRANGER = """
+import socket, sys
+if sys.argv[1] == "tcp":
+    held = socket.create_server(("127.0.0.1", 25370))
+else:
+    held = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    held.bind(("0.0.0.0", 25370))
+print("up", flush=True)
+import time
+time.sleep(3600)
+"""
+
+
+class Doctor(unittest.TestCase):
+    """Each test has a host for itself, where port 25370 is nobody's."""
+
+    def setUp(self):
+        self.hosts = Hosts()
+        self.addCleanup(self.hosts.close)
+        self.folder = tempfile.TemporaryDirectory()
+        self.addCleanup(self.folder.cleanup)
+        self.clesd("echo 'without a file: can be used'")
+
+    def clesd(self, script):
+        """What is found as clesd."""
+        path = os.path.join(self.folder.name, "clesd")
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(f"#!/bin/sh\n{script}\n")
+        os.chmod(path, 0o755)
+
+    def environment(self, **more):
+        path = self.folder.name + os.pathsep + os.environ["PATH"]
+        return environment(PATH=path, **{"CLES_MULTICAST": "lo", **more})
+
+    def start(self, *command, wait_for="", **variables):
+        process = subprocess.Popen([*self.hosts.inside(self.hosts.near), *command], stdin=subprocess.DEVNULL,
+                                   stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+                                   env=self.environment(**variables))
+        self.addCleanup(process.stdout.close)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)
+        self.assertIn(wait_for, read_line(process))
+        return process
+
+    def serve(self, name, *arguments):
+        return self.start(CLES, "serve", "--name", name, *arguments, wait_for="listening")
+
+    def run_doctor(self, *arguments, **variables):
+        done = subprocess.run([*self.hosts.inside(self.hosts.near), CLES, "doctor", *arguments], capture_output=True,
+                              text=True, stdin=subprocess.DEVNULL, env=self.environment(**variables), timeout=PATIENCE,
+                              check=False)
+        self.assertEqual(done.stderr, "")
+        return done.returncode, done.stdout
+
+    def examine(self, *arguments, **variables):
+        """Exit code, and of each check what was found."""
+        code, out = self.run_doctor("-o", "json", *arguments, **variables)
+        report = json.loads(out)
+        found = {}
+        for each in report["findings"]:
+            found.setdefault(each["check"], []).append(each)
+        self.assertEqual(report["failures"], sum(e["verdict"] == "failure" for e in report["findings"]))
+        self.assertEqual(report["warnings"], sum(e["verdict"] == "warning" for e in report["findings"]))
+        self.assertEqual(code, 1 if report["failures"] else 0, out)
+        return code, found
+
+    def failure(self, found, check, says):
+        """The one failure of a check, which says that."""
+        failures = [each for each in found[check] if each["verdict"] == "failure"]
+        self.assertEqual(len(failures), 1, found)
+        self.assertRegex(failures[0]["text"], says)
+        self.assertIn("advice", failures[0])
+        return failures[0]
+
+    def test_a_host_without_nodes_is_well(self):
+        code, found = self.examine()
+        self.assertEqual(code, 0, found)
+        self.assertEqual(list(found), ["config", "interfaces", "multicast", "ports", "nodes", "clock", "limits"])
+        self.assertEqual([each["text"] for each in found["ports"]],
+                         ["tcp://127.0.0.1:25370 is free", "udp://127.0.0.1:25370 is free"])
+        self.assertEqual(found["nodes"][0]["text"], "nobody is heard")
+        self.assertIn("v0 10.77.0.1", found["interfaces"][0]["text"])
+        self.assertIn("239.255.25.37:25370 on lo is heard", found["multicast"][0]["text"])
+
+    def test_as_text(self):
+        self.clesd("echo 'clesd: x.yaml:3: workers: wrong' >&2; exit 2")
+        code, out = self.run_doctor("-o", "table")
+        self.assertEqual(code, 1)
+        first, second, third = out.splitlines()[:3]
+        self.assertEqual(first, "failure  config      clesd: x.yaml:3: workers: wrong")
+        self.assertRegex(second, r"^ {21}-> mend it")
+        self.assertRegex(third, r"^ok       interfaces  ")
+
+    def test_the_configuration(self):
+        _, found = self.examine()
+        self.assertEqual(found["config"], [{"check": "config", "verdict": "ok",
+                                            "text": "clesd: without a file: can be used"}])
+        self.clesd("kill -9 $$")
+        self.failure(self.examine()[1], "config", "did not end by itself")
+        self.clesd("exit 1")
+        self.failure(self.examine()[1], "config", "refuses its configuration")
+
+    @unittest.skipUnless(CLESD, "clesd was not built")
+    def test_what_clesd_itself_says_of_its_configuration(self):
+        self.clesd(f'exec {CLESD} "$@"')
+        config = os.path.join(self.folder.name, "clesd.yaml")
+        with open(config, "w", encoding="utf-8") as file:
+            file.write("node: sat1\nplugins: [libcles-system.so]\n")
+        code, found = self.examine(CLES_CONFIG=config)
+        self.assertEqual(code, 0, found)
+        self.assertEqual(found["config"][0]["text"], f"clesd: {config}: can be used")
+        with open(config, "a", encoding="utf-8") as file:
+            file.write("workers: none\n")
+        self.failure(self.examine(CLES_CONFIG=config)[1], "config", rf"clesd: {config}:3: workers: ")
+        self.failure(self.examine(CLES_CONFIG=config + "x")[1], "config", rf"{config}x")
+
+    @unittest.skipUnless(CLESD, "clesd was not built")
+    def test_clesd_at_the_usual_port(self):
+        config = os.path.join(self.folder.name, "clesd.yaml")
+        with open(config, "w", encoding="utf-8") as file:
+            file.write("node: sat1\nplugins: [libcles-system.so]\n")
+        daemon = self.start(CLESD, "--config", config, wait_for="sat1 listening on tcp://127.0.0.1:25370")
+        self.assertIn("sat1 listening on udp://127.0.0.1:25370", read_line(daemon))
+        code, found = self.examine()
+        self.assertEqual(code, 0, found)
+        by_tcp, by_udp = found["ports"]
+        self.assertRegex(by_tcp["text"], r"^tcp://127.0.0.1:25370: the node sat1 is there, version \d")
+        # It has more to say of itself than goes into a datagram.
+        self.assertRegex(by_udp["text"], r"^udp://127.0.0.1:25370: a node is there, which answers: sat1: .* use TCP$")
+        self.assertEqual(found["nodes"][0]["text"], "one is heard")
+        self.assertFalse([each for each in found["clock"] if "sat1" in each["text"]])  # whose clock is this host's
+
+    def test_an_interface_that_is_not_there(self):
+        code, found = self.examine(CLES_MULTICAST="nowhere0")
+        self.assertEqual(code, 1)
+        self.failure(found, "interfaces", "by nowhere0, and there is none")
+        self.failure(found, "multicast", "cannot join the group 239.255.25.37 on nowhere0")
+        self.assertIn("ports", found)  # the rest is looked at all the same
+
+    def test_an_interface_that_is_down(self):
+        self.hosts._ip(self.hosts.near, "link", "set", "v0", "down")
+        _, found = self.examine("-m", "v0")
+        self.failure(found, "interfaces", "by v0, which is down")
+        self.failure(found, "multicast", "v0")
+
+    def test_another_interface(self):
+        code, found = self.examine("-m", "v0")
+        self.assertEqual(code, 0, found)
+        self.assertEqual(found["interfaces"][1]["text"], "multicast goes by v0")
+        self.assertIn("25370 on v0 is heard", found["multicast"][0]["text"])
+
+    def test_no_multicast_wanted(self):
+        code, found = self.examine("-m", "off")
+        self.assertEqual(code, 0, found)
+        self.assertIn("is off", found["multicast"][0]["text"])
+
+    def test_a_node_at_the_usual_port(self):
+        self.serve("car1", "--listen", "tcp://127.0.0.1", "--listen", "udp://127.0.0.1")
+        code, found = self.examine()
+        self.assertEqual(code, 0, found)
+        for each, way in zip(found["ports"], ("tcp", "udp")):
+            self.assertRegex(each["text"], rf"^{way}://127.0.0.1:25370: the node car1 is there, version \d")
+        self.assertEqual(found["nodes"][0]["text"], "one is heard")
+
+    def test_a_stranger_at_the_usual_port(self):
+        stranger = self.start(sys.executable, "-c", STRANGER, "tcp", wait_for="up")
+        failure = self.failure(self.examine()[1], "ports", r"tcp://127\.0\.0\.1:25370: .* it is no node")
+        self.assertRegex(failure["text"], rf"python\S* \(process {stranger.pid}\)")
+
+    def test_a_stranger_at_the_port_of_the_group(self):
+        self.start(sys.executable, "-c", STRANGER, "udp", wait_for="up")
+        _, found = self.examine()
+        self.failure(found, "multicast", "cannot listen to udp port 25370: Address already in use")
+        self.failure(found, "ports", "udp://127.0.0.1:25370")
+
+    def test_two_nodes_of_one_name(self):
+        for _ in range(2):
+            self.serve("car1", "--listen", "tcp://127.0.0.1:0")
+        found = {}
+
+        def clash():
+            found.update(self.examine()[1])
+            return any("two nodes call themselves car1" in each["text"] for each in found["nodes"])
+
+        wait_until(clash, "the clash is told")
+        self.failure(found, "nodes", "two nodes call themselves car1")
+
+    def test_a_node_that_does_not_answer(self):
+        self.start(sys.executable, "-c", GHOST, "silent", "0", wait_for="up")
+        _, found = self.examine()
+        self.failure(found, "nodes", "ghost announces itself, and does not answer at tcp://127.0.0.1:")
+
+    def test_another_clock(self):
+        for offset, says in (("3600", "ahead of"), ("-3600", "behind")):
+            ghost = self.start(sys.executable, "-c", GHOST, "answers", offset, wait_for="up")
+            code, found = self.examine()
+            self.assertEqual(code, 0, found)
+            told = [each for each in found["clock"] if "ghost" in each["text"]]
+            self.assertEqual([each["verdict"] for each in told], ["warning"])
+            self.assertRegex(told[0]["text"], rf"^ghost is 3(600|599)\.\d+ s {says} this host$")
+            ghost.kill()
+            ghost.wait()
+        self.start(sys.executable, "-c", GHOST, "answers", "0", wait_for="up")
+        self.assertFalse([e for e in self.examine()[1]["clock"] if "ghost" in e["text"]])
+
+    def test_a_named_place(self):
+        self.serve("car1", "--listen", "tcp://127.0.0.1:25999")
+        code, found = self.examine("--at", "tcp://127.0.0.1:25999")
+        self.assertEqual(code, 0, found)
+        self.assertIn("the node car1 is there", found["ports"][0]["text"])
+        _, found = self.examine("--at", "tcp://127.0.0.1:25998")
+        self.failure(found, "ports", "25998 does not answer")
+
+    def test_few_files(self):
+        done = subprocess.run([*self.hosts.inside(self.hosts.near), "sh", "-c",
+                               f"ulimit -n 200; exec {CLES} doctor -o json"], capture_output=True, text=True,
+                              env=self.environment(), timeout=PATIENCE, check=False)
+        limits = [each for each in json.loads(done.stdout)["findings"] if each["check"] == "limits"]
+        self.assertEqual(limits[0]["verdict"], "warning")
+        self.assertIn("200 files", limits[0]["text"])
+
+
+if __name__ == "__main__":
+    unittest.main()

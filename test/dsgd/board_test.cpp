@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "dsgd/board.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <set>
+
+namespace {
+
+using cles::errc;
+
+cles::error error(errc code) { return {code, "words"}; }
+const cles::error refused{boost::system::errc::make_error_code(boost::system::errc::connection_refused), "no link"};
+
+dsgd::board four(const std::vector<std::string>& targets) { return dsgd::board{std::vector<sgd::order>(4), targets}; }
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(board)
+
+BOOST_AUTO_TEST_CASE(nodes_have_their_turns) {
+    const auto all = four({"a", "b", "c"});
+    BOOST_TEST(all.shards()[0].target == "a");
+    BOOST_TEST(all.shards()[1].target == "b");
+    BOOST_TEST(all.shards()[2].target == "c");
+    BOOST_TEST(all.shards()[3].target == "a");
+}
+
+BOOST_AUTO_TEST_CASE(what_is_done_is_kept) {
+    auto all = four({"any"});
+    BOOST_TEST(all.shards()[2].fate == "open");
+    all.done(2, {.node = "b", .points = 7});
+    BOOST_TEST(all.shards()[2].fate == "done");
+    BOOST_TEST(all.parts()[2].node == "b");
+    BOOST_TEST(all.parts()[2].points == 7U);
+    BOOST_TEST(!all.failure());
+}
+
+BOOST_AUTO_TEST_CASE(a_lost_nodes_shards_go_to_those_that_have_the_fewest) {
+    for (const auto& why : {error(errc::unavailable), error(errc::deadline), error(errc::no_target), refused}) {
+        auto all = four({"a", "b", "c"});
+        all.done(1, {});
+        BOOST_TEST(all.failed(0, why)); // a has two shards, b none, c one
+        BOOST_TEST(all.shards()[0].target == "b");
+        BOOST_TEST(all.failed(3, why));
+        BOOST_TEST(all.shards()[3].fate == "open");
+        BOOST_TEST((std::set<std::string>{"b", "c"}).contains(all.shards()[3].target));
+        BOOST_TEST(all.shards()[0].trouble.size() == 1U);
+        BOOST_TEST(all.shards()[0].trouble[0].starts_with("a: "));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_was_lost_is_not_asked_again) {
+    auto all = four({"a", "b"});
+    BOOST_TEST(all.failed(0, error(errc::unavailable)));
+    BOOST_TEST(all.shards()[0].target == "b");
+    BOOST_TEST(all.failed(2, error(errc::unavailable)));
+    BOOST_TEST(all.shards()[2].target == "b");
+    BOOST_TEST(!all.failed(1, error(errc::unavailable)));
+    BOOST_TEST(all.shards()[1].fate == "failed");
+    BOOST_TEST((all.failure()->code() == errc::unavailable));
+    BOOST_TEST(all.failure()->message() == "shard 2: b: unavailable: words");
+}
+
+BOOST_AUTO_TEST_CASE(any_is_asked_again_until_there_is_nobody) {
+    auto all = four({"any"});
+    BOOST_TEST(all.failed(0, error(errc::unavailable)));
+    BOOST_TEST(all.failed(0, error(errc::deadline)));
+    BOOST_TEST(all.shards()[0].target == "any");
+    BOOST_TEST(!all.failed(0, error(errc::no_target)));
+    BOOST_TEST(all.shards()[0].fate == "failed");
+    BOOST_TEST(all.shards()[0].trouble.size() == 3U);
+}
+
+BOOST_AUTO_TEST_CASE(a_busy_node_is_asked_again_but_not_for_ever) {
+    auto all = four({"a", "b"});
+    for (std::size_t i = 1; i < dsgd::board::most_attempts; ++i) {
+        BOOST_TEST(all.failed(0, error(errc::busy)));
+        BOOST_TEST(all.shards()[0].target == "a");
+    }
+    BOOST_TEST(!all.failed(0, error(errc::busy)));
+    BOOST_TEST((all.failure()->code() == errc::busy));
+}
+
+BOOST_AUTO_TEST_CASE(what_fails_everywhere_is_not_tried_elsewhere) {
+    for (const auto code : {errc::bad_request, errc::failed, errc::no_task, errc::denied, errc::conversion}) {
+        auto all = four({"a", "b"});
+        BOOST_TEST(!all.failed(0, error(code)));
+        BOOST_TEST((all.failure()->code() == code));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(the_first_failure_ends_all) {
+    auto all = four({"a", "b"});
+    all.done(3, {});
+    BOOST_TEST(!all.failed(0, error(errc::failed)));
+    BOOST_TEST(!all.failed(1, error(errc::stopped)));
+    BOOST_TEST(!all.failed(2, error(errc::stopped)));
+    BOOST_TEST(all.shards()[0].fate == "failed");
+    BOOST_TEST(all.shards()[1].fate == "withdrawn");
+    BOOST_TEST(all.shards()[2].fate == "withdrawn");
+    BOOST_TEST(all.shards()[3].fate == "done");
+    BOOST_TEST(all.failure()->message().starts_with("shard 1: "));
+}
+
+BOOST_AUTO_TEST_SUITE_END()

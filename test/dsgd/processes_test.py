@@ -1,0 +1,217 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Distributed stochastic gradient descent as its users run it: daemons, and the manager as a process of its own. Whoever
+computes, the result is the same; whoever is killed, each shard's fate is told."""
+
+import json
+import os
+import signal
+import subprocess
+import unittest
+
+from daemon import DEFAULTS, Daemon, clean_environment, wait_until_running
+from support import PATIENCE, finish, wait_until
+
+DSGD = os.environ["DSGD"]
+PLUGIN = os.environ["SGD_PLUGIN"]
+LONG, ENDLESS = "600", "1000000"  # epochs: some tenths of a second for a shard, and more than anybody waits for
+
+
+def node(name, *seeds, plugin=f"plugins: [{PLUGIN}]\n"):
+    known = f"seeds: [{', '.join(seeds)}]\n" if seeds else ""
+    return Daemon("drain: 500ms\n" + known + plugin,
+                  base=DEFAULTS.replace("sat1", name).replace("level: debug", "level: info"))
+
+
+def start(*arguments):
+    return subprocess.Popen([DSGD, *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                            stderr=subprocess.PIPE, text=True, env=clean_environment())
+
+
+def run(*arguments):
+    """Exit code, stdout, stderr."""
+    return finish(start(*arguments))
+
+
+def live_at(daemon):
+    return {peer["node"] for peer in json.loads(daemon.ask("PULL self:cles/peers"))["peers"] if peer["state"] == "live"}
+
+
+class Cluster:
+    """sat1 and sat2, which know each other."""
+
+    def __enter__(self):
+        self.sat1 = node("sat1").__enter__()
+        try:
+            self.sat2 = node("sat2", self.sat1.url).__enter__()
+            wait_until(lambda: live_at(self.sat1) == {"sat2"} and live_at(self.sat2) == {"sat1"}, "both know each other")
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        for daemon in (self.sat1, getattr(self, "sat2", None)):
+            if daemon:
+                daemon.__exit__()
+
+
+def kill(daemon):
+    daemon.send_signal(signal.SIGKILL)
+    daemon.process.wait()
+
+
+class Manager(unittest.TestCase):
+    def check(self, arguments, code=0):
+        """The object that it prints."""
+        ended, out, err = run(*arguments, "--json")
+        self.assertEqual(ended, code, err)
+        return json.loads(out), err
+
+    def fates(self, report):
+        return [shard["fate"] for shard in report["shards"]]
+
+    def test_whoever_computes_the_result_is_the_same(self):
+        here, _ = self.check(["--local", "4", "-e", "20"])
+        self.assertLess(here["quality"]["mse"], 0.0199)  # the paper's, Table 2
+        self.assertLess(here["quality"]["mse"], here["quality"]["least_mse"] * 1.02)
+        self.assertEqual(self.fates(here), ["done"] * 4)
+        with Cluster() as cluster:
+            for more in ([], ["--nodes", "sat1"], ["--nodes", "sat2,sat1"]):
+                there, err = self.check(["--at", cluster.sat1.url, "-e", "20", *more])
+                self.assertEqual(there["result"], here["result"], more)
+                self.assertEqual(there["quality"], here["quality"])
+                self.assertEqual(self.fates(there), ["done"] * 4)
+                self.assertEqual(err, "")
+                times = there["times"]
+                self.assertGreater(times["overhead_ms"], 0)
+                self.assertAlmostEqual(times["elapsed_ms"], times["longest_ms"] + times["overhead_ms"], 6)
+                self.assertEqual(times["longest_ms"], max(part["ms"] for part in there["parts"]))
+
+    def test_named_nodes_have_their_turns(self):
+        with Cluster() as cluster:
+            report, _ = self.check(["--at", cluster.sat2.url, "-e", "5", "-k", "5", "-n", "sat2,sat1"])
+            self.assertEqual([part["node"] for part in report["parts"]], ["sat2", "sat1", "sat2", "sat1", "sat2"])
+
+    def test_by_speed_all_points_are_trained_on_once(self):
+        with Cluster() as cluster:
+            report, _ = self.check(["--at", cluster.sat1.url, "-e", "30", "--weighted"])
+        self.assertEqual(self.fates(report), ["done"] * 4)
+        self.assertEqual({part["node"] for part in report["parts"]}, {"sat1", "sat2"})
+        self.assertGreater(report["trial_ms"], 0)
+        next_point = 0
+        for shard in report["shards"]:
+            self.assertEqual(shard["what"]["first"], next_point)
+            next_point += shard["what"]["count"]
+        self.assertEqual(next_point, 200_000)
+        self.assertLess(report["quality"]["mse"], 0.0199)
+
+    def test_for_people_it_prints_a_table_and_its_progress(self):
+        with node("sat1") as daemon:
+            code, out, err = run("--at", daemon.url, "-k", "2", "-e", "50")
+        self.assertEqual(code, 0)
+        self.assertRegex(out, r"(?m)^done +100000 points +\d+\.\d{3} ms  sat1\ndone +100000 points")
+        self.assertRegex(out, r"(?m)^elapsed +\d+\.\d{3} ms: the longest shard \d+\.\d{3}, all else \d+\.\d{3}$")
+        self.assertRegex(out, r"(?m)^mse +0\.01\d{5}; no line has less than 0\.01\d{5}; 0\.0\d{3} % of the points")
+        self.assertRegex(err, r"(?m)^cles-dsgd: [1-9]\d % of 2 shards$")
+
+    # -- who is killed ---------------------------------------------------------------------------------------------------
+
+    def test_a_lost_nodes_shards_are_delegated_again(self):
+        here, _ = self.check(["--local", "4", "-e", LONG])
+        with Cluster() as cluster:
+            manager = start("--at", cluster.sat1.url, "--nodes", "sat1,sat2", "-e", LONG, "--json")
+            wait_until_running(cluster.sat2, 2)
+            kill(cluster.sat2)
+            code, out, err = finish(manager)
+        self.assertEqual(code, 0, err)
+        report = json.loads(out)
+        self.assertEqual(self.fates(report), ["done"] * 4)
+        self.assertEqual([part["node"] for part in report["parts"]], ["sat1"] * 4)
+        for i in (1, 3):
+            self.assertRegex(report["shards"][i]["trouble"][0], "^sat2: unavailable: ")
+            self.assertRegex(err, rf"(?m)^cles-dsgd: shard {i + 1}: sat2: unavailable: .*; again, to sat1$")
+        self.assertEqual(report["shards"][0]["trouble"], [])
+        self.assertEqual(report["result"], here["result"])
+
+    def test_any_goes_on_without_the_node_whose_address_it_was_given(self):
+        here, _ = self.check(["--local", "4", "-e", LONG])
+        with Cluster() as cluster:
+            manager = start("--at", cluster.sat1.url, "-e", LONG, "--json")
+            wait_until(lambda: json.loads(cluster.sat1.ask("PULL self:cles/metrics"))["pool"]["running"] > 0, "it began")
+            kill(cluster.sat1)
+            code, out, err = finish(manager)
+        self.assertEqual(code, 0, err)
+        report = json.loads(out)
+        self.assertEqual(self.fates(report), ["done"] * 4)
+        self.assertEqual({part["node"] for part in report["parts"]}, {"sat2"})
+        self.assertEqual(report["result"], here["result"])
+
+    def test_where_nobody_is_left_each_fate_is_told(self):
+        with node("sat1") as daemon:
+            manager = start("--at", daemon.url, "--nodes", "sat1", "-e", ENDLESS, "--json")
+            wait_until_running(daemon, 2)
+            kill(daemon)
+            code, out, err = finish(manager)
+        self.assertEqual(code, 5, err)
+        report = json.loads(out)
+        self.assertEqual(sorted(self.fates(report)), ["failed", "withdrawn", "withdrawn", "withdrawn"])
+        self.assertRegex(report["error"], r"^shard \d: sat1: unavailable: ")
+        self.assertIn(report["error"], err)
+
+    def test_daemons_go_on_without_a_killed_manager(self):
+        with Cluster() as cluster:
+            manager = start("--at", cluster.sat1.url, "--nodes", "sat1,sat2", "-e", ENDLESS, "--json")
+            wait_until_running(cluster.sat1, 2)
+            wait_until_running(cluster.sat2, 2)
+            manager.kill()
+            manager.communicate(timeout=PATIENCE)
+            wait_until_running(cluster.sat1, 0)  # nobody waits for what they were doing
+            wait_until_running(cluster.sat2, 0)
+            report, _ = self.check(["--at", cluster.sat1.url, "-e", "5"])
+            self.assertEqual(self.fates(report), ["done"] * 4)
+            self.assertEqual([daemon.stop()[0] for daemon in (cluster.sat1, cluster.sat2)], [0, 0])
+
+    def test_a_shard_past_its_deadline_goes_elsewhere_or_fails(self):
+        with node("sat1") as daemon:
+            report, _ = self.check(["--at", daemon.url, "--nodes", "sat1", "-k", "1", "-e", ENDLESS, "--deadline", "1"], 4)
+            self.assertEqual(self.fates(report), ["failed"])
+            wait_until_running(daemon, 0)
+
+    # -- what is missing -------------------------------------------------------------------------------------------------
+
+    def test_no_node_is_there(self):
+        code, out, err = run("--at", "tcp://127.0.0.1:1")
+        self.assertEqual((code, out), (3, ""))
+        self.assertEqual(err, "cles-dsgd: no node answers where it was told to ask (--at): is clesd running there?\n")
+
+    def test_no_node_has_the_plugin(self):
+        with node("sat1", plugin="") as daemon:
+            code, out, err = run("--at", daemon.url)
+        self.assertEqual((code, out), (3, ""))
+        self.assertRegex(err, "^cles-dsgd: .*: is libcles-sgd.so among the plugins of a node\\?\n$")
+
+    def test_a_named_node_is_not_there(self):
+        with node("sat1") as daemon:
+            code, out, err = run("--at", daemon.url, "--nodes", "sat1,sat9")
+        self.assertEqual((code, out), (3, ""))
+        self.assertEqual(err, "cles-dsgd: 'sat9' does not offer 'sgd': see cles ls --tasks\n")
+
+    def test_a_node_has_other_data(self):
+        with node("sat1") as first:
+            with node("sat2", first.url, plugin=f"plugins: [{{path: {PLUGIN}, config: {{seed: 2}}}}]\n") as second:
+                wait_until(lambda: live_at(first) == {"sat2"} and live_at(second) == {"sat1"}, "both know each other")
+                report, err = self.check(["--at", first.url, "--nodes", "sat1,sat2", "-k", "2"], 5)
+        self.assertRegex(err, "bad_request: .*the data here is other: 100000 points per class, 7 apart, from seed [12]")
+        self.assertIn("failed", self.fates(report))
+        self.assertNotIn("open", self.fates(report))
+
+    def test_wrong_usage(self):
+        for arguments in (["--shards", "0"], ["--shards", "x"], ["--rate", "-1"], ["--nonsense"], ["--at", "nonsense"]):
+            code, out, err = run(*arguments)
+            self.assertEqual((code, out), (2 if arguments[0] != "--at" else 5, ""), arguments)
+            self.assertNotEqual(err, "")
+
+
+if __name__ == "__main__":
+    unittest.main()

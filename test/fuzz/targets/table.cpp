@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: BSL-1.0
+// Tables of nodes, a line each, that others tell: what is taken stays within its bounds, what is told in turn can be
+// read, and one who asks again and again for what is new ends up with all that there is.
+
+#include <cles/json_reader.hpp>
+
+#include "core/peer_table.hpp"
+#include "core/presence.hpp"
+#include "fuzz/fuzz.hpp"
+#include "protocol/grammar.hpp"
+
+#include <chrono>
+#include <string>
+
+namespace cles::fuzz {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr std::size_t most_peers = 4;
+
+class learner final : public core::table_reader {
+  public:
+    learner(core::presence& table, time_point now) : table_(table), now_(now) {}
+
+    void on_report(const core::peer_report& r) override {
+        ++entries;
+        require(protocol::is_name(r.said.node) && !protocol::is_reserved_target(r.said.node), "a node has a name");
+        require(r.said.endpoints.size() <= core::most_endpoints, "endpoints are bounded");
+        require(r.age >= milliseconds{0} && r.age <= std::chrono::hours{24}, "an age is bounded");
+        require(r.said.interval >= core::shortest_interval && r.said.interval <= core::longest_interval,
+                "an interval is bounded");
+        table_.be_told(r, core::teller::at("tcp://10.0.0.7:1"), now_, now_);
+    }
+    void on_beat(const core::peer_beat& b) override {
+        ++entries;
+        table_.be_told(b, now_, now_);
+    }
+    void on_bad_entry() override { ++entries; }
+
+    std::size_t entries = 0;
+
+  private:
+    core::presence& table_;
+    time_point now_;
+};
+
+// Of another node that asks this one until there is no more.
+void check_told(const core::presence& table, time_point now) {
+    core::deadline_queue deadlines;
+    core::presence other{"other", 2, deadlines, most_peers * 2};
+    std::string since = "0";
+    for (int i = 0;; ++i) {
+        require(i < 64, "there is an end");
+        std::string text;
+        json_writer w{text};
+        write_news(w, {"me", "00000001"}, table, {since, i % 2 == 0 ? "" : "00000002,00000003"}, 1200, now);
+        require(text.size() <= 1200, "an answer fits a datagram", text);
+        require(is_valid_json(text), "an answer is JSON", text);
+        learner to{other, now};
+        core::table_head head;
+        require(read_table(text, 64, to, head), "an answer can be read", text);
+        require(!head.next.empty(), "an answer says what to ask with next", text);
+        since = head.next;
+        if (!head.more) {
+            break;
+        }
+    }
+    table.each([&](const core::presence::known& k) {
+        require(k.suspect || k.node == "other" || other.look(k.node).has_value(), "who is live is told of", k.node);
+    });
+}
+
+} // namespace
+
+void run(std::string_view input) {
+    core::deadline_queue deadlines;
+    core::presence table{"me", 1, deadlines, most_peers};
+    time_point now{std::chrono::hours{1}};
+    table.speak({.node = "me", .endpoints = {"tcp://0.0.0.0:1"}}, 1, now);
+    while (!input.empty()) {
+        const auto end = input.find('\n');
+        const auto line = input.substr(0, end);
+        input.remove_prefix(end == std::string_view::npos ? input.size() : end + 1);
+        now += milliseconds{static_cast<int>(line.size()) * 3};
+        deadlines.expire(now);
+        learner to{table, now};
+        core::table_head head;
+        read_table(line, 8, to, head);
+        require(to.entries <= 16, "only so many entries count", line);
+        require(table.size() <= most_peers, "the table is bounded", line);
+        check_told(table, now);
+        core::peer_report ignored;
+        read_description(line, ignored);
+    }
+    now += std::chrono::hours{48};
+    deadlines.expire(now);
+    require(table.size() == 0 && !deadlines.next(), "who is silent is forgotten, and nothing waits for him");
+}
+
+} // namespace cles::fuzz

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "jadc2/commander.hpp"
+#include "jadc2/story.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+using cles::errc;
+
+namespace {
+
+jadc2::picture picture_of(std::vector<fmv::track> tracks) { return {.by = "sat1", .tracks = std::move(tracks)}; }
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(commander)
+
+BOOST_AUTO_TEST_CASE(the_oldest_that_is_in_sight_is_worth_it) {
+    jadc2::commander c;
+    BOOST_TEST(!c.worth_striking(10));
+    c.see(picture_of(
+        {{.id = 1, .age = 9}, {.id = 2, .age = 12}, {.id = 3, .age = 50, .missed = 1}, {.id = 4, .age = 30}}));
+    BOOST_TEST_REQUIRE(c.worth_striking(10).has_value());
+    BOOST_TEST(c.worth_striking(10)->id == 4U);
+    BOOST_TEST(!c.worth_striking(31));
+}
+
+BOOST_AUTO_TEST_CASE(against_one_target_there_is_one_order) {
+    jadc2::commander c;
+    c.see(picture_of({{.id = 1, .age = 20}, {.id = 2, .age = 12}}));
+    c.ordered(*c.worth_striking(10));
+    BOOST_TEST_REQUIRE(c.worth_striking(10).has_value());
+    BOOST_TEST(c.worth_striking(10)->id == 2U);
+    c.ordered(*c.worth_striking(10));
+    BOOST_TEST(!c.worth_striking(10));
+    auto other = picture_of({{.id = 1, .age = 20}}); // another node's first is another target
+    other.by = "sat2";
+    c.see(other);
+    BOOST_TEST(c.worth_striking(10).has_value());
+}
+
+BOOST_AUTO_TEST_CASE(a_target_is_found_by_its_number) {
+    jadc2::commander c;
+    c.see(picture_of({{.id = 3, .x = 7}}));
+    BOOST_TEST_REQUIRE(c.find(3).has_value());
+    BOOST_TEST(c.find(3)->x == 7);
+    BOOST_TEST(!c.find(4));
+}
+
+BOOST_AUTO_TEST_CASE(each_order_has_a_fate) {
+    jadc2::commander c;
+    for (const char* fate : {"done", "refused", "failed", "unknown", "done"}) {
+        c.ordered({.id = 1});
+        BOOST_TEST(c.fates().open == 1U);
+        c.ended(fate);
+    }
+    BOOST_TEST(c.fates().open == 0U);
+    BOOST_TEST(c.fates().given == 5U);
+    BOOST_TEST(c.fates().done == 2U);
+    BOOST_TEST(c.fates().refused == 1U);
+    BOOST_TEST(c.fates().failed == 1U);
+    BOOST_TEST(c.fates().unknown == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(whether_it_was_carried_out_is_not_guessed) {
+    for (const auto code : {errc::unavailable, errc::deadline, errc::stopped, errc::cancelled}) {
+        BOOST_TEST(jadc2::fate_of({code, "w"}) == "unknown");
+    }
+    for (const auto code : {errc::busy, errc::no_target, errc::no_task, errc::denied}) {
+        BOOST_TEST(jadc2::fate_of({code, "w"}) == "refused");
+    }
+    for (const auto code : {errc::failed, errc::bad_request}) {
+        BOOST_TEST(jadc2::fate_of({code, "w"}) == "failed");
+    }
+    const auto no_way = boost::system::errc::make_error_code(boost::system::errc::connection_refused);
+    BOOST_TEST(jadc2::fate_of({no_way, "w"}) == "refused");
+}
+
+BOOST_AUTO_TEST_CASE(the_steps_of_a_story_are_all_of_it) {
+    const jadc2::picture seen{.by = "sat1",
+                              .frame = 40,
+                              .captured = 100,
+                              .published = 100.012,
+                              .encode_ms = 1,
+                              .way_ms = 4,
+                              .queue_ms = 2,
+                              .run_ms = 3};
+    const auto told = jadc2::begin_story(seen, {.id = 9}, 100.015, 100.016);
+    BOOST_TEST(told.target == 9U);
+    BOOST_TEST(told.publish_ms == 2, boost::test_tools::tolerance(1e-6));
+    BOOST_TEST(told.tracks_way_ms == 3, boost::test_tools::tolerance(1e-6));
+    BOOST_TEST(told.decide_ms == 1, boost::test_tools::tolerance(1e-6));
+    BOOST_TEST(told.data_to_decision_ms == 16, boost::test_tools::tolerance(1e-6));
+    const auto text = jadc2::to_text(told);
+    BOOST_TEST(text.find("processed at sat1") != std::string::npos);
+    BOOST_TEST(text.find("data to answer") == std::string::npos); // there is none
+}
+
+BOOST_AUTO_TEST_SUITE_END()

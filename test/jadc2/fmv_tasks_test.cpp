@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/service.hpp>
+
+#include "fmv/base64.hpp"
+#include "fmv/messages.hpp"
+#include "fmv/streams.hpp"
+#include "fmv/tasks.hpp"
+#include "jadc2/scene.hpp"
+#include "support/answer.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+
+namespace {
+
+using jadc2::scene;
+
+struct fixture {
+    fixture() { fmv::register_tasks(node, {.streams = 2}); }
+    std::string ask(const std::string& command) {
+        try {
+            return node.request(command);
+        } catch (const cles::error& e) {
+            return e.what();
+        }
+    }
+    std::string send(const fmv::frame_message& what) {
+        return ask("DELEGATE self:FMV_Processing " + cles::to_json(what));
+    }
+    [[nodiscard]] fmv::frame_message frame(std::uint64_t number, const std::string& stream = "a") const {
+        return {.stream = stream,
+                .frame = number,
+                .width = scene::size.width,
+                .height = scene::size.height,
+                .deadline_ms = 30'000,
+                .pixels = fmv::to_base64(ground.frame(number))};
+    }
+
+    scene ground{1};
+    boost::asio::io_context io;
+    cles::service node{io, {.name = "node"}};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(fmv_tasks, fixture)
+
+BOOST_AUTO_TEST_CASE(frames_become_tracks) {
+    fmv::found last;
+    for (std::uint64_t i = 0; i < 60; ++i) {
+        last = cles::from_json<fmv::found>(send(frame(i)));
+        BOOST_TEST(last.node == "node");
+        BOOST_TEST(last.frame == i);
+        BOOST_TEST(last.run_ms > 0);
+        BOOST_TEST(last.queue_ms >= 0);
+        BOOST_TEST(last.queue_ms < 1000);
+        BOOST_TEST(last.ready == (i + 1 >= fmv::background::learning));
+    }
+    BOOST_TEST(last.tracks.size() >= 2U);
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":1,"frames":60,"repeated":0,"refused":0,"bad":0})");
+}
+
+BOOST_AUTO_TEST_CASE(a_message_with_a_frame_fits_into_a_line) {
+    BOOST_TEST(cles::to_json(frame(0)).size() < 1'000'000U);
+    BOOST_TEST(fmv::to_base64(fmv::grey(700'000)).size() + 1000 < (1U << 20U));
+}
+
+BOOST_AUTO_TEST_CASE(a_frame_that_comes_twice_changes_nothing) {
+    for (std::uint64_t i = 0; i < 50; ++i) {
+        send(frame(i));
+    }
+    const auto once = cles::from_json<fmv::found>(send(frame(50)));
+    const auto twice = cles::from_json<fmv::found>(send(frame(50)));
+    const auto old = cles::from_json<fmv::found>(send(frame(20)));
+    BOOST_TEST(cles::to_json(once.tracks) == cles::to_json(twice.tracks));
+    BOOST_TEST(cles::to_json(once.tracks) == cles::to_json(old.tracks));
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":1,"frames":51,"repeated":2,"refused":0,"bad":0})");
+}
+
+BOOST_AUTO_TEST_CASE(streams_are_apart_and_no_more_than_so_many) {
+    BOOST_TEST(cles::from_json<fmv::found>(send(frame(0))).frame == 0U);
+    BOOST_TEST(cles::from_json<fmv::found>(send(frame(7, "b"))).frame == 7U);
+    BOOST_TEST(send(frame(0, "c")) == "busy: node: no more streams are taken");
+    BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":2,"frames":2,"repeated":0,"refused":1,"bad":0})");
+}
+
+BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
+    auto what = frame(0);
+    what.pixels.pop_back();
+    BOOST_TEST(send(what) == "bad_request: node: pixels: not the base64 of 76800 bytes");
+    what = frame(0);
+    what.pixels.front() = '!';
+    BOOST_TEST(send(what) == "bad_request: node: pixels: not the base64 of 76800 bytes");
+    for (const auto& [width, height] : {std::pair{63, 240}, {240, -1}, {1025, 240}, {1024, 1024}}) {
+        what = frame(0);
+        what.width = width;
+        what.height = height;
+        BOOST_TEST(send(what).starts_with("bad_request: node: width and height: 64 to 1024, 700000 pixels at most"));
+    }
+    what = frame(0);
+    what.stream = "";
+    BOOST_TEST(send(what) == "bad_request: node: stream: 1 to 64 characters");
+    what.stream = std::string(65, 'a');
+    BOOST_TEST(send(what) == "bad_request: node: stream: 1 to 64 characters");
+    BOOST_TEST(ask("DELEGATE self:FMV_Processing {}").starts_with("bad_request: node: the body does not fit: stream"));
+    send(frame(0));
+    what = frame(1);
+    std::swap(what.width, what.height);
+    BOOST_TEST(send(what) == "bad_request: node: the stream began with frames of another size");
+}
+
+BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {
+    for (const auto& wrong : {fmv::settings{.streams = 0}, fmv::settings{.streams = 65}, fmv::settings{.idle_s = 0}}) {
+        boost::asio::io_context other;
+        cles::service there{other, {.name = "there"}};
+        BOOST_CHECK_THROW(fmv::register_tasks(there, wrong), cles::error);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_stream_that_is_idle_is_forgotten) {
+    using namespace std::chrono_literals;
+    const auto now = std::chrono::steady_clock::time_point{} + 1h;
+    fmv::streams all{1, 10s};
+    const auto first = all.find("a", scene::size, now);
+    BOOST_TEST((all.find("a", scene::size, now + 9s) == first));
+    BOOST_TEST((all.find("b", scene::size, now + 18s) == nullptr));
+    BOOST_TEST((all.find("b", scene::size, now + 20s) != nullptr));
+    BOOST_TEST(all.count() == 1U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""What joint command says where something is missing: nobody there, no plugin, a port that is taken, wrong usage.
+
+    missing_test.py PROGRAMS
+"""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import unittest
+
+from jadc2_fleet import Fleet, Trouble, clean_environment, free_port
+
+PROGRAMS = sys.argv[1]
+
+
+def run(*arguments):
+    """Exit code, stdout, stderr."""
+    done = subprocess.run([os.path.join(PROGRAMS, "cles-jadc2"), *arguments], stdin=subprocess.DEVNULL, capture_output=True,
+                          text=True, timeout=60, check=False, env=clean_environment())
+    return done.returncode, done.stdout, done.stderr
+
+
+class Missing(unittest.TestCase):
+    def setUp(self):
+        self.fleet = Fleet(PROGRAMS).__enter__()
+        self.addCleanup(lambda: self.fleet.__exit__(None, None, None))
+
+    def test_no_satellite(self):
+        recon = self.fleet.recon([f"tcp://127.0.0.1:{free_port()}"], "--frames", "20")
+        self.assertEqual(recon.end(), 3)
+        self.assertEqual(recon.all("trouble")[0]["text"], "no processing: no node answers where it was told to ask "
+                                                          "(--satellite): is clesd running there?")
+        frames = recon.all("report")[0]["data"]["frames"]
+        self.assertEqual((frames["captured"], frames["done"]), (20, 0))
+        self.assertEqual(frames["failed"] + frames["skipped"], 20)
+
+    def test_a_satellite_without_the_plugin(self):
+        satellite = self.fleet.satellite(plugins=[])
+        recon = self.fleet.recon([satellite])
+        said = recon.wait_for("trouble", "sat1")["text"]
+        self.assertRegex(said, "of sat1 \\(live\\): is libcles-fmv.so among the plugins of a node\\?$")
+        recon.stop(signal.SIGINT)
+        self.assertEqual(recon.end(), 3)
+
+    def test_no_recon(self):
+        at = f"tcp://127.0.0.1:{free_port()}"
+        mission = self.fleet.mission(at, [at], "--duration", "1")
+        self.assertEqual(mission.end(), 3)
+        self.assertRegex(mission.all("trouble")[0]["text"],
+                         f"^no tracks: .*: is cles-jadc2 recon running at {at} \\(--recon\\)\\?$")
+        self.assertEqual(len(mission.all("trouble")), 1)  # told once
+        self.assertEqual(mission.all("report")[0]["data"]["given"], 0)
+
+    def check_refused(self, strikers, words):
+        recon = self.fleet.recon([self.fleet.satellite()], "--fps", "30")
+        mission = self.fleet.mission(recon, strikers, "--duration", "60")
+        self.assertEqual(mission.end(), 3, mission.events)
+        told = mission.all("strike")[0]["data"]
+        self.assertEqual(told["fate"], "refused")
+        self.assertIn(words, told["trouble"])
+        self.assertEqual(mission.all("report")[0]["data"],
+                         {"given": 1, "done": 0, "refused": 1, "failed": 0, "unknown": 0, "open": 0})
+
+    def test_no_strike_aircraft(self):
+        self.check_refused([f"tcp://127.0.0.1:{free_port()}"], "no node answers where it was told to ask (--strike)")
+
+    def test_a_strike_aircraft_without_the_plugin(self):
+        self.check_refused([self.fleet.striker(plugins=[])], "is libcles-strike.so among the plugins of a node?")
+
+    def test_no_weapon_anywhere(self):
+        plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{weapons: 0}}}}"
+        self.check_refused([self.fleet.striker(plugins=[plugin])], "no weapon is left")
+
+    def test_settings_of_a_plugin_that_cannot_be(self):
+        plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{weapons: 5000}}}}"
+        with self.assertRaisesRegex(Trouble, "weapons: 1000 at most"):
+            self.fleet.striker(plugins=[plugin])
+        plugin = f"{{path: {self.fleet.plugin('fmv')}, config: {{streams: 0}}}}"
+        with self.assertRaisesRegex(Trouble, "streams: 1 to 64"):
+            self.fleet.satellite(plugins=[plugin])
+
+    def test_a_port_that_is_taken(self):
+        with socket.create_server(("127.0.0.1", 0)) as holder:
+            at = f"tcp://127.0.0.1:{holder.getsockname()[1]}"
+            code, out, err = run("recon", "--listen", at)
+        self.assertEqual((code, out), (5, ""))
+        self.assertIn(at, err)
+        self.assertIn("in use", err)
+
+    def test_listening_to_everybody_takes_a_word(self):
+        code, _, err = run("recon", "--listen", "tcp://0.0.0.0:0")
+        self.assertEqual(code, 5)
+        self.assertIn("insecure", err)
+
+    def test_wrong_usage(self):
+        for arguments in ([], ["nonsense"], ["recon", "--fps", "0"], ["mission", "--strikes", "0"], ["recon", "--seed", "x"],
+                          ["load", "--streams", "65"], ["mission", "--duration", "-1"]):
+            code, out, err = run(*arguments)
+            self.assertEqual((code, out), (2, ""), arguments)
+            self.assertNotEqual(err, "")
+        for arguments in (["recon", "--satellite", "nonsense"], ["mission", "--recon", "nonsense"]):
+            code, _, err = run(*arguments, *(["--listen", "tcp://127.0.0.1:0"] if arguments[0] == "recon" else []))
+            self.assertEqual(code, 5, arguments)
+            self.assertIn("nonsense", err)
+
+    def test_a_load_of_more_streams_than_are_taken(self):
+        satellite = self.fleet.satellite(plugins=[f"{{path: {self.fleet.plugin('fmv')}, config: {{streams: 2}}}}"])
+        code, out, err = run("load", "--streams", "4", "--duration", "30", "--at", satellite.url)
+        self.assertEqual((code, out), (6, ""), err)
+        self.assertIn("no more streams are taken", err)
+
+    def test_measuring_where_nobody_is(self):
+        at = f"tcp://127.0.0.1:{free_port()}"
+        for what in (["drill", "--count", "1"], ["load", "--streams", "1"]):
+            code, _, err = run(*what, "--at", at)
+            self.assertEqual(code, 5, what)
+            self.assertIn("cles-jadc2: ", err)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "fmv/registration.hpp"
+#include "sgd/random_source.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+namespace {
+
+constexpr fmv::extent size{.width = 96, .height = 80};
+
+// A texture without end, of which pictures show a part.
+std::uint8_t ground(int x, int y) {
+    sgd::random_source chance{static_cast<std::uint64_t>((y + 50) / 3 * 1000 + (x + 50) / 3)};
+    return static_cast<std::uint8_t>(60 + chance.below(120));
+}
+
+fmv::grey picture_from(int left, int top) {
+    fmv::grey out(size.pixels());
+    for (int y = 0; y < size.height; ++y) {
+        for (int x = 0; x < size.width; ++x) {
+            out[size.at(x, y)] = ground(x + left, y + top);
+        }
+    }
+    return out;
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(registration)
+
+BOOST_AUTO_TEST_CASE(each_shift_is_found) {
+    const auto reference = picture_from(0, 0);
+    for (int dy = -fmv::most_shift; dy <= fmv::most_shift; ++dy) {
+        for (int dx = -fmv::most_shift; dx <= fmv::most_shift; ++dx) {
+            BOOST_TEST((fmv::register_with(reference, picture_from(dx, dy), size) == fmv::shift{dx, dy}));
+        }
+    }
+}
+
+BOOST_AUTO_TEST_CASE(what_moves_in_it_does_not_mislead) {
+    auto picture = picture_from(2, -3);
+    for (int y = 20; y < 36; ++y) {
+        for (int x = 30; x < 50; ++x) {
+            picture[size.at(x, y)] = 255;
+        }
+    }
+    BOOST_TEST((fmv::register_with(picture_from(0, 0), picture, size) == fmv::shift{2, -3}));
+}
+
+BOOST_AUTO_TEST_CASE(an_aligned_picture_is_the_reference_again) {
+    const auto reference = picture_from(0, 0);
+    for (const auto by : {fmv::shift{0, 0}, fmv::shift{3, -2}, fmv::shift{-4, 4}}) {
+        auto picture = picture_from(by.dx, by.dy);
+        fmv::align(reference, picture, size, by);
+        BOOST_TEST((picture == reference));
+    }
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/service.hpp>
+
+#include "strike/order.hpp"
+#include "strike/tasks.hpp"
+#include "support/answer.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <string>
+
+namespace {
+
+double now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
+
+struct fixture {
+    fixture() { strike::register_tasks(node, {.weapons = 2, .x = 0, .y = 0, .speed = 100, .oldest_s = 60}); }
+    std::string ask(const std::string& command) {
+        try {
+            return node.request(command);
+        } catch (const cles::error& e) {
+            return e.what();
+        }
+    }
+    std::string give(const strike::order& what) { return ask("DELEGATE self:strike " + cles::to_json(what)); }
+    static strike::order order(const std::string& id) {
+        return {.id = id, .x = 300, .y = 400, .utc = now(), .deadline_ms = 30'000};
+    }
+
+    boost::asio::io_context io;
+    cles::service node{io, {.name = "node"}};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(strike_tasks, fixture)
+
+BOOST_AUTO_TEST_CASE(an_order_is_carried_out) {
+    const auto before = now();
+    const auto out = cles::from_json<strike::outcome>(give(order("o1")));
+    BOOST_TEST(out.node == "node");
+    BOOST_TEST(out.order == "o1");
+    BOOST_TEST(out.aim_x == 300);
+    BOOST_TEST(out.aim_y == 400);
+    BOOST_TEST(out.flight_s == 5);
+    BOOST_TEST(out.impact_utc >= before + 5);
+    BOOST_TEST(out.left == 1U);
+    BOOST_TEST(out.run_ms > 0);
+    BOOST_TEST(ask("PULL self:strike") == R"({"left":1,"orders":["o1"]})");
+}
+
+BOOST_AUTO_TEST_CASE(it_is_aimed_at_where_the_target_will_be) {
+    auto what = order("o1");
+    what.vx = 20;
+    what.utc -= 10; // so long ago was it there
+    const auto out = cles::from_json<strike::outcome>(give(what));
+    BOOST_TEST(std::abs(out.aim_x - (300 + 20 * (10 + out.flight_s))) < 2); // the time that this takes
+    BOOST_TEST(std::abs(std::hypot(out.aim_x, out.aim_y) - 100 * out.flight_s) < 1e-6);
+}
+
+BOOST_AUTO_TEST_CASE(no_order_is_carried_out_twice) {
+    give(order("o1"));
+    BOOST_TEST(give(order("o1")) == "failed: node: the order o1 has been carried out already");
+    BOOST_TEST(ask("PULL self:strike") == R"({"left":1,"orders":["o1"]})");
+}
+
+BOOST_AUTO_TEST_CASE(without_a_weapon_it_is_for_another) {
+    give(order("o1"));
+    give(order("o2"));
+    BOOST_TEST(give(order("o3")) == "busy: node: no weapon is left");
+    BOOST_TEST(ask("PULL self:strike") == R"({"left":0,"orders":["o1","o2"]})");
+}
+
+BOOST_AUTO_TEST_CASE(a_drill_is_all_but_the_release) {
+    auto what = order("o1");
+    what.drill = true;
+    BOOST_TEST(cles::from_json<strike::outcome>(give(what)).flight_s == 5);
+    BOOST_TEST(cles::from_json<strike::outcome>(give(what)).left == 2U);
+    BOOST_TEST(ask("PULL self:strike") == R"({"left":2,"orders":[]})");
+}
+
+BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
+    auto what = order("");
+    BOOST_TEST(give(what) == "bad_request: node: id: 1 to 64 characters");
+    what = order("o1");
+    what.x = std::numeric_limits<double>::infinity();
+    BOOST_TEST(give(what) == "bad_request: node: x, y, vx, vy and utc: numbers");
+    what = order("o1");
+    what.utc -= 100;
+    BOOST_TEST(give(what).starts_with("failed: node: the track is 100."));
+    what.utc += 200;
+    BOOST_TEST(give(what).starts_with("failed: node: the track is -"));
+    what = order("o1");
+    what.vx = 1000;
+    BOOST_TEST(give(what) == "failed: node: the target is too fast");
+    BOOST_TEST(ask("PULL self:strike") == R"({"left":2,"orders":[]})");
+}
+
+BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {
+    for (const auto& wrong :
+         {strike::settings{.weapons = 1001}, strike::settings{.speed = 0}, strike::settings{.oldest_s = -1},
+          strike::settings{.x = std::numeric_limits<double>::quiet_NaN()}}) {
+        boost::asio::io_context other;
+        cles::service there{other, {.name = "there"}};
+        BOOST_CHECK_THROW(strike::register_tasks(there, wrong), cles::error);
+    }
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Runs `scripts/evaluate --quick` over all the sections that there are: that it works, not how fast anything is.
+
+    evaluate_test.py ROOT BUILD
+"""
+
+import json
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from xml.etree import ElementTree
+
+from run_within import run_within
+
+ROOT, BUILD = Path(sys.argv[1]), Path(sys.argv[2])
+sys.path[:0] = [str(ROOT / "perf")]
+from report import figures  # noqa: E402
+
+LIMIT_S = 1680  # less than it has, so that what was started is ended
+
+
+class Quick(unittest.TestCase):
+    def test_every_section_that_there_is_runs(self):
+        with tempfile.TemporaryDirectory(prefix="cles-evaluate-") as folder:
+            done = run_within(LIMIT_S, [sys.executable, "-B", str(ROOT / "scripts" / "evaluate"), "--quick", "--build",
+                                        str(BUILD), "-o", folder])
+            print(done.stderr)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            run = json.loads((Path(folder) / "raw" / "run.json").read_text(encoding="utf-8"))
+            page = ElementTree.parse(Path(folder) / "index.html").getroot()
+            raws = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (Path(folder) / "raw").glob("*.json")}
+        for name, told in run["sections"].items():
+            there = (ROOT / "perf" / "evaluate" / f"{name}.py").exists()
+            if name != "peers":  # which only a build that was asked for has programs for
+                self.assertEqual(told["state"], "ran" if there else "skipped", (name, told))
+            if told["state"] == "ran":
+                with self.subTest(section=name):
+                    self.assertTrue(figures.figures_of(raws[name]) or raws[name].get("rows"), "neither a figure nor a row")
+        self.assertEqual((run["sections"]["bench"]["state"], run["sections"]["dsgd"]["state"]), ("ran", "ran"))
+        for key in ("command", "date", "compiler", "machine"):
+            self.assertTrue(run[key], key)
+        names = {figure["name"] for figure in raws["bench"]["figures"]}
+        for name in ("pull_tcp_ratio", "pull_overhead", "pull_reply_bytes", "parse_typed_growth", "update_tcp_64_p50"):
+            self.assertIn(name, names)
+        text = " ".join("".join(page.itertext()).split())
+        self.assertIn("PULL over a Unix socket, p99", text)
+        self.assertIn("overhead: elapsed less the longest shard's own time", text)
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

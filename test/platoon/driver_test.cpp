@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "platoon/driver.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <cmath>
+
+namespace {
+
+using platoon::role;
+
+constexpr double period = 0.04;
+
+/// v2 behind v1 behind v0, all at 25 m/s. Others tell what they are made to tell.
+struct road {
+    platoon::driver v2{{.name = "v2", .ahead = "v1", .start = {.x = -30, .v = 25, .a = 0}}, 0};
+    platoon::state v0{.mode = role::lead, .lead = "v0", .v = 25};
+    platoon::state v1{.mode = role::follow, .ahead = "v0", .lead = "v0", .behind = 15, .x = -15, .v = 25};
+    std::set<std::string> silent{};
+    double now = 0;
+
+    void drive(double seconds) {
+        for (const double end = now + seconds; now < end - 1e-9; now += period) {
+            for (auto* other : {&v0, &v1}) {
+                other->t = now;
+            }
+            tell("v0", v0);
+            tell("v1", v1);
+            v2.step(now);
+            for (auto* other : {&v0, &v1}) {
+                const auto next = advance(other->where(), other->u, 0.3, period);
+                other->x = next.x;
+                other->v = next.v;
+                other->a = next.a;
+            }
+        }
+    }
+    void tell(const std::string& name, const platoon::state& what) {
+        if (!silent.contains(name)) {
+            v2.take(name, what, now);
+        }
+    }
+};
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(driver)
+
+BOOST_AUTO_TEST_CASE(it_learns_the_leader_from_the_one_ahead) {
+    platoon::driver v2{{.name = "v2", .ahead = "v1"}, 0};
+    BOOST_TEST((v2.wanted() == std::set<std::string>{"v1"}));
+    v2.take("v1", {.ahead = "v0", .lead = "v0", .behind = 15, .x = 15}, 0);
+    BOOST_TEST((v2.wanted() == std::set<std::string>{"v0", "v1"}));
+    BOOST_TEST(v2.report().behind == 30);
+    BOOST_TEST(v2.report().lead == "v0");
+}
+
+BOOST_AUTO_TEST_CASE(the_one_ahead_may_not_know_who_leads) {
+    road all;
+    std::string said;
+    all.v2.on_change = [&](double, role, const std::string& why) { said = why; };
+    all.silent = {"v0"};
+    all.v1.lead.clear();
+    all.drive(2);
+    BOOST_TEST((all.v2.mode() == role::degraded));
+    BOOST_TEST(said == "v1 ahead does not say who leads");
+}
+
+BOOST_AUTO_TEST_CASE(in_its_place_it_does_nothing) {
+    road all;
+    all.drive(3);
+    BOOST_TEST((all.v2.mode() == role::follow));
+    BOOST_TEST(std::abs(all.v2.command()) < 1e-6);
+    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.where().x - 15) < 1e-6);
+}
+
+BOOST_AUTO_TEST_CASE(it_falls_back_when_three_updates_of_the_one_ahead_are_missed) {
+    road all;
+    all.drive(1);
+    all.silent = {"v1"};
+    all.drive(3 * period);
+    BOOST_TEST((all.v2.mode() == role::follow));
+    all.drive(period);
+    BOOST_TEST((all.v2.mode() == role::fallback));
+    BOOST_TEST(all.v2.command() < 0);
+    all.drive(1);
+    BOOST_TEST(all.v2.command() == -4);
+    BOOST_TEST(all.v2.report().lead == "v2"); // those behind are to stop with it
+    all.drive(12);
+    BOOST_TEST(all.v2.where().v == 0);
+    BOOST_TEST((all.v2.report().mode == role::fallback));
+}
+
+BOOST_AUTO_TEST_CASE(an_update_that_comes_after_all_has_cost_next_to_nothing) {
+    road all;
+    all.drive(1);
+    all.silent = {"v1"};
+    all.drive(4 * period);
+    BOOST_TEST((all.v2.mode() == role::fallback));
+    all.silent.clear();
+    all.drive(period);
+    BOOST_TEST((all.v2.mode() == role::follow));
+    BOOST_TEST(std::abs(all.v2.where().v - 25) < 0.01);
+}
+
+BOOST_AUTO_TEST_CASE(without_the_leader_it_follows_the_one_ahead) {
+    road all;
+    all.drive(1);
+    all.silent = {"v0"};
+    all.drive(4 * period);
+    BOOST_TEST((all.v2.mode() == role::degraded));
+    all.v0.u = -5; // which it cannot know
+    all.drive(2);
+    BOOST_TEST((all.v2.mode() == role::degraded));
+    BOOST_TEST(std::abs(all.v2.command()) < 0.01);
+    BOOST_TEST(std::abs(all.v2.where().v - 25) < 0.01);
+}
+
+BOOST_AUTO_TEST_CASE(behind_one_that_falls_back_it_does_not_heed_the_leader) {
+    road all;
+    all.drive(1);
+    all.v1.mode = role::fallback;
+    all.v1.u = -4;
+    all.drive(0.5);
+    BOOST_TEST((all.v2.mode() == role::degraded));
+    BOOST_TEST(all.v2.command() < -1);
+    all.v1.lead = "v1"; // it leads those behind to a halt
+    all.v1.behind = 0;
+    all.drive(0.5);
+    BOOST_TEST((all.v2.mode() == role::follow));
+    BOOST_TEST((all.v2.wanted() == std::set<std::string>{"v1"}));
+    BOOST_TEST(all.v2.report().lead == "v1");
+    all.drive(10);
+    BOOST_TEST(all.v2.where().v < 0.1);
+    BOOST_TEST(all.v1.x - all.v2.where().x > 14);
+}
+
+BOOST_AUTO_TEST_CASE(when_the_one_ahead_leaves_it_follows_the_next_and_closes_up_slowly) {
+    road all;
+    all.drive(1);
+    all.v1.mode = role::leave;
+    all.drive(2 * period);
+    BOOST_TEST((all.v2.wanted() == std::set<std::string>{"v0"}));
+    all.silent = {"v1"};
+    double fastest = 0;
+    for (int i = 0; i < 1000; ++i) {
+        all.drive(period);
+        fastest = std::max(fastest, all.v2.where().v);
+    }
+    BOOST_TEST((all.v2.mode() == role::follow));
+    BOOST_TEST(fastest < 27.5);
+    BOOST_TEST(std::abs(all.v0.x - period * 25 - all.v2.where().x - 15) < 0.05);
+}
+
+BOOST_AUTO_TEST_CASE(when_the_leader_leaves_the_next_one_leads) {
+    platoon::driver v1{{.name = "v1", .ahead = "v0", .start = {.x = -15, .v = 25, .a = 0}}, 0};
+    v1.take("v0", {.mode = role::lead, .lead = "v0", .t = 0, .v = 25}, 0);
+    v1.step(0.01);
+    v1.take("v0", {.mode = role::leave, .lead = "v0", .t = 0.04, .x = 1, .v = 25}, 0.04);
+    v1.step(0.05);
+    BOOST_TEST((v1.mode() == role::lead));
+    BOOST_TEST(v1.wanted().empty());
+    BOOST_TEST(v1.report().lead == "v1");
+    v1.step(20);
+    BOOST_TEST(std::abs(v1.where().v - 25) < 0.1);
+}
+
+BOOST_AUTO_TEST_CASE(where_nobody_is_ahead_after_all_it_brakes) {
+    platoon::driver v1{{.name = "v1", .ahead = "v0", .start = {.x = 0, .v = 25, .a = 0}}, 0};
+    std::string why;
+    v1.on_change = [&](double, role, const std::string& said) { why = said; };
+    double now = 0;
+    for (; now < 0.99; now += 0.01) {
+        v1.step(now);
+        BOOST_TEST_REQUIRE((v1.mode() == role::follow));
+    }
+    for (; now < 12; now += 0.01) {
+        v1.step(now);
+    }
+    BOOST_TEST((v1.mode() == role::fallback));
+    BOOST_TEST(why == "v0 ahead was never heard");
+    BOOST_TEST(v1.where().v == 0);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,57 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""The evaluation, short, and its plots: that all there is to be told is told.
+
+    evaluation_test.py SCRIPTS PROGRAMS
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+import unittest
+import xml.etree.ElementTree
+from pathlib import Path
+
+SCRIPTS, PROGRAMS = Path(sys.argv[1]), sys.argv[2]
+
+
+class Evaluation(unittest.TestCase):
+    def test_it_tells_all_and_draws_it(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "platoon.json"
+            subprocess.run([sys.executable, "-B", SCRIPTS / "platoon.py", "--quick", "--programs", PROGRAMS, "-o", file,
+                            "--plots", folder], check=True, timeout=150)
+            result = json.loads(file.read_text(encoding="utf-8"))
+            plots = list(Path(folder).glob("*/*.svg"))
+            for plot in plots:
+                drawn = xml.etree.ElementTree.parse(plot).getroot()
+                self.assertGreaterEqual(len(drawn.findall(".//{http://www.w3.org/2000/svg}polyline")), 1, plot)
+        self.assertEqual({plot.name for plot in plots}, {"speed.svg", "error.svg", "latency.svg"})
+        self.assertEqual(len(result["simulated"]), 12)
+        figures = {figure["name"]: figure for figure in result["figures"]}
+        self.assertEqual(figures["string_ratio_leader_50"]["value"], result["checks"]["string_ratio"]["50 Hz"])
+        self.assertEqual(figures["nobody_collides"]["reached"], True)
+        self.assertEqual([picture["name"] for picture in result["pictures"]], ["speed", "error", "latency"])
+        for picture in result["pictures"]:
+            xml.etree.ElementTree.fromstring(picture["svg"])
+        self.assertTrue({"title", "date", "command", "machine"} <= result.keys())
+        self.assertTrue(all(len(row["ratios"]) == 2 for row in result["simulated"]))
+        self.assertTrue(result["checks"]["nobody_collides"])
+        self.assertGreater(result["driven"][0]["latency"]["count"], 0)
+        self.assertEqual(result["killed"][0]["killed"], 1)
+        self.assertIn("gone", [event["mode"] for event in result["killed"][0]["events"]])
+
+    def test_a_record_that_is_none(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for text in ("", "{}", "[1]"):
+                file = Path(folder) / "record.json"
+                file.write_text(text, encoding="utf-8")
+                done = subprocess.run([sys.executable, "-B", SCRIPTS / "platoon_plot.py", file, "-o", folder],
+                                      capture_output=True, text=True, check=False)
+                self.assertEqual(done.returncode, 1, text)
+                self.assertRegex(done.stderr, r"^platoon_plot\.py: ")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1])

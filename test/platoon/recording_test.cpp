@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/convert.hpp>
+
+#include "platoon/recording.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <cmath>
+
+namespace {
+
+platoon::recording record_of(const platoon::assessment& judge) {
+    platoon::recording drive{.vehicles = 2, .hz = 25};
+    drive.verdict = judge.result();
+    return drive;
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(recording)
+
+BOOST_AUTO_TEST_CASE(says_how_near_they_came) {
+    platoon::assessment judge{2, 15, 5};
+    judge.sample({{.x = 100}, {.x = 84}});
+    judge.sample({{.x = 100}, {.x = 86}});
+    const auto text = summary_of(record_of(judge));
+    BOOST_TEST(text.find("spacing   1.000 m off at most, behind v0") != text.npos, text);
+    BOOST_TEST(text.find("gap       9.000 m at least\n") != text.npos, text);
+    judge.sample({{.x = 100}, {.x = 95}});
+    BOOST_TEST(judge.result().collision);
+    BOOST_TEST(summary_of(record_of(judge)).find("gap       0.000 m at least: A COLLISION\n") != text.npos);
+}
+
+BOOST_AUTO_TEST_CASE(claims_nothing_of_a_drive_that_nobody_saw) {
+    const platoon::assessment judge{2, 15, 5};
+    BOOST_TEST(!judge.result().collision);
+    const auto text = summary_of(record_of(judge));
+    BOOST_TEST(text.find("gap       not seen") != text.npos, text);
+    BOOST_TEST(text.find("spacing") == text.npos, text);
+    BOOST_TEST(cles::to_json(judge.result()).find(R"("least_gap":null)") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(one_alone_has_no_gap) {
+    BOOST_TEST(std::isnan(platoon::least_gap({{.x = 3}}, 5)));
+    BOOST_TEST(platoon::least_gap({{.x = 3}, {.x = 23}}, 5) == 15);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

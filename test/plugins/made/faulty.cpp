@@ -1,0 +1,114 @@
+// SPDX-License-Identifier: BSL-1.0
+// Plugins that are wrong in one way each, which FAULT_... names, written against the bare C entry point.
+#include <cles/plugin_abi.h>
+
+#include <stdexcept>
+
+#include <unistd.h>
+
+namespace {
+
+constexpr cles_text text_of(const char* text, size_t size) { return {text, size}; }
+
+[[maybe_unused]] int32_t start(const cles_host* host, cles_text) {
+#if defined(FAULT_THROWS_IN_START)
+    (void)host;
+    throw std::runtime_error{"no such device"};
+#elif defined(FAULT_REFUSES)
+    host->refuse(host, text_of("the device is on fire", 21));
+    return 1;
+#elif defined(FAULT_REFUSES_SILENTLY)
+    (void)host;
+    return 1;
+#elif defined(FAULT_BAD_TASKS)
+    cles_task task{};
+    task.size = sizeof task;
+    task.verb = CLES_PULL;
+    task.name = text_of("nothing", 7);
+    if (host->add_task(host, &task) != CLES_BAD_TASK) { // no handler
+        return 2;
+    }
+    task.verb = 17;
+    if (host->add_task(host, &task) != CLES_BAD_TASK) { // no verb
+        return 3;
+    }
+    task = {};
+    task.size = 4;
+    if (host->add_task(host, &task) != CLES_BAD_TASK) { // no name, since the size says so
+        return 4;
+    }
+    return 1;
+#else
+    (void)host;
+    return 0;
+#endif
+}
+
+#if defined(FAULT_WRONG_MAJOR)
+constexpr uint32_t major = CLES_PLUGIN_ABI_MAJOR + 1;
+#else
+constexpr uint32_t major = CLES_PLUGIN_ABI_MAJOR;
+#endif
+#if defined(FAULT_NEWER_MINOR)
+constexpr uint32_t minor = CLES_PLUGIN_ABI_MINOR + 7;
+#else
+constexpr uint32_t minor = CLES_PLUGIN_ABI_MINOR;
+#endif
+#if defined(FAULT_TOO_SHORT)
+constexpr uint32_t size = 8;
+#elif defined(FAULT_LACKS_START)
+constexpr uint32_t size = 32;
+#else
+constexpr uint32_t size = sizeof(cles_plugin);
+#endif
+
+[[maybe_unused]] const cles_plugin description{.size = size,
+                                               .abi_major = major,
+                                               .abi_minor = minor,
+                                               .reserved = 0,
+                                               .name = text_of("faulty", 6),
+                                               .version = text_of("0", 1),
+                                               .start = &start,
+                                               .stop = nullptr};
+
+#if defined(FAULT_THROWS_WHEN_LOADED)
+struct at_load {
+    at_load() { throw std::runtime_error{"thrown by a global object"}; }
+} const loaded;
+#elif defined(FAULT_HANGS_WHEN_LOADED)
+struct at_load {
+    at_load() {
+        for (;;) {
+            pause();
+        }
+    }
+} const loaded;
+#elif defined(FAULT_EXITS_WHEN_LOADED)
+struct at_load {
+    at_load() { _exit(0); }
+} const loaded;
+#endif
+
+} // namespace
+
+#if defined(FAULT_UNDEFINED_SYMBOL)
+extern "C" int cles_test_nobody_has_this();
+#endif
+
+#if defined(FAULT_OTHER_VERSION)
+extern "C" CLES_PLUGIN_EXPORT const cles_plugin* cles_plugin_v2() { return &description; }
+#elif defined(FAULT_NO_ENTRY)
+extern "C" CLES_PLUGIN_EXPORT int something_else() { return 1; }
+#else
+extern "C" CLES_PLUGIN_EXPORT const cles_plugin* cles_plugin_v1() {
+#if defined(FAULT_DESCRIBES_NOTHING)
+    return nullptr;
+#elif defined(FAULT_THROWS_IN_ENTRY)
+    throw std::runtime_error{"not today"};
+#elif defined(FAULT_UNDEFINED_SYMBOL)
+    return cles_test_nobody_has_this() != 0 ? &description : nullptr;
+#else
+    return &description;
+#endif
+}
+#endif

@@ -1,0 +1,148 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""clesd --check, --print-config, and where the configuration comes from."""
+
+import os
+import unittest
+
+from daemon import FAULTY, Folder, clean_environment, clesd
+
+ROOT = os.path.join(os.path.dirname(__file__), "..", "..")
+
+
+class Check(unittest.TestCase):
+    def test_a_configuration_that_can_be_used(self):
+        with Folder() as f:
+            file = f.write("node: sat1\nlisten: tcp://127.0.0.1:0\n")
+            self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used\n", ""))
+
+    def test_a_mistake_is_named_with_file_line_and_key(self):
+        with Folder() as f:
+            file = f.write("node: sat1\nmulticast:\n  prot: 1\n")
+            code, out, err = clesd("--config", file, "--check")
+            self.assertEqual((code, out), (2, ""))
+            self.assertEqual(err, f"clesd: {file}:3: multicast.prot: unknown key; "
+                                  "known here: group, interface, port, required\n")
+
+    def test_a_mistake_keeps_the_daemon_from_starting(self):
+        with Folder() as f:
+            file = f.write("workers: none\n")
+            code, out, err = clesd("--config", file)
+            self.assertEqual((code, out), (2, ""))
+            self.assertEqual(err, f"clesd: {file}:1: workers: 'none' is not a number from 1 to 1024\n")
+
+    def test_a_plugin_that_is_not_there(self):
+        with Folder() as f:
+            missing = f.file("missing.so")
+            file = f.write(f"plugins:\n  - path: {missing}\n")
+            code, out, err = clesd("--config", file, "--check")
+            self.assertEqual((code, out), (2, ""))
+            self.assertEqual(err, f"clesd: {file}:2: plugins[0].path: {missing}: there is no such file\n")
+
+            file = f.write(f"plugins:\n  - path: {missing}\n    required: false\n")
+            code, out, err = clesd("--config", file, "--check")
+            self.assertEqual((code, out), (0, f"{file}: can be used\n"))
+            self.assertIn("is not required", err)
+
+    def test_a_plugin_lies_where_the_file_says_wherever_the_daemon_runs(self):
+        with Folder() as f:
+            f.write("", "plugins/mine.so")
+            file = f.write("plugins: [plugins/mine.so]\n")
+            self.assertEqual(clesd("--config", file, "--check", cwd="/")[0], 0)
+            file = f.write("plugin_path: plugins\nplugins: [mine.so]\n")
+            self.assertEqual(clesd("--config", file, "--check", cwd="/")[0], 0)
+            file = f.write("plugins: [mine.so]\n")
+            self.assertEqual(clesd("--config", file, "--check", cwd="/")[0], 2)
+
+    def test_plugins_are_not_run_by_a_check(self):
+        with Folder() as f:
+            file = f.write(f"plugins:\n  - path: {FAULTY}/hangs_when_loaded.so\n")
+            self.assertEqual(clesd("--config", file, "--check")[0], 0)
+
+    def test_the_configuration_that_comes_along_can_be_used_and_says_the_defaults(self):
+        file = os.path.join(ROOT, "config", "clesd.yaml")
+        self.assertEqual(clesd("--config", file, "--check")[0], 0)
+        with Folder() as f:
+            said = clesd("--config", file, "--print-config", "--node", "a")[1]
+            unsaid = clesd("--config", f.write("# nothing\n"), "--print-config", "--node", "a")[1]
+
+        def values(text):
+            return [line.split("  # ")[0] for line in text.splitlines() if not line.startswith("#")]
+        self.assertEqual(values(said), values(unsaid))
+
+
+class Sources(unittest.TestCase):
+    def print_config(self, *arguments, env=None, cwd=None):
+        code, out, err = clesd("--print-config", *arguments, env=env, cwd=cwd)
+        self.assertEqual((code, err), (0, ""))
+        return out
+
+    def test_what_is_printed_can_be_read_again(self):
+        with Folder() as f:
+            file = f.write("node: sat1\nplugins:\n  - path: /x.so\n    config: {a: [1, 'b']}\n    required: false\n")
+            first = self.print_config("--config", file)
+            again = f.write(first, "again.yaml")
+            second = self.print_config("--config", again)
+            without_origins = [[line.split("  # ")[0] for line in text.splitlines()[1:]] for text in (first, second)]
+            self.assertEqual(*without_origins)
+
+    def test_a_flag_goes_before_the_environment_and_that_before_the_file(self):
+        with Folder() as f:
+            file = f.write("node: from_file\nseeds: [tcp://127.0.0.1:1]\n")
+            self.assertIn(f'node: "from_file"  # {file}:1\n', self.print_config("--config", file))
+            env = clean_environment(CLES_NODE="from_environment", CLES_SEEDS="tcp://127.0.0.1:2,tcp://127.0.0.1:3",
+                                    CLES_LISTEN="tcp://127.0.0.1:4", CLES_LOG="debug,json", CLES_CONFIG=file)
+            out = self.print_config(env=env)
+            self.assertIn('node: "from_environment"  # CLES_NODE\n', out)
+            self.assertIn('seeds: ["tcp://127.0.0.1:2", "tcp://127.0.0.1:3"]  # CLES_SEEDS\n', out)
+            self.assertIn('listen: ["tcp://127.0.0.1:4"]  # CLES_LISTEN\n', out)
+            self.assertIn("log: {level: debug, format: json}  # CLES_LOG\n", out)
+            out = self.print_config("--node", "from_flag", "--seed", "tcp://127.0.0.1:5", env=env)
+            self.assertIn('node: "from_flag"  # --node\n', out)
+            self.assertIn('seeds: ["tcp://127.0.0.1:5"]  # --seed\n', out)
+
+    def test_a_mistake_in_the_environment_names_the_variable(self):
+        code, _, err = clesd("--check", env=clean_environment(CLES_LISTEN="there"))
+        self.assertEqual(code, 2)
+        self.assertTrue(err.startswith("clesd: CLES_LISTEN: "), err)
+
+    def test_the_usual_places(self):
+        with Folder() as f:
+            f.write("node: in_home\n", "home/.config/cles/clesd.yaml")
+            f.write("node: in_xdg\n", "xdg/cles/clesd.yaml")
+            f.write("node: in_folder\n", "here/clesd.yaml")
+            f.write("", "empty/nothing")
+            homeless = clean_environment(HOME=f.file("home"))
+            del homeless["XDG_CONFIG_HOME"]
+            self.assertIn('"in_home"', self.print_config(env=homeless, cwd=f.file("empty")))
+            with_xdg = clean_environment(HOME=f.file("home"), XDG_CONFIG_HOME=f.file("xdg"))
+            self.assertIn('"in_xdg"', self.print_config(env=with_xdg, cwd=f.file("empty")))
+            self.assertIn('"in_folder"', self.print_config(env=with_xdg, cwd=f.file("here")))
+
+    def test_usage(self):
+        code, out, err = clesd("--verbose")
+        self.assertEqual((code, out), (2, ""))
+        self.assertIn("clesd --help", err)
+        self.assertEqual(clesd("--help")[0], 0)
+        self.assertRegex(clesd("--version")[1], r"^clesd \d+\.\d+\.\d+\n$")
+
+
+class Unit(unittest.TestCase):
+    def test_the_unit_file_says_what_the_daemon_does(self):
+        lines = {}
+        with open(os.path.join(ROOT, "config", "clesd.service"), encoding="utf-8") as unit:
+            for line in unit:
+                if "=" in line and not line.startswith("#"):
+                    key, _, value = line.strip().partition("=")
+                    lines[key] = value
+        self.assertEqual(lines["Type"], "notify")
+        self.assertEqual(lines["ExecStart"], "clesd --config /etc/cles/clesd.yaml")
+        self.assertIn("-HUP $MAINPID", lines["ExecReload"])
+        # Longer than a drain takes by default.
+        drain = int(next(line for line in clesd("--print-config")[1].splitlines() if line.startswith("drain: "))
+                    .removeprefix("drain: ").removesuffix("s"))
+        self.assertGreater(int(lines["TimeoutStopSec"].removesuffix("s")), drain + 2)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: BSL-1.0
+"""Some daemons that have found each other, and what their jobs leave behind."""
+
+import collections
+import contextlib
+import json
+import os
+import signal
+
+from daemon import DEFAULTS, Daemon, Folder
+from support import wait_until
+
+COUNTING = os.environ.get("COUNTING_PLUGIN", "")
+
+
+class Fleet:
+    """Nodes sat1, sat2 ..., each of which can be asked for all; sat1 is the others' seed."""
+
+    def __init__(self, count):
+        self.names = [f"sat{i + 1}" for i in range(count)]
+        with contextlib.ExitStack() as opened:
+            self.folder = opened.enter_context(Folder())
+            self.marks_file = self.folder.write("", "marks")
+            self.nodes = {}
+            for name in self.names:
+                self.nodes[name] = opened.enter_context(self.start(name))
+            wait_until(lambda: all(self.live_at(name) == set(self.names) - {name} for name in self.names),
+                       "all know all")
+            self.opened = opened.pop_all()
+
+    def start(self, name):
+        seeds = f"seeds: [{self.nodes['sat1'].url}]\n" if self.nodes else ""
+        return Daemon(f"queue: 8\ndrain: 500ms\nplugins: [{{path: {COUNTING}, config: {{marks: {self.marks_file}}}}}]\n"
+                      + seeds, base=DEFAULTS.replace("sat1", name).replace("level: debug", "level: info"))
+
+    def __getitem__(self, name):
+        return self.nodes[name]
+
+    def peers_at(self, name):
+        return json.loads(self.nodes[name].ask("PULL self:cles/peers"))["peers"]
+
+    def live_at(self, name):
+        return {peer["node"] for peer in self.peers_at(name) if peer["state"] == "live"}
+
+    def kill(self, name):
+        """Returns when it has gone, and the system has closed all that it held."""
+        self.nodes[name].send_signal(signal.SIGKILL)
+        self.nodes[name].process.wait()
+
+    def pause(self, name):
+        """Returns when it has stopped."""
+        process = self.nodes[name].process
+        process.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
+
+    def resume(self, name):
+        self.nodes[name].send_signal(signal.SIGCONT)
+
+    def marks(self):
+        """By number of a job: the nodes where it ran."""
+        with open(self.marks_file, encoding="utf-8") as marks:
+            found = collections.defaultdict(list)
+            for line in marks.read().splitlines():
+                number, node = line.split()
+                found[int(number)].append(node)
+            return found
+
+    def stop(self):
+        """All that live; the codes with which they ended."""
+        return [node.stop()[0] for node in self.nodes.values() if node.process.poll() is None]
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.opened.close()

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSL-1.0
+// A plugin whose jobs leave a mark in a file when they run, "number node" a line, so that a test sees what became of
+// each: also where nobody is left who could have answered. Noun: task/number/milliseconds of work.
+#include <cles/plugin.hpp>
+
+#include <boost/describe/class.hpp>
+
+#include <chrono>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+namespace {
+
+using namespace std::chrono_literals;
+
+struct settings {
+    std::string marks; // the file
+};
+BOOST_DESCRIBE_STRUCT(settings, (), (marks))
+
+class mark_file {
+  public:
+    explicit mark_file(const std::string& path) : file_(::open(path.c_str(), O_WRONLY | O_APPEND | O_CREAT, 0600)) {
+        if (file_ < 0) {
+            throw std::runtime_error{"there is no file for marks"};
+        }
+    }
+    mark_file(const mark_file&) = delete;
+    mark_file& operator=(const mark_file&) = delete;
+    ~mark_file() { ::close(file_); }
+
+    // In one piece, whoever else writes: it is a single write at the end of a file.
+    void leave(const cles::request& asked) const {
+        const auto line = std::string{asked.parameter(0)} + " " + std::string{asked.node()} + "\n";
+        if (::write(file_, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
+            throw std::runtime_error{"the mark was not written"};
+        }
+    }
+
+  private:
+    int file_;
+};
+
+void work(const cles::request& asked) {
+    std::this_thread::sleep_for(std::chrono::milliseconds{asked.parameter<int>(1)});
+}
+
+void register_tasks(cles::registrar& to, const settings& wanted) {
+    const auto marks = std::make_shared<const mark_file>(wanted.marks);
+    const auto count = [marks](const cles::request& asked) {
+        marks->leave(asked);
+        work(asked);
+        return std::string{asked.node()};
+    };
+    to.on_delegate("once", count);
+    to.on_delegate("again", count, {.idempotent = true});
+    to.on_delegate("fails", [marks](const cles::request& asked) {
+        marks->leave(asked);
+        throw std::runtime_error{"as it should"};
+    });
+    // Runs as long as anybody waits for it.
+    to.on_delegate("holds", [marks](const cles::request& asked, const cles::responder& answer) {
+        marks->leave(asked);
+        while (!answer.stopped()) {
+            std::this_thread::sleep_for(2ms);
+        }
+        answer.fail(cles::errc::cancelled, "nobody waits");
+    });
+}
+
+} // namespace
+
+CLES_PLUGIN("counting", "1.0", register_tasks)

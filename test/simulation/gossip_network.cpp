@@ -1,0 +1,419 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/gossip_network.hpp"
+
+#include "core/absence.hpp"
+#include "core/peer_table.hpp"
+#include "protocol/message.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::simulation {
+namespace {
+
+constexpr std::size_t headers = 52;      // of IP and TCP, with time stamps
+constexpr std::size_t segment = 1448;    // what a packet carries besides
+constexpr std::size_t request_head = 64; // "PULL self:cles/peers id=... deadline=2000 since=", and alike
+constexpr std::size_t reply_head = 12;   // "id=... "
+constexpr std::size_t most_known = 2'000;
+constexpr std::chrono::seconds settles{20}; // after a pause, until it is judged again
+
+std::size_t on_the_wire(std::size_t bytes) { return bytes + headers * (1 + bytes / segment); }
+
+// Epochs are random: those of a run of numbers would fall into order.
+std::uint32_t scattered(std::uint32_t n) { return n * 2654435761U; }
+
+} // namespace
+
+struct gossip_network::message {
+    enum class kind : std::uint8_t { ask, table, tell, failure };
+    kind what = kind::ask;
+    std::size_t from = 0;
+    std::uint32_t to_run = 0; // of the receiver, for what answers; 0: whichever
+    std::uint32_t from_run = 0;
+    std::uint64_t ticket = 0;
+    std::string text{};
+    std::string describe{};
+};
+
+/// One node, from its start to its end.
+class gossip_network::member final : public core::announcer::voice,
+                                     public core::gossip::caller,
+                                     public core::presence::watcher {
+  public:
+    member(gossip_network& owner, std::size_t number, std::string name, std::uint32_t epoch)
+        : net(owner), place(number), run_number(epoch),
+          url("tcp://10." + std::to_string(number / 62500) + "." + std::to_string(number / 250 % 250) + "." +
+              std::to_string(number % 250 + 1) + ":25370"),
+          said{.node = std::move(name), .endpoints = {"tcp://0.0.0.0:25370"}, .tasks = "85944171f73967e8"},
+          others_known(said.node, epoch, deadlines, most_known),
+          talk({said.node, protocol::epoch_text(epoch)}, *this, others_known, counts, deadlines, most_known,
+               static_cast<std::uint32_t>(owner.dice_.next())),
+          mouth(*this, deadlines, static_cast<std::uint32_t>(owner.dice_.next())) {
+        said.load.workers = 4;
+        others_known.watch(this);
+    }
+
+    [[nodiscard]] time_point local() const noexcept { return net.now_ + ahead; }
+
+    void begin() {
+        mouth.start(local());
+        deadlines.expire(local()); // it speaks before it asks
+        talk.set_seeds(net.seeds_, local());
+        talk.start(local());
+    }
+
+    void announce(milliseconds interval) override {
+        said.interval = interval;
+        said.load.running = static_cast<std::uint32_t>(net.dice_.below(4));
+        others_known.speak(said, ++seq, local());
+    }
+    [[nodiscard]] std::size_t others() const override { return others_known.size(); }
+
+    void ask(std::uint64_t ticket, std::string_view at, std::string_view since, std::string_view describe) override {
+        post(at, {.what = message::kind::ask,
+                  .ticket = ticket,
+                  .text = std::string{since},
+                  .describe = std::string{describe}});
+        // Where no answer comes, the link's own machine tells so when the time is up.
+        net.schedule(
+            net.now_ + core::gossip::limit, place,
+            std::make_shared<message>(message{.what = message::kind::failure, .to_run = run_number, .ticket = ticket}));
+    }
+    void ask_who(std::uint64_t, std::string_view) override {} // all here know `since`
+    void tell(std::string_view at, std::string_view table) override {
+        post(at, {.what = message::kind::tell, .text = std::string{table}});
+    }
+    void release(std::string_view) override {}
+
+    void on_peer(std::string_view node, core::presence::change what, std::string_view where) override {
+        const auto about = net.by_url_.find(where);
+        const bool lives = about != net.by_url_.end() && net.members_[about->second]->alive;
+        if (what == core::presence::change::gone) {
+            talk.on_gone(node, where, local());
+            net.false_deaths_ += lives ? 1 : 0;
+        } else if (what == core::presence::change::silent) {
+            net.false_suspicions_ += lives && net.members_[about->second]->stopped_until <= net.now_ ? 1 : 0;
+        } else if (what == core::presence::change::clash) {
+            ++net.clashes_;
+        }
+    }
+
+    void post(std::string_view at, message m) {
+        const auto to = net.by_url_.find(at);
+        m.from_run = run_number;
+        if (to != net.by_url_.end()) {
+            net.send(place, to->second, std::move(m));
+        }
+    }
+
+    gossip_network& net;
+    std::size_t place;
+    std::uint32_t run_number;
+    std::string url;
+    core::announcement said;
+    std::uint64_t seq = 0;
+    bool alive = true;
+    time_point stopped_until = time_point::min();
+    std::chrono::nanoseconds ahead{0}; // of its clock
+    std::deque<std::shared_ptr<message>> unread;
+    time_point woken_at = time_point::max();
+    std::size_t bytes = 0;
+    core::absence away;
+    core::counters counts;
+    core::deadline_queue deadlines;
+    core::presence others_known;
+    core::gossip talk;
+    core::announcer mouth;
+};
+
+gossip_network::gossip_network(std::uint64_t seed, gossip_weather weather, planted fault)
+    : dice_(seed), weather_(weather), fault_(fault) {}
+gossip_network::~gossip_network() = default;
+
+std::size_t gossip_network::start(std::size_t count, milliseconds within, std::size_t seeds) {
+    const auto first = members_.size();
+    std::vector<time_point> when;
+    for (std::size_t i = 0; i < count; ++i) {
+        const auto number = first + i;
+        auto m = std::make_unique<member>(*this, number, "vehicle-" + std::to_string(1000 + number),
+                                          scattered(next_epoch_++));
+        by_url_.emplace(m->url, number);
+        if (seeds_.size() < seeds) {
+            seeds_.push_back(m->url);
+        }
+        m->alive = false;
+        members_.push_back(std::move(m));
+        when.push_back(now_ + dice_.within(within));
+    }
+    std::sort(when.begin(), when.end());
+    for (std::size_t i = 0; i < count; ++i) {
+        pass(std::chrono::duration_cast<milliseconds>(when[i] - now_));
+        auto& m = *members_[first + i];
+        m.alive = true;
+        m.begin();
+        wake(m);
+        plan_pause(m.place);
+    }
+    return first;
+}
+
+// -- time ----------------------------------------------------------------------------------------------------------
+
+void gossip_network::schedule(time_point when, std::size_t node, std::shared_ptr<message> what) {
+    events_.push({when, order_++, node, std::move(what)});
+}
+
+// Has its timers run when the next one is due.
+void gossip_network::wake(member& m) {
+    const auto next = m.deadlines.next();
+    if (!m.alive || !next) {
+        return;
+    }
+    m.away.expect(*next, m.local());
+    const auto due = std::max(*next - m.ahead, now_);
+    if (due < m.woken_at) {
+        m.woken_at = due;
+        schedule(due, m.place, nullptr);
+    }
+}
+
+void gossip_network::pass(milliseconds span) {
+    const auto end = now_ + std::max(span, milliseconds{0});
+    while (!events_.empty() && events_.top().when <= end) {
+        begin_pauses(events_.top().when);
+        const auto next = events_.top();
+        events_.pop();
+        now_ = next.when;
+        auto& m = *members_[next.node];
+        if (!m.alive) {
+            continue;
+        }
+        if (next.what) {
+            m.unread.push_back(next.what);
+            deepest_queue_ = std::max(deepest_queue_, m.unread.size());
+        } else if (m.woken_at <= now_) {
+            m.woken_at = time_point::max();
+        }
+        if (m.stopped_until <= now_) {
+            run(m);
+        }
+    }
+    now_ = end;
+}
+
+void gossip_network::run(member& m) {
+    const auto now = m.local();
+    if (m.away.ended(now) && fault_ != planted::excuse_forgotten) {
+        m.others_known.excuse(now);
+    }
+    m.deadlines.expire(now);
+    while (!m.unread.empty()) {
+        const auto what = std::move(m.unread.front());
+        m.unread.pop_front();
+        handle(m, *what);
+    }
+    wake(m);
+}
+
+gossip_network::milliseconds gossip_network::pass_until(const std::function<bool()>& holds, milliseconds limit) {
+    constexpr milliseconds step{500};
+    milliseconds took{0};
+    while (took < limit) {
+        pass(step);
+        took += step;
+        if (holds()) {
+            break;
+        }
+    }
+    return took;
+}
+
+// -- messages ------------------------------------------------------------------------------------------------------
+
+void gossip_network::send(std::size_t from, std::size_t to, message what) {
+    ++messages_;
+    what.from = from;
+    if (passes_ && !passes_(from, to)) {
+        return;
+    }
+    const auto way = weather_.quickest + dice_.within(weather_.slowest - weather_.quickest) +
+                     delay_by_loss(1 + what.text.size() / segment);
+    if (!members_[to]->alive) { // there is nobody: the system there says so
+        if (what.what == message::kind::ask && (!passes_ || passes_(to, from))) {
+            schedule(now_ + way * 2, from,
+                     std::make_shared<message>(
+                         message{.what = message::kind::failure, .to_run = what.from_run, .ticket = what.ticket}));
+        }
+        return;
+    }
+    const auto arrival = now_ + way;
+    schedule(arrival, to, std::make_shared<message>(std::move(what)));
+}
+
+// Streams and requests by datagram alike send again what is lost, first after 200 ms, then at doubling pauses.
+std::chrono::microseconds gossip_network::delay_by_loss(std::size_t packets) {
+    std::chrono::microseconds delay{0};
+    bool lost = false;
+    for (std::size_t i = 0; i < packets && weather_.loss != 0; ++i) {
+        lost |= dice_.chance(weather_.loss);
+    }
+    for (std::chrono::milliseconds pause{200}; lost; pause *= 2) {
+        delay += pause;
+        lost = dice_.chance(weather_.loss);
+    }
+    return delay;
+}
+
+void gossip_network::handle(member& m, message& what) {
+    const auto now = m.local();
+    if (what.to_run != 0 && what.to_run != m.run_number) {
+        return;
+    }
+    switch (what.what) {
+    case message::kind::ask: {
+        m.bytes += on_the_wire(request_head + what.text.size() + what.describe.size());
+        message answer{
+            .what = message::kind::table, .to_run = what.from_run, .from_run = m.run_number, .ticket = what.ticket};
+        json_writer w{answer.text};
+        m.talk.write_news(w, {what.text, what.describe}, 1U << 20U, now);
+        send(m.place, what.from, std::move(answer));
+        break;
+    }
+    case message::kind::table:
+        m.bytes += on_the_wire(reply_head + what.text.size());
+        m.talk.on_answer(what.ticket, what.text, now);
+        break;
+    case message::kind::tell:
+        m.bytes += on_the_wire(request_head + what.text.size());
+        m.talk.on_told(what.text, core::teller::at(members_[what.from]->url), now);
+        break;
+    case message::kind::failure: m.talk.on_failure(what.ticket, now); break;
+    }
+}
+
+// -- what happens to nodes -----------------------------------------------------------------------------------------
+
+void gossip_network::kill(std::size_t node) {
+    members_[node]->alive = false;
+    members_[node]->unread.clear();
+}
+
+void gossip_network::leave(std::size_t node) {
+    members_[node]->talk.stop(members_[node]->local());
+    kill(node);
+}
+
+void gossip_network::restart(std::size_t node) {
+    kill(node);
+    auto& before = members_[node];
+    auto next = std::make_unique<member>(*this, node, before->said.node, scattered(next_epoch_++));
+    next->bytes = before->bytes;
+    buried_.push_back(std::exchange(before, std::move(next)));
+    members_[node]->begin();
+    wake(*members_[node]);
+}
+
+void gossip_network::pause(std::size_t node, milliseconds span) {
+    auto& m = *members_[node];
+    m.stopped_until = now_ + span;
+    schedule(m.stopped_until, node, nullptr);
+}
+
+void gossip_network::jump(std::size_t node, milliseconds ahead) {
+    members_[node]->ahead += ahead;
+    run(*members_[node]);
+}
+
+// Pauses are as long, and as far apart, as makes up their share of time.
+void gossip_network::plan_pause(std::size_t node) {
+    if (weather_.paused == 0) {
+        return;
+    }
+    const auto& w = weather_;
+    const auto mean = (w.shortest_pause + w.longest_pause) / 2;
+    const auto apart = mean * (1000 - w.paused) / w.paused;
+    const auto begins = now_ + dice_.within(apart * 2);
+    const auto lasts = w.shortest_pause + dice_.within(w.longest_pause - w.shortest_pause);
+    pauses_.push({begins, lasts, node});
+}
+
+void gossip_network::begin_pauses(time_point by) {
+    while (!pauses_.empty() && pauses_.top().begins <= by) {
+        const auto next = pauses_.top();
+        pauses_.pop();
+        auto& m = *members_[next.node];
+        m.stopped_until = next.begins + next.lasts;
+        schedule(m.stopped_until, next.node, nullptr);
+        const auto now = std::exchange(now_, m.stopped_until);
+        plan_pause(next.node);
+        now_ = now;
+    }
+}
+
+// -- what came of it -----------------------------------------------------------------------------------------------
+
+std::size_t gossip_network::living() const {
+    return static_cast<std::size_t>(
+        std::count_if(members_.begin(), members_.end(), [](const auto& m) { return m->alive; }));
+}
+
+bool gossip_network::is_steady(const member& m) const { return m.alive && m.stopped_until + settles <= now_; }
+
+std::size_t gossip_network::missing() const {
+    std::size_t lacking = 0;
+    const auto all = static_cast<std::size_t>(
+        std::count_if(members_.begin(), members_.end(), [&](const auto& m) { return is_steady(*m); }));
+    for (const auto& m : members_) {
+        if (!is_steady(*m)) {
+            continue;
+        }
+        std::size_t known = 0;
+        m->others_known.each([&](const core::presence::known& k) {
+            const auto at = by_url_.find(k.where);
+            if (at != by_url_.end()) {
+                const auto& other = *members_[at->second];
+                known += !k.suspect && is_steady(other) && k.epoch == other.run_number ? 1 : 0;
+            }
+        });
+        lacking += all - 1 - known;
+    }
+    return lacking;
+}
+
+bool gossip_network::whole() const { return missing() == 0; }
+
+std::size_t gossip_network::holding(std::size_t node) const {
+    std::size_t count = 0;
+    for (const auto& m : members_) {
+        if (m->alive && m->place != node) {
+            const auto k = m->others_known.look(members_[node]->said.node);
+            count += k && !k->suspect ? 1 : 0;
+        }
+    }
+    return count;
+}
+
+std::size_t gossip_network::suspecting(std::size_t node) const {
+    std::size_t count = 0;
+    for (const auto& m : members_) {
+        if (m->alive && m->place != node) {
+            const auto k = m->others_known.look(members_[node]->said.node);
+            count += k && k->suspect ? 1 : 0;
+        }
+    }
+    return count;
+}
+
+gossip_network::received gossip_network::take_received(milliseconds within) {
+    received r;
+    const double seconds = std::chrono::duration<double>(within).count();
+    for (const auto& m : members_) {
+        const auto rate = static_cast<double>(std::exchange(m->bytes, 0)) / seconds;
+        r.average += rate / static_cast<double>(members_.size());
+        r.most = std::max(r.most, rate);
+    }
+    return r;
+}
+
+} // namespace cles::simulation

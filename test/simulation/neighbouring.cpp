@@ -1,0 +1,294 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/neighbouring.hpp"
+
+#include "core/announcement.hpp"
+#include "protocol/message.hpp"
+#include "simulation/world.hpp"
+
+#include <utility>
+#include <vector>
+
+namespace cles::simulation {
+namespace {
+
+using core::presence;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr milliseconds look_every{400};
+constexpr milliseconds slack{50};
+constexpr seconds until_all_know{10}; // two intervals of 3.5 s for runs that are over, and time to be heard
+constexpr seconds namesake_lives{6};
+
+constexpr milliseconds until_silent(milliseconds interval) { return interval * 7 / 2; }
+constexpr milliseconds until_gone(milliseconds interval) { return interval * 15; }
+
+std::string run_text(std::string_view node, std::uint32_t epoch) {
+    return std::string{node} + " (" + protocol::epoch_text(epoch) + ")";
+}
+
+std::string door_of(unsigned host) {
+    const auto where = to_string(endpoint{host, stream_door});
+    return "tcp://" + where;
+}
+
+} // namespace
+
+neighbouring::~neighbouring() {
+    for (const auto& [host, n] : namesakes_) {
+        n->crash();
+    }
+}
+
+void neighbouring::perform(const action& a) {
+    if (!world_.has_group()) {
+        return;
+    }
+    switch (a.what) {
+    case deed::depart: world_.depart(a["host"], milliseconds{a["down"]}); break;
+    case deed::namesake:
+        begin_namesake(a["host"]);
+        world_.time().at(world_.time().now() + milliseconds{a["for"]},
+                         [this, host = a["host"], silently = a["silent"] != 0] { end_namesake(host, silently); });
+        break;
+    default: break;
+    }
+}
+
+void neighbouring::on_start(node_run&) {
+    if (world_.has_group() && !std::exchange(looking_, true)) {
+        look_at_all();
+    }
+}
+
+void neighbouring::on_crash(node_run& n) { accounts_.erase(&n); }
+
+// -- namesakes -----------------------------------------------------------------------------------------------------
+
+void neighbouring::begin_namesake(unsigned of) {
+    auto& n = namesakes_[of];
+    if (!n) {
+        n = world_.begin_stranger(world::name_of(of), world_.hosts() + of, ++namesake_runs_);
+    }
+}
+
+void neighbouring::end_namesake(unsigned of, bool silently) {
+    const auto found = namesakes_.extract(of);
+    if (!found) {
+        return;
+    }
+    auto& n = *found.mapped();
+    if (!silently) {
+        n.run([&n] { n.seat()->leave(); });
+    }
+    world_.end_stranger(n);
+}
+
+// -- what is heard -------------------------------------------------------------------------------------------------
+
+void neighbouring::on_group_heard(node_run& at, const core::group_source&, std::string_view datagram) {
+    protocol::request_line update;
+    protocol::malformed_request ignored;
+    core::announcement said;
+    std::string why;
+    if (datagram.ends_with('\n')) {
+        datagram.remove_suffix(1);
+    }
+    if (!protocol::parse_request(datagram, update, ignored) || !update.is_update() || update.noun.task != "cles" ||
+        !read_announcement(update, said, why)) {
+        return;
+    }
+    auto& r = accounts_[&at].runs[*update.epoch];
+    if (*update.seq <= r.seq) { // overtaken
+        return;
+    }
+    if (said.leaving) {
+        const auto known = at.node()->others.look(said.node);
+        r.left = known && known->epoch == *update.epoch;
+        r.seq = r.left ? *update.seq : r.seq;
+        return;
+    }
+    r.node = said.node;
+    r.seq = *update.seq;
+    r.at = at.now();
+    r.interval = said.interval;
+}
+
+// Silence counts from the last word, or from when whoever listens was back.
+time_point neighbouring::last_chance(const node_run& n, const heard_run& r) { return std::max(r.at, n.back_since()); }
+
+// -- what is made of it --------------------------------------------------------------------------------------------
+
+void neighbouring::on_neighbour(node_run& at, std::string_view node, presence::change what) {
+    auto& mine = accounts_[&at];
+    const auto known = at.node()->others.look(node);
+    const auto owner = mine.owners.find(node);
+    const auto* before = owner == mine.owners.end() ? nullptr : &mine.runs[owner->second];
+    const auto audible_until = [&](milliseconds (*span)(milliseconds)) {
+        return before == nullptr || before->left ? time_point::min()
+                                                 : last_chance(at, *before) + span(before->interval);
+    };
+    const auto complain_if_heard = [&](time_point until, const char* as) {
+        if (at.now() < until) {
+            complain(rule::nobody_lost, at, "takes " + run_text(node, owner->second) + " for " + as);
+        }
+    };
+    switch (what) {
+    case presence::change::silent: complain_if_heard(audible_until(until_silent), "silent"); break;
+    case presence::change::gone: complain_if_heard(audible_until(until_gone), "gone"); break;
+    case presence::change::left:
+        if (before == nullptr || !before->left) {
+            complain(rule::nobody_lost, at, "says that " + std::string{node} + " has left, which it has not");
+        }
+        break;
+    case presence::change::moved:
+        if (known && owner != mine.owners.end() && known->epoch != owner->second && !mine.silent.contains(node)) {
+            complain_if_heard(audible_until(until_silent), "another");
+        }
+        break;
+    case presence::change::clash: mine.clashes.emplace(node); break;
+    default: break;
+    }
+    mine.silent.erase(std::string{node});
+    if (known && known->suspect) {
+        mine.silent.emplace(node);
+    }
+    if (known) {
+        mine.owners.insert_or_assign(std::string{node}, known->epoch);
+    } else if (what != presence::change::clash) {
+        mine.owners.erase(std::string{node});
+    }
+}
+
+void neighbouring::look_at_all() {
+    if (!looking_) {
+        return;
+    }
+    for (unsigned host = 0; host < world_.hosts(); ++host) {
+        if (auto* n = world_.node(host); n != nullptr && !n->frozen() && !n->was_frozen_until_now()) {
+            look_at(*n);
+        }
+    }
+    world_.time().at(world_.time().now() + look_every, [this] { look_at_all(); });
+}
+
+void neighbouring::look_at(node_run& n) {
+    n.node()->others.each([&](const presence::known& other) { look_at(n, other); });
+}
+
+void neighbouring::look_at(node_run& n, const presence::known& other) {
+    const auto& runs = accounts_[&n].runs;
+    const auto found = runs.find(other.epoch);
+    const auto who = run_text(other.node, other.epoch);
+    if (found == runs.end() || found->second.node != other.node) {
+        complain(rule::gone_in_time, n, "lists " + who + ", whom it has not heard");
+        return;
+    }
+    const auto& r = found->second;
+    const auto since = std::max(r.at, n.thawed_at());
+    if (r.left) {
+        complain(rule::gone_in_time, n, "lists " + who + ", who has left");
+    } else if (n.now() > since + until_gone(r.interval) + slack) {
+        complain(rule::gone_in_time, n, "lists " + who + ", who is silent");
+    } else if (!other.suspect && n.now() > since + until_silent(r.interval) + slack) {
+        complain(rule::gone_in_time, n, "does not suspect " + who + ", who is silent");
+    }
+}
+
+// -- judging -------------------------------------------------------------------------------------------------------
+
+void neighbouring::on_calm() {
+    if (!world_.has_group()) {
+        return;
+    }
+    while (!namesakes_.empty()) {
+        end_namesake(namesakes_.begin()->first, true);
+    }
+    world_.time().at(world_.time().now() + until_all_know, [this] { expect_all_known("soon"); });
+}
+
+void neighbouring::expect_all_known(const char* when) {
+    for (unsigned host = 0; host < world_.hosts(); ++host) {
+        auto& n = *world_.node(host);
+        const auto& others = n.node()->others;
+        for (unsigned other = 0; other < world_.hosts(); ++other) {
+            const auto name = world::name_of(other);
+            const auto known = others.look(name);
+            if (other == host) {
+                continue;
+            }
+            if (!known || known->suspect || protocol::epoch_text(known->epoch) != world_.node(other)->node()->epoch) {
+                complain(rule::others_known, n,
+                         "does not " + std::string{when} + " know " + name + " as it is" +
+                             (known ? ", but as " + run_text(name, known->epoch) : std::string{}));
+            } else if (known->where != door_of(other) || others.find(name) != door_of(other)) {
+                complain(rule::others_known, n, "takes " + name + " to be at " + std::string{known->where});
+            }
+        }
+        if (others.size() >= world_.hosts()) {
+            complain(rule::others_known, n, "knows " + std::to_string(others.size()) + " others");
+        }
+    }
+}
+
+void neighbouring::probe() {
+    if (!world_.has_group()) {
+        return;
+    }
+    expect_all_known("for long");
+    for (auto& [n, mine] : accounts_) {
+        mine.clashes.clear();
+    }
+    begin_namesake(0);
+    world_.time().at(world_.time().now() + namesake_lives, [this] {
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            auto& n = *world_.node(host);
+            if (!accounts_[&n].clashes.contains(world::name_of(0))) {
+                complain(rule::clashes_told, n, "does not say that there is a second " + world::name_of(0));
+            }
+            const auto known = n.node()->others.look(world::name_of(0));
+            if (host != 0 && (!known || protocol::epoch_text(known->epoch) != world_.node(0)->node()->epoch)) {
+                complain(rule::clashes_told, n, "asks a namesake for " + world::name_of(0));
+            }
+        }
+        end_namesake(0, false);
+    });
+}
+
+void neighbouring::judge_probe() {
+    if (!world_.has_group()) {
+        return;
+    }
+    expect_all_known("still");
+    for (unsigned host = 0; host < world_.hosts(); ++host) {
+        const auto& n = *world_.node(host)->node();
+        for (const auto& p : n.others.list(n.time.now())) {
+            if (p.state == peer_state::clash) {
+                complain(rule::clashes_told, *world_.node(host), "still lists a second " + p.node);
+            }
+        }
+    }
+}
+
+void neighbouring::wind_down() {
+    looking_ = false;
+    for (unsigned host = 0; host < world_.hosts(); ++host) {
+        auto* n = world_.node(host);
+        if (n->seat() == nullptr) {
+            continue;
+        }
+        n->run([&] {
+            if (host % 2 == 0) {
+                n->seat()->leave();
+            } else {
+                n->seat()->fall_silent();
+            }
+        });
+    }
+}
+
+void neighbouring::complain(rule which, node_run& at, const std::string& what) {
+    world_.watcher().broken(which, at.name() + " " + what);
+}
+
+} // namespace cles::simulation

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "core/routing.hpp"
+#include "support/recorded_ways.hpp"
+#include "support/session_fixture.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::test {
+
+/// The node car1, which routes for a client on a link; the test plays the other nodes.
+struct routing_fixture {
+    ~routing_fixture() { routing->stop(); }
+
+    /// Another node announces itself.
+    void hear(const std::string& name, const std::string& digest = "d", node_load load = {}) {
+        node.host->others.hear({.node = name, .endpoints = {"tcp://127.0.0.1:1"}, .load = load, .tasks = digest},
+                               run_of(name), ++seq[name], from(name), node.clock.now());
+    }
+    void leave(const std::string& name) {
+        node.host->others.hear({.node = name, .leaving = true}, run_of(name), ++seq[name], from(name),
+                               node.clock.now());
+    }
+    static std::string description(const std::string& name, const std::string& tasks) {
+        return R"({"node":")" + name + R"(","tasks":[)" + tasks + "]}";
+    }
+    static std::string task(const std::string& verb, const std::string& name, bool idempotent = false) {
+        return R"({"verb":")" + verb + R"(","task":")" + name + (idempotent ? R"(","idempotent":true})" : "\"}");
+    }
+    /// Another node is there and has said what it offers. Each has a digest of its own.
+    void offer(const std::string& name, const std::string& tasks, node_load load = {}) {
+        hear(name, "of " + name, load);
+        ways.to(name).answers(description(name, tasks));
+    }
+
+    static std::uint32_t run_of(const std::string& name) {
+        return static_cast<std::uint32_t>(std::hash<std::string>{}(name));
+    }
+    static core::group_source from(const std::string& name) {
+        core::group_source s;
+        s.address = 0x7f000001;
+        s.port = static_cast<std::uint16_t>(1000 + run_of(name) % 50000);
+        return s;
+    }
+
+    /// What the shell does when it is woken.
+    void drain() {
+        node.drain();
+        routing->drain(node.clock.now());
+    }
+
+    test_node node;
+    recorded_ways ways;
+    int wakes = 0;
+    std::shared_ptr<core::routing> routing = std::make_shared<core::routing>(node.host, ways, 7, [this] { ++wakes; });
+    test_link link{node};
+    std::map<std::string, std::uint64_t> seq;
+};
+
+} // namespace cles::test

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/chooser.hpp"
+#include "support/routing_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+#include <vector>
+
+namespace {
+
+struct fixture : cles::test::routing_fixture {
+    cles::core::chooser::chosen choose(const std::string& line, const std::vector<std::string>& asked = {}) {
+        cles::protocol::request_line r;
+        cles::protocol::malformed_request wrong;
+        BOOST_REQUIRE_MESSAGE(cles::protocol::parse_request(line, r, wrong), wrong.why);
+        return routing->choose(r, asked, node.clock.now());
+    }
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(chooser, fixture)
+
+using cles::verb;
+
+BOOST_AUTO_TEST_CASE(whether_it_is_idempotent_comes_with_the_choice) {
+    offer("car2", task("DELEGATE", "work", true) + "," + task("DELEGATE", "drive"));
+    BOOST_TEST(choose("DELEGATE any:work").other->name == "car2");
+    BOOST_TEST(choose("DELEGATE any:work").idempotent);
+    BOOST_TEST(!choose("DELEGATE any:drive").idempotent);
+    node.host->tasks.add(verb::push, "own", {.info = {.idempotent = true}, .plain = [](const auto&, auto&) {}});
+    BOOST_TEST(choose("PUSH any:own").here);
+    BOOST_TEST(choose("PUSH any:own").idempotent);
+}
+
+BOOST_AUTO_TEST_CASE(who_was_asked_is_not_chosen_again) {
+    offer("car2", task("PULL", "speed"));
+    offer("car3", task("PULL", "speed"));
+    BOOST_TEST(choose("PULL any:speed", {"car2"}).other->name == "car3");
+    BOOST_TEST(choose("PULL any:speed", {"car2", "car3"}).nobody());
+    node.on(verb::pull, "speed", "1");
+    BOOST_TEST(choose("PULL any:speed", {"car2", "car3"}).here);
+    BOOST_TEST(choose("PULL any:speed", {"car2", "car3", "car1"}).nobody());
+}
+
+BOOST_AUTO_TEST_CASE(who_is_to_be_avoided_is_chosen_where_there_is_nobody_else) {
+    offer("car2", task("PULL", "speed"));
+    routing->find("car2")->avoid_until = node.clock.now() + std::chrono::seconds{1};
+    BOOST_TEST(choose("PULL any:speed").other->name == "car2");
+    node.on(verb::pull, "speed", "1");
+    for (int i = 0; i < 20; ++i) {
+        BOOST_TEST(choose("PULL any:speed").here);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(this_nodes_load_is_asked_for_each_time) {
+    cles::node_load own{.queued = 50};
+    const auto host = std::make_shared<cles::core::node>(
+        cles::core::node_setup{.name = "hub", .epoch = 1, .load = [&own] { return own; }}, node.clock, [] {});
+    const auto routes = std::make_shared<cles::core::routing>(host, ways, 1, [] {});
+    host->tasks.add(verb::pull, "speed", {.plain = [](const auto&, auto&) {}});
+    host->others.hear({.node = "car2", .endpoints = {"tcp://127.0.0.1:1"}, .load = {.queued = 5}, .tasks = "d"}, 2, 1,
+                      from("car2"), node.clock.now());
+    ways.to("car2").answers(description("car2", task("PULL", "speed")));
+    cles::protocol::request_line r;
+    cles::protocol::malformed_request wrong;
+    BOOST_REQUIRE(cles::protocol::parse_request("PULL any:speed", r, wrong));
+    BOOST_TEST(routes->choose(r, {}, node.clock.now()).other->name == "car2");
+    own.queued = 0;
+    BOOST_TEST(routes->choose(r, {}, node.clock.now()).here);
+    routes->stop();
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/gossip.hpp"
+#include "support/manual_clock.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <set>
+#include <string>
+#include <vector>
+
+namespace {
+
+using namespace std::chrono_literals;
+
+struct fixture : cles::core::gossip::caller, cles::core::presence::watcher {
+    fixture() { others.watch(this); }
+
+    void ask(std::uint64_t ticket, std::string_view url, std::string_view since, std::string_view describe) override {
+        asks.push_back({ticket, std::string{url}, std::string{since}, std::string{describe}});
+    }
+    void ask_who(std::uint64_t ticket, std::string_view url) override {
+        whos.push_back({ticket, std::string{url}, {}, {}});
+    }
+    void tell(std::string_view url, std::string_view table) override { tells[std::string{url}] = table; }
+    void release(std::string_view url) override { released.insert(std::string{url}); }
+    void on_peer(std::string_view node, cles::core::presence::change what, std::string_view where) override {
+        if (what == cles::core::presence::change::gone) {
+            talk.on_gone(node, where, clock.now());
+        }
+    }
+
+    struct asked {
+        std::uint64_t ticket;
+        std::string url;
+        std::string since;
+        std::string describe;
+    };
+    std::vector<asked> take_asks() { return std::exchange(asks, {}); }
+    std::vector<asked> take_asks_within(std::chrono::milliseconds span) {
+        take_asks();
+        pass(span);
+        return take_asks();
+    }
+    void pass(std::chrono::milliseconds by) {
+        for (auto i = 0ms; i < by; i += 5ms) {
+            clock.advance(5ms);
+            deadlines.expire(clock.now());
+        }
+    }
+    void begin(const std::vector<std::string>& seeds = {}) {
+        talk.set_seeds(seeds, clock.now());
+        talk.start(clock.now());
+        deadlines.expire(clock.now());
+    }
+    static std::string url_of(int car) { return "tcp://10.0.0." + std::to_string(car) + ":1"; }
+    static std::string name_of(int car) { return "car" + std::to_string(car); }
+    static std::string entry(int car, int seq = 1) {
+        return R"({"node":")" + name_of(car) + R"(","endpoints":[")" + url_of(car) + R"("],"epoch":"0000000)" +
+               std::to_string(car) + R"(","seq":)" + std::to_string(seq) + R"(,"age_ms":0,"interval_ms":1000})";
+    }
+    static std::string answer(int by, const std::vector<int>& cars, const std::string& more = {}, int seq = 1) {
+        std::string text =
+            R"({"node":")" + name_of(by) + R"(","epoch":"0000000)" + std::to_string(by) + R"(","peers":[)";
+        for (std::size_t i = 0; i < cars.size(); ++i) {
+            text += (i == 0 ? "" : ",") + entry(cars[i], seq);
+        }
+        return text + R"(],"beats":{},"next":"0000000)" + std::to_string(by) + ".4\"" + more + "}";
+    }
+    /// A network of so many whom this node knows, and who answer all that they are asked, for so long.
+    void live_among(int cars, std::chrono::milliseconds span, const std::set<int>& silent = {}) {
+        std::vector<int> all;
+        for (int i = 1; i <= cars; ++i) {
+            if (!silent.contains(i)) {
+                all.push_back(i);
+            }
+        }
+        for (auto i = 0ms; i < span; i += 50ms) {
+            pass(50ms);
+            for (const auto& a : take_asks()) {
+                const int car = a.url[std::string{"tcp://10.0.0."}.size()] - '0';
+                asked_count[car] += 1;
+                if (!silent.contains(car)) {
+                    talk.on_answer(a.ticket, answer(car, all, {}, ++seq), clock.now());
+                } else {
+                    talk.on_failure(a.ticket, clock.now());
+                }
+            }
+        }
+    }
+
+    std::vector<asked> asks;
+    std::vector<asked> whos;
+    std::map<std::string, std::string> tells;
+    std::set<std::string> released;
+    std::map<int, int> asked_count;
+    int seq = 1;
+    cles::test::manual_clock clock;
+    cles::core::deadline_queue deadlines;
+    cles::core::counters counts;
+    cles::core::presence others{"car5", 5, deadlines, 100};
+    cles::core::gossip talk{{"car5", "00000005"}, *this, others, counts, deadlines, 100, 7};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(gossip, fixture)
+
+BOOST_AUTO_TEST_CASE(without_seeds_nobody_is_asked) {
+    begin();
+    BOOST_TEST(take_asks_within(10s).empty());
+}
+
+BOOST_AUTO_TEST_CASE(seeds_are_asked_at_the_start_for_everything) {
+    begin({url_of(1), url_of(2)});
+    const auto all = take_asks();
+    BOOST_REQUIRE(all.size() == 2U);
+    BOOST_TEST(all[0].url == url_of(1));
+    BOOST_TEST(all[0].since == "0");
+    BOOST_TEST(all[1].url == url_of(2));
+}
+
+BOOST_AUTO_TEST_CASE(a_seed_that_fails_is_asked_again) {
+    begin({url_of(1)});
+    for (int i = 0; i < 5; ++i) {
+        const auto all = take_asks();
+        BOOST_REQUIRE(all.size() == 1U);
+        talk.on_failure(all[0].ticket, clock.now());
+        asks.clear();
+        pass(2s);
+        asks.resize(std::min<std::size_t>(asks.size(), 1));
+    }
+    BOOST_TEST(counts.tables_failed == 5U);
+}
+
+BOOST_AUTO_TEST_CASE(names_that_become_known_are_asked_and_again_with_what_they_said_was_next) {
+    begin({url_of(1)});
+    talk.on_answer(take_asks().front().ticket, answer(1, {1, 2}), clock.now());
+    pass(200ms);
+    std::set<std::string> urls;
+    for (const auto& a : take_asks()) {
+        urls.insert(a.url);
+        BOOST_TEST(a.since == "0"); // the seed too, whom it asks as one of them from now on
+        talk.on_answer(a.ticket, answer(a.url == url_of(1) ? 1 : 2, {1, 2}), clock.now());
+    }
+    BOOST_TEST(urls.size() == 2U);
+    pass(300ms);
+    const auto again = take_asks();
+    BOOST_REQUIRE(!again.empty());
+    BOOST_TEST(again[0].since == "0000000" + again[0].url.substr(std::string{"tcp://10.0.0."}.size(), 1) + ".4");
+}
+
+BOOST_AUTO_TEST_CASE(three_are_asked_of_whom_one_is_the_next_by_name) {
+    begin({url_of(1)});
+    live_among(9, 20s);
+    const auto asked = talk.asked();
+    BOOST_TEST(asked.size() == 3U);
+    BOOST_TEST((std::find(asked.begin(), asked.end(), "car6") != asked.end()));
+    BOOST_TEST((std::find(asked.begin(), asked.end(), "car5") == asked.end()));
+    BOOST_TEST(others.size() == 8U);
+}
+
+BOOST_AUTO_TEST_CASE(each_is_asked_every_eighth_of_an_interval_or_a_quarter_among_few) {
+    begin({url_of(1)});
+    live_among(9, 5s);
+    asked_count.clear();
+    live_among(9, 10s);
+    // 125 ms less up to a quarter, on a grid of 50.
+    BOOST_TEST(asked_count[6] >= 50);
+    BOOST_TEST(asked_count[6] <= 110);
+}
+
+BOOST_AUTO_TEST_CASE(chance_chooses_again_when_twice_as_many_are_known) {
+    begin({url_of(1)});
+    live_among(2, 2s); // two others, both of whom are asked
+    asked_count.clear();
+    released.clear();
+    live_among(4, 2s);
+    BOOST_TEST(!released.empty());
+    BOOST_TEST(talk.asked().size() == 3U);
+}
+
+BOOST_AUTO_TEST_CASE(who_is_asked_first_is_told_of_this_node) {
+    others.speak({.node = "car5", .endpoints = {"tcp://0.0.0.0:9"}}, 3, clock.now());
+    begin({url_of(1)});
+    BOOST_TEST(tells[url_of(1)].find(R"("node":"car5","endpoints":["tcp://0.0.0.0:9"],"epoch":"00000005","seq":3)") !=
+               std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_nobody_asks_tells_of_itself) {
+    others.speak({.node = "car5", .endpoints = {"tcp://0.0.0.0:9"}}, 3, clock.now());
+    begin({url_of(1)});
+    live_among(9, 2s);
+    tells.clear();
+    for (int i = 0; i < 10; ++i) {
+        std::string answer;
+        cles::json_writer w{answer};
+        talk.write_news(w, {.since = "0"}, 1U << 16U, clock.now());
+        live_among(9, 200ms);
+    }
+    BOOST_TEST(tells.empty());
+    live_among(9, 1200ms);
+    BOOST_TEST(tells.size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(one_that_fails_twice_is_replaced_and_let_go) {
+    begin({url_of(1)});
+    live_among(9, 5s);
+    released.clear();
+    live_among(9, 1s, {6});
+    const auto asked = talk.asked();
+    BOOST_TEST((std::find(asked.begin(), asked.end(), "car6") == asked.end()));
+    BOOST_TEST((std::find(asked.begin(), asked.end(), "car7") != asked.end())); // the next of the next
+    BOOST_TEST(released.contains(url_of(6)));
+    BOOST_TEST(asked.size() == 3U);
+}
+
+BOOST_AUTO_TEST_CASE(one_that_answers_nothing_at_all_is_given_up_too) {
+    begin({url_of(1)});
+    BOOST_TEST(take_asks().size() == 1U);
+    pass(5s); // even where the link forgets to say so
+    BOOST_TEST(!take_asks().empty());
+}
+
+BOOST_AUTO_TEST_CASE(an_answer_that_comes_late_is_not_read) {
+    begin({url_of(1)});
+    const auto ticket = take_asks().front().ticket;
+    clock.advance(2001ms);
+    talk.on_answer(ticket, answer(1, {1, 2}), clock.now());
+    BOOST_TEST(others.size() == 0U);
+    BOOST_TEST(counts.tables_failed == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_no_table_counts_as_a_failure) {
+    begin({url_of(1)});
+    talk.on_answer(take_asks().front().ticket, R"({"value":7})", clock.now());
+    BOOST_TEST(counts.tables_failed == 1U);
+    talk.on_answer(4711, answer(1, {1}), clock.now()); // nobody asked
+    BOOST_TEST(others.size() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(where_there_is_more_it_is_asked_for_at_once) {
+    begin({url_of(1)});
+    talk.on_answer(take_asks().front().ticket, answer(1, {1}, R"(,"more":true)"), clock.now());
+    const auto again = take_asks_within(5ms);
+    BOOST_REQUIRE(!again.empty());
+    BOOST_TEST(again[0].url == url_of(1));
+    BOOST_TEST(again[0].since == "00000001.4");
+}
+
+BOOST_AUTO_TEST_CASE(a_seed_that_is_this_node_is_not_asked_again) {
+    begin({url_of(5)});
+    talk.on_answer(take_asks().front().ticket, answer(5, {5}), clock.now());
+    BOOST_TEST(others.size() == 0U);
+    BOOST_TEST(take_asks_within(30s).empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_seed_is_asked_again_when_its_node_is_live_no_more) {
+    begin({url_of(1)});
+    live_among(3, 5s);
+    asked_count.clear();
+    live_among(3, 20s, {1}); // gone
+    BOOST_TEST(!others.find("car1").has_value());
+    asked_count.clear();
+    live_among(3, 20s, {1});
+    BOOST_TEST(asked_count[1] >= 5);
+    live_among(3, 5s); // back
+    BOOST_TEST(others.find("car1").has_value());
+}
+
+BOOST_AUTO_TEST_CASE(those_who_have_gone_are_tried_so_that_a_cut_network_heals) {
+    begin();
+    talk.on_told(R"({"peers":[)" + entry(1) + "," + entry(2) + "]}", cles::core::teller::at(url_of(1)), clock.now());
+    live_among(3, 5s);
+    live_among(3, 30s, {2});
+    BOOST_TEST(!others.find("car2").has_value());
+    live_among(1, 20s, {1}); // the rest has gone too: nobody is left, and there are no seeds
+    BOOST_TEST(others.size() == 0U);
+    asked_count.clear();
+    live_among(3, 10s);
+    BOOST_TEST(others.size() == 3U);
+}
+
+BOOST_AUTO_TEST_CASE(a_stranger_who_tells_of_himself_is_asked_once) {
+    begin();
+    BOOST_TEST(talk.on_told(R"({"peers":[)" + entry(1) + "]}", cles::core::teller::at(url_of(1)), clock.now()));
+    const auto all = take_asks_within(200ms);
+    BOOST_TEST(!all.empty());
+    BOOST_TEST(all[0].url == url_of(1));
+    BOOST_TEST(!talk.on_told("[]", cles::core::teller::at(url_of(1)), clock.now()));
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_knows_plain_tables_only_takes_part) {
+    begin({url_of(1)});
+    const std::string plain =
+        R"({"peers":[{"node":"car2","endpoints":["tcp://10.0.0.2:1"],"epoch":"00000002","age_ms":100,"state":"live","load":{}}]})";
+    talk.on_answer(take_asks().front().ticket, plain, clock.now());
+    BOOST_TEST(others.find("car2").has_value());
+    BOOST_REQUIRE(whos.size() == 1U);
+    BOOST_TEST(whos[0].url == url_of(1));
+    talk.on_description(
+        whos[0].ticket,
+        R"({"node":"car1","version":"x","protocol":1,"epoch":"00000001","endpoints":["tcp://0.0.0.0:1"]})",
+        clock.now());
+    BOOST_TEST(std::string{others.find("car1").value_or("nowhere")} == url_of(1));
+    BOOST_TEST(released.empty());
+    // It is one of those who are asked from then on, for its whole table, and not too often.
+    whos.clear();
+    int tables = 0;
+    for (int i = 0; i < 100; ++i) {
+        for (const auto& a : take_asks_within(100ms)) {
+            if (a.url == url_of(1)) {
+                ++tables;
+                BOOST_TEST(a.since == "0");
+                talk.on_answer(a.ticket, plain, clock.now());
+                talk.on_description(
+                    whos.back().ticket,
+                    R"({"node":"car1","version":"x","protocol":1,"epoch":"00000001","endpoints":["tcp://0.0.0.0:1"]})",
+                    clock.now());
+            } else {
+                talk.on_failure(a.ticket, clock.now());
+            }
+        }
+    }
+    BOOST_TEST(tables >= 8);
+    BOOST_TEST(tables <= 25);
+    BOOST_TEST(!others.look("car1")->suspect);
+}
+
+BOOST_AUTO_TEST_CASE(a_description_that_is_missing_is_asked_for) {
+    begin({url_of(1)});
+    live_among(3, 3s);
+    for (const auto& a : take_asks_within(300ms)) {
+        if (a.url == url_of(1)) {
+            talk.on_answer(
+                a.ticket,
+                R"({"node":"car1","epoch":"00000001","peers":[],"beats":{"00000009":[4,0,1000,0,0]},"next":"00000001.9"})",
+                clock.now());
+        }
+    }
+    for (const auto& a : take_asks_within(300ms)) {
+        if (a.url == url_of(1)) {
+            BOOST_TEST(a.since == "00000001.9");
+            BOOST_TEST(a.describe == "00000009");
+            return;
+        }
+    }
+    BOOST_ERROR("car1 was not asked");
+}
+
+BOOST_AUTO_TEST_CASE(who_leaves_tells_those_whom_it_asks) {
+    others.speak({.node = "car5", .endpoints = {"tcp://0.0.0.0:9"}}, 3, clock.now());
+    begin({url_of(1)});
+    live_among(9, 5s);
+    tells.clear();
+    talk.stop(clock.now());
+    BOOST_TEST(tells.size() == 3U);
+    BOOST_TEST(tells.begin()->second.find(R"("seq":4,"age_ms":0)") != std::string::npos);
+    BOOST_TEST(tells.begin()->second.find(R"("state":"left")") != std::string::npos);
+    BOOST_TEST(take_asks_within(10s).empty());
+}
+
+// A link that was let go of for another to the same node could tell nobody of a farewell.
+BOOST_AUTO_TEST_CASE(who_leaves_when_a_seed_has_just_answered_tells_it_by_the_same_link) {
+    others.speak({.node = "car5", .endpoints = {"tcp://0.0.0.0:9"}}, 3, clock.now());
+    begin({url_of(1)});
+    talk.on_answer(take_asks().front().ticket, answer(1, {1}), clock.now());
+    BOOST_TEST(released.empty());
+    tells.clear();
+    talk.stop(clock.now());
+    BOOST_REQUIRE(tells.contains(url_of(1)));
+    BOOST_TEST(tells[url_of(1)].find(R"("state":"left")") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(who_leaves_may_go_on_asking_and_tells_nobody_that_he_is_there) {
+    others.speak({.node = "car5", .endpoints = {"tcp://0.0.0.0:9"}}, 3, clock.now());
+    begin({url_of(1)});
+    live_among(9, 5s);
+    tells.clear();
+    talk.leave(clock.now());
+    BOOST_TEST(tells.size() == 3U);
+    asked_count.clear();
+    live_among(9, 40s); // chance chooses others meanwhile
+    BOOST_TEST(asked_count[6] > 100);
+    BOOST_TEST(others.size() == 8U);
+    for (const auto& [url, told] : tells) {
+        BOOST_TEST(told.find(R"("state":"left")") != std::string::npos, url << " was told " << told);
+    }
+    tells.clear();
+    talk.leave(clock.now());
+    talk.stop(clock.now());
+    BOOST_TEST(tells.empty());
+}
+
+BOOST_AUTO_TEST_CASE(seeds_may_be_changed_while_it_runs) {
+    begin({url_of(1)});
+    take_asks();
+    talk.set_seeds({url_of(2)}, clock.now());
+    const auto all = take_asks_within(5ms);
+    BOOST_REQUIRE(all.size() == 1U);
+    BOOST_TEST(all[0].url == url_of(2));
+}
+
+BOOST_AUTO_TEST_SUITE_END()

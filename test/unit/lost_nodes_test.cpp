@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/lost_nodes.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <set>
+#include <string>
+
+namespace {
+
+using namespace std::chrono_literals;
+
+struct fixture {
+    void hear(const std::string& node, std::uint32_t epoch) {
+        const cles::core::announcement said{.node = node, .endpoints = {"tcp://10.0.0.1:1"}};
+        others.hear(said, epoch, 1, {0x0A000001, 1}, now);
+    }
+    std::string any() {
+        const auto found = lost.any(others, now);
+        return found ? found->name + " " + found->url : "nobody";
+    }
+
+    cles::time_point now{1h};
+    cles::core::deadline_queue deadlines;
+    cles::core::presence others{"me", 0xAAAA, deadlines, 10};
+    cles::core::lost_nodes lost{2, 7};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(lost_nodes, fixture)
+
+BOOST_AUTO_TEST_CASE(nobody_is_lost_at_first) { BOOST_TEST(any() == "nobody"); }
+
+BOOST_AUTO_TEST_CASE(who_has_gone_is_tried_for_an_hour) {
+    lost.add("car1", "tcp://10.0.0.1:1", now);
+    BOOST_TEST(any() == "car1 tcp://10.0.0.1:1");
+    now += 59min;
+    BOOST_TEST(any() == "car1 tcp://10.0.0.1:1");
+    now += 1min;
+    BOOST_TEST(any() == "nobody");
+}
+
+BOOST_AUTO_TEST_CASE(who_is_known_again_is_not_lost) {
+    lost.add("car1", "tcp://10.0.0.1:1", now);
+    hear("car1", 1);
+    BOOST_TEST(any() == "nobody");
+}
+
+BOOST_AUTO_TEST_CASE(who_is_suspect_is_tried_too) {
+    hear("car1", 1);
+    now += 4s;
+    deadlines.expire(now);
+    BOOST_TEST(any() == "car1 tcp://10.0.0.1:1");
+}
+
+BOOST_AUTO_TEST_CASE(who_was_nowhere_cannot_be_tried) {
+    lost.add("car1", "", now);
+    BOOST_TEST(any() == "nobody");
+}
+
+BOOST_AUTO_TEST_CASE(they_are_bounded_and_chosen_by_chance) {
+    for (int i = 1; i <= 4; ++i) {
+        lost.add("car" + std::to_string(i), "tcp://10.0.0.1:1", now);
+    }
+    std::set<std::string> seen;
+    for (int i = 0; i < 50; ++i) {
+        seen.insert(any());
+    }
+    BOOST_TEST(seen.size() == 2U);
+    BOOST_TEST(seen.contains("car4 tcp://10.0.0.1:1"));
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/relayed_bindings.hpp"
+#include "support/routing_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+
+BOOST_FIXTURE_TEST_SUITE(relayed_bindings, cles::test::routing_fixture)
+
+BOOST_AUTO_TEST_CASE(bound_again_a_noun_keeps_its_place_and_has_new_terms) {
+    link.ask("BIND car2:pose id=7");
+    ways.bound("car2:pose").binds("{}");
+    link.take();
+    BOOST_TEST(link.kind("BIND car2:pose id=8 every=1000") == "id=8 ok");
+    BOOST_TEST(link.session().serving().bindings() == 1U);
+    for (int i = 0; i < 3; ++i) {
+        ways.bound("car2:pose").publishes("{\"x\":1}");
+        drain();
+    }
+    BOOST_TEST(link.take_lines().size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(nouns_are_compared_decoded) {
+    link.ask("BIND car2:pose/a%41 id=7");
+    ways.bound("car2:pose/aA").binds("{}");
+    BOOST_TEST(link.sent() == "id=7 ok");
+    BOOST_TEST(link.kind("BIND car2:pose/%61A lease=0 id=8") == "id=8 ok");
+    BOOST_TEST(ways.count_bound() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(with_the_link_all_goes) {
+    link.ask("BIND car2:pose id=7");
+    link.ask("BIND car3:pose id=8");
+    ways.bound("car2:pose").binds("{}");
+    link.reset();
+    ways.bound("car3:pose").binds("{}");
+    BOOST_TEST(ways.count_bound() == 0U);
+    BOOST_TEST(link.session().serving().bindings() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_binding_that_is_withdrawn_before_it_is_answered_is_none) {
+    link.ask("BIND car2:pose id=7");
+    link.ask("PUSH self:cles/cancel/7 reply=no");
+    ways.bound("car2:pose").binds("{}");
+    BOOST_TEST(ways.count_bound() == 0U);
+    link.ask("BIND all:pose id=8");
+    link.take();
+    offer("car3", task("BIND", "pose"));
+    ways.bound("car3:pose").binds("{}");
+    link.ask("BIND all:other id=9");
+    offer("car4", task("BIND", "late"));
+    link.ask("BIND all:late id=10");
+    link.ask("PUSH self:cles/cancel/10 reply=no");
+    ways.bound("car4:late").binds("{}");
+    BOOST_TEST(ways.count_bound() == 1U); // car3:pose
+}
+
+BOOST_AUTO_TEST_SUITE_END()

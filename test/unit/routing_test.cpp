@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/routing.hpp"
+#include "support/routing_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <string>
+
+BOOST_FIXTURE_TEST_SUITE(routing, cles::test::routing_fixture)
+
+using namespace std::chrono_literals;
+using cles::errc;
+using cles::verb;
+
+BOOST_AUTO_TEST_CASE(any_and_all_wait_for_the_first_round) {
+    node.on(verb::pull, "speed", "1");
+    routing->hold();
+    BOOST_TEST(link.ask("PULL any:speed id=7").empty());
+    BOOST_TEST(link.ask("PULL all:speed id=8").empty());
+    routing->release(node.clock.now());
+    BOOST_TEST(link.take() == "id=7 {\"value\":1}\nid=8 {\"results\":{\"car1\":{\"value\":1}},\"errors\":{}}\n");
+}
+
+BOOST_AUTO_TEST_CASE(names_do_not_wait_here) {
+    routing->hold();
+    link.ask("PULL car2:speed id=7");
+    BOOST_TEST(ways.count_open() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(who_was_heard_in_the_first_round_is_asked_after_it) {
+    routing->hold();
+    link.ask("PULL any:speed id=7");
+    hear("car2");
+    routing->release(node.clock.now());
+    BOOST_TEST(link.take().empty()); // what car2 offers is still being asked
+    BOOST_TEST(ways.to("car2").text == "PULL car2:cles");
+    ways.to("car2").answers(description("car2", task("PULL", "speed")));
+    BOOST_TEST(ways.to("car2").text == "PULL car2:speed hops=7 via=car1");
+}
+
+BOOST_AUTO_TEST_CASE(all_waits_until_it_is_known_what_each_offers) {
+    hear("car2", "a");
+    hear("car3", "b");
+    link.ask("PULL all:speed id=7");
+    ways.to("car2").answers(description("car2", task("PULL", "speed")));
+    BOOST_TEST(ways.to("car2").text == "PULL car2:cles");
+    ways.to("car3").fails(errc::deadline, "no answer came in time");
+    BOOST_TEST(ways.to("car2").text == "PULL car2:speed hops=7 via=car1");
+    ways.to("car2").answers("[1]");
+    BOOST_TEST(link.take() == "id=7 {\"results\":{\"car2\":[1]},\"errors\":{}}\n");
+}
+
+BOOST_AUTO_TEST_CASE(any_does_not_wait_for_more_than_one) {
+    offer("car2", task("PULL", "speed"));
+    hear("car3", "b");
+    link.ask("PULL any:speed id=7");
+    BOOST_TEST(ways.to("car2").text == "PULL car2:speed hops=7 via=car1");
+}
+
+BOOST_AUTO_TEST_CASE(what_waits_ends_with_its_deadline_and_its_link) {
+    routing->hold();
+    link.ask("PULL any:speed id=7 deadline=100");
+    link.ask("PULL all:speed id=8");
+    node.pass(100ms);
+    BOOST_TEST(link.sent() == "id=7 deadline");
+    link.reset();
+    routing->release(node.clock.now());
+    BOOST_TEST(link.take().empty());
+    BOOST_TEST(node.counts().handlers_running == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(what_is_for_this_node_is_served_by_it) {
+    node.on(verb::pull, "speed", "1");
+    BOOST_TEST(link.kind("PULL car1:speed") == "ok");
+    BOOST_TEST(link.kind("PULL self:speed") == "ok");
+    BOOST_TEST(ways.count() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(once_stopped_it_routes_no_more) {
+    routing->stop();
+    BOOST_TEST(link.kind("PULL car2:speed") == "no_target");
+    hear("car2");
+    BOOST_TEST(ways.count() == 0U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

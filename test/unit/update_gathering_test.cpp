@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/update_gathering.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+namespace {
+
+constexpr cles::time_point start{std::chrono::seconds{1}};
+constexpr auto longest = cles::core::update_gathering::longest;
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(update_gathering)
+
+BOOST_AUTO_TEST_CASE(updates_wait_while_each_turn_brings_more) {
+    cles::core::update_gathering all;
+    BOOST_TEST(all.waits(1, start));
+    BOOST_TEST(all.waits(2, start));
+    BOOST_TEST(!all.waits(2, start));
+}
+
+BOOST_AUTO_TEST_CASE(never_for_longer_than_a_moment) {
+    cles::core::update_gathering all;
+    BOOST_TEST(all.waits(1, start));
+    BOOST_TEST(all.waits(2, start + longest / 2));
+    BOOST_TEST(!all.waits(3, start + longest));
+}
+
+BOOST_AUTO_TEST_CASE(nor_for_more_than_binders_have_room_for) {
+    cles::core::update_gathering all;
+    all.gone(100);
+    BOOST_TEST(all.waits(100 + all.most - 1, start));
+    BOOST_TEST(!all.waits(100 + all.most, start));
+}
+
+BOOST_AUTO_TEST_CASE(the_time_begins_anew_when_they_have_gone) {
+    cles::core::update_gathering all;
+    BOOST_TEST(all.waits(1, start));
+    BOOST_TEST(!all.waits(2, start + longest));
+    all.gone(2);
+    BOOST_TEST(!all.waits(2, start + longest));
+    BOOST_TEST(all.waits(3, start + longest));
+    BOOST_TEST(!all.waits(4, start + 2 * longest));
+}
+
+BOOST_AUTO_TEST_SUITE_END()
