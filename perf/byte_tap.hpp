@@ -3,7 +3,7 @@
 
 #include <cles/url.hpp>
 
-#include "stream_socket.hpp"
+#include "bare_socket.hpp"
 
 #include <atomic>
 #include <cstdint>

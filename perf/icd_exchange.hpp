@@ -1,24 +1,25 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "bare_socket.hpp"
 #include "localization.hpp"
-#include "stream_socket.hpp"
 
 #include <cstdint>
 
-/// The baseline: a packed struct over a stream, with blocking sockets, as a careful engineer writes it by hand for one
-/// task.
+/// The baseline: a packed struct over a stream or in a datagram, with blocking sockets, as a careful engineer writes it
+/// by hand for one task.
 namespace cles::perf::icd {
 
 class server {
   public:
     explicit server(const url& where) : listener_(listen_on(where)) {}
     [[nodiscard]] const url& where() const noexcept { return listener_.where; }
-    /// Serves one client after the other, for ever.
+    /// Serves one client after the other, for ever; by datagrams all of them.
     [[noreturn]] void run();
 
   private:
     void serve(int client);
+    [[noreturn]] void serve_datagrams();
 
     listener listener_;
     std::uint64_t served_ = 0;

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "bare_socket.hpp"
 #include "fan_out.hpp"
 #include "multicast_socket.hpp"
-#include "stream_socket.hpp"
 
 #include <optional>
 #include <vector>

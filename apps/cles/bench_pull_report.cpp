@@ -67,6 +67,9 @@ std::string table_of(const pull_report& report) {
     if (report.icd_unix) {
         out.add(cells_of("hand-written (unix)", *report.icd_unix));
     }
+    if (report.icd_udp) {
+        out.add(cells_of("hand-written (udp)", *report.icd_udp));
+    }
     out.add(cells_of("CLES (" + report.transport + ")", report.cles));
     if (report.ratio) {
         const auto& ratio = *report.ratio;

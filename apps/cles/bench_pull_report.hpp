@@ -54,12 +54,13 @@ struct pull_report {
     std::optional<std::string> against{};
     std::optional<exchange_figures> icd{};      ///< over TCP
     std::optional<exchange_figures> icd_unix{}; ///< beside CLES over a Unix socket
+    std::optional<exchange_figures> icd_udp{};  ///< beside CLES over UDP
     exchange_figures cles{};
     std::optional<exchange_ratio> ratio{};
 };
 BOOST_DESCRIBE_STRUCT(pull_report, (),
                       (bench, transport, style, in_flight, rounds, requests, busy_poll_us, client_core, server_core,
-                       against, icd, icd_unix, cles, ratio))
+                       against, icd, icd_unix, icd_udp, cles, ratio))
 
 /// Each figure's median over the passes.
 exchange_figures median_of(const std::vector<exchange_figures>& passes);

@@ -157,7 +157,7 @@ pull_report bench_pulls(const bench_options& options) {
 
     // The children come first: before there is anything of ours that they would inherit.
     std::unique_ptr<baseline> by_hand;
-    std::unique_ptr<baseline> by_hand_unix; // what the sockets themselves make of it
+    std::unique_ptr<baseline> by_hand_alike; // over what carries CLES: what the sockets themselves make of it
     std::unique_ptr<perf::child_process> server;
     std::string url = options.against;
     if (!remote) {
@@ -165,7 +165,9 @@ pull_report bench_pulls(const bench_options& options) {
         url = bench_url(options.transport);
     }
     if (!remote && options.transport == carrier::unix_socket) {
-        by_hand_unix = std::make_unique<baseline>(cores.server, url + "-by-hand");
+        by_hand_alike = std::make_unique<baseline>(cores.server, url + "-by-hand");
+    } else if (!remote && options.transport == carrier::udp) {
+        by_hand_alike = std::make_unique<baseline>(cores.server, url);
     }
     if (!remote && !inproc) {
         server =
@@ -198,7 +200,7 @@ pull_report bench_pulls(const bench_options& options) {
     const pass_meter meter{server ? std::optional{server->id()} : std::nullopt};
 
     std::vector<exchange_figures> hand_written;
-    std::vector<exchange_figures> hand_written_unix;
+    std::vector<exchange_figures> hand_written_alike;
     std::vector<exchange_figures> ours;
     pull_report report{.transport = remote ? cles::parse_url(url).scheme : to_string(options.transport),
                        .style = to_string(options.style),
@@ -206,7 +208,7 @@ pull_report bench_pulls(const bench_options& options) {
                        .rounds = options.rounds,
                        .busy_poll_us = options.how.busy_poll.count(),
                        .client_core = cores.client};
-    const std::size_t exchanges = 1U + (by_hand ? 1U : 0U) + (by_hand_unix ? 1U : 0U);
+    const std::size_t exchanges = 1U + (by_hand ? 1U : 0U) + (by_hand_alike ? 1U : 0U);
     bench_progress progress{options.rounds * exchanges};
     for (std::size_t round = 0; round < options.rounds; ++round) {
         if (by_hand) {
@@ -214,10 +216,10 @@ pull_report bench_pulls(const bench_options& options) {
             by_hand->pass(limit, by_hand_warm_up);
             hand_written.push_back(by_hand->pass(limit, by_hand_record));
         }
-        if (by_hand_unix) {
-            progress.step("hand-written exchange over a Unix socket");
-            by_hand_unix->pass(limit, by_hand_warm_up);
-            hand_written_unix.push_back(by_hand_unix->pass(limit, by_hand_record));
+        if (by_hand_alike) {
+            progress.step("hand-written exchange over " + report.transport);
+            by_hand_alike->pass(limit, by_hand_warm_up);
+            hand_written_alike.push_back(by_hand_alike->pass(limit, by_hand_record));
         }
         progress.step("CLES");
         load.run(options.in_flight, limit, warm_up);
@@ -240,8 +242,8 @@ pull_report bench_pulls(const bench_options& options) {
         report.server_core = inproc ? std::nullopt : std::optional{cores.server};
         report.icd = median_of(hand_written);
         report.ratio = ratio_of(report.cles, *report.icd);
-        if (by_hand_unix) {
-            report.icd_unix = median_of(hand_written_unix);
+        if (by_hand_alike) {
+            (options.transport == carrier::udp ? report.icd_udp : report.icd_unix) = median_of(hand_written_alike);
         }
     }
     return report;

@@ -19,6 +19,7 @@ import sys
 import bench_figures
 from clean_environment import clean_environment
 from provenance import command, date, machine
+from result_file import write
 
 PULLS = {"tcp": ["--transport", "tcp"], "udp": ["--transport", "udp"], "unix": ["--transport", "unix"],
          "polling": ["--transport", "tcp", "--busy-poll", "50"]}
@@ -108,12 +109,7 @@ def main():
               "command": command("perf/evaluate/bench.py"), "machine": before, "date": date(),
               "quick": options.quick, "rounds": options.rounds, "skipped": failures,
               "figures": bench_figures.figures(reports), "series": bench_figures.series(reports)}
-    text = json.dumps(result, indent=1)
-    if options.output == "-":
-        print(text)
-    else:
-        with open(options.output, "w", encoding="utf-8") as file:
-            file.write(text + "\n")
+    write(result, options.output)
     for failure in failures:
         print(f"bench.py: {failure['what']}: {failure['reason']}", file=sys.stderr)
     return 1 if failures else 0

@@ -24,6 +24,7 @@ from clean_environment import clean_environment
 from interval import interval_over, quantile
 from linked_hosts import LinkedHosts, OneHost, why_not
 from provenance import command, date, machine
+from result_file import write
 
 COUNT_LINES = Path(__file__).parent.parent / "effort" / "count_lines.py"
 WANTED_RATIO, WANTED_ONE_WAY, WANTED_BYTES, WANTED_LINES = 1.10, 0.6, 132, 30
@@ -253,12 +254,7 @@ def main():
               "quick": options.quick, "skipped": skipped,
               "links": {name: meaning for name, meaning, *_ in LINKS if name in links},
               "figures": figures.found, "series": series_of(loopback, links)}
-    text = json.dumps(result, indent=1)
-    if options.output == "-":
-        print(text)
-    else:
-        with open(options.output, "w", encoding="utf-8") as file:
-            file.write(text + "\n")
+    write(result, options.output)
     return 0
 
 

@@ -19,6 +19,7 @@ import sys
 
 from peers_rows import MEASURES, PEERS, rows_of, table_of
 from provenance import command, date, machine
+from result_file import write
 
 NOT_OFFERED = 77
 LONGEST_RUN_S = 300
@@ -135,12 +136,7 @@ def main():
         for each in skipped:
             print(f"without {each['name']}: {each['reason']}")
     if options.output:
-        text = json.dumps(result, indent=1) + "\n"
-        if options.output == "-":
-            print(text, end="")
-        else:
-            with open(options.output, "w", encoding="utf-8") as file:
-                file.write(text)
+        write(result, options.output)
     return 1 if failed else 0
 
 

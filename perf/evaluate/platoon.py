@@ -3,12 +3,12 @@
 """Measures a platoon: whether errors grow along it, in virtual time from many seeds, and how long updates take when each
 vehicle is a process.
 
-    platoon.py [--programs build/release/apps] [--seeds 20] [--vehicles 20] [--seconds 60] [--quick] [-o FILE]
-               [--plots FOLDER]
+    platoon.py [--programs build/release/apps] [--seeds 20] [--vehicles 20] [--seconds 60] [--drives 5] [--quick]
+               [-o FILE] [--plots FOLDER]
 
 Writes JSON: the string ratio at 10, 25 and 50 Hz, without loss and at 10 %, and of a controller that does not heed the
-leader; drives of processes at those rates with the string ratio, the least gap and the latencies of updates; a drive in
-which the leader, one in the middle, or the last is killed.
+leader; drives of processes at those rates with the string ratio, the least gap and the latencies of updates, at 50 Hz several
+in turn, of which the median counts; a drive in which the leader, one in the middle, or the last is killed.
 """
 
 import argparse
@@ -16,6 +16,7 @@ import json
 import os
 import signal
 import socket
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -23,6 +24,7 @@ from pathlib import Path
 
 import platoon_plot
 from provenance import command, date, machine
+from result_file import write
 
 MOST_RATIO, MOST_P999_MS, BUDGET_MS = 1.02, 2, 100
 
@@ -73,21 +75,30 @@ def driven(program, vehicles, seconds, record, *more):
 
 def checks_of(rows, drives, kills):
     lossy = [row for row in rows if row["loss_percent"] == 10]
-    fast = [d for d in drives if d["hz"] == 50]
+    fast = fastest(drives)
     return {"string_ratio": {f"{row['hz']} Hz": row["string_ratio"] for row in lossy if row["controller"] == "leader"},
             "string_ratio_wanted": MOST_RATIO,
             "string_ratio_reached": {f"{row['hz']} Hz": row["string_ratio"] <= MOST_RATIO
                                      for row in lossy if row["controller"] == "leader"},
             "without_leader_fails": all(row["string_ratio"] > MOST_RATIO
                                         for row in lossy if row["controller"] == "predecessor"),
-            "p999_ms_at_50_hz": [d["latency"]["p999_us"] / 1e3 for d in fast], "p999_ms_wanted": MOST_P999_MS,
-            "p999_reached": all(d["latency"]["p999_us"] / 1e3 <= MOST_P999_MS for d in fast),
+            "p999_ms_at_50_hz": fast, "p999_ms_wanted": MOST_P999_MS,
+            "p999_reached": all(statistics.median(found) <= MOST_P999_MS for found in fast.values()),
             "nobody_collides": not any(r["collision"] for r in [*rows, *drives, *kills] if r.get("controller") != "predecessor"),
             "over_budget": sum(d["latency"]["late"] for d in drives)}
 
 
-def figure(name, what, value, unit="", runs=1, target=None, reached=None):
-    return {"name": name, "what": what, "value": value, "low": None, "high": None, "runs": runs, "unit": unit,
+def fastest(drives):
+    """Of each loss in percent, the drives' p99.9 in ms at 50 Hz, by size."""
+    found = {}
+    for drive in drives:
+        if drive["hz"] == 50:
+            found.setdefault(f"{drive['loss_percent']:g}", []).append(drive["latency"]["p999_us"] / 1e3)
+    return {loss: sorted(each) for loss, each in found.items()}
+
+
+def figure(name, what, value, unit="", runs=1, target=None, reached=None, low=None, high=None):
+    return {"name": name, "what": what, "value": value, "low": low, "high": high, "runs": runs, "unit": unit,
             "paper": None, "target": target, "reached": reached}
 
 
@@ -104,11 +115,11 @@ def figures_of(checks, rows, drives):
                      reached=checks["string_ratio_reached"][f"{row['hz']} Hz"] if heeds else None)
     yield figure("without_leader_fails", f"without the leader the ratio is above {MOST_RATIO:g} at each rate",
                  "yes" if checks["without_leader_fails"] else "no", target="yes", reached=checks["without_leader_fails"])
-    for drive in (d for d in drives if d["hz"] == 50):
-        p999 = drive["latency"]["p999_us"] / 1e3
-        yield figure(f"p999_50_hz_{drive['loss_percent']:g}", "an update from one process to another, p99.9, at 50 Hz with "
-                     f"{drive['loss_percent']:g} % lost", p999, "ms", target=f"\u2264 {MOST_P999_MS:g}",
-                     reached=p999 <= MOST_P999_MS)
+    for loss, found in checks["p999_ms_at_50_hz"].items():
+        p999 = statistics.median(found)
+        yield figure(f"p999_50_hz_{loss}", f"an update from one process to another, p99.9, at 50 Hz with {loss} % lost, of all "
+                     "drives the median, the least and the most", p999, "ms", runs=len(found),
+                     target=f"\u2264 {MOST_P999_MS:g}", reached=p999 <= MOST_P999_MS, low=found[0], high=found[-1])
     yield figure("over_budget", f"updates between processes that took more than {BUDGET_MS} ms", checks["over_budget"],
                  runs=len(drives), target="0", reached=checks["over_budget"] == 0)
     yield figure("nobody_collides", "nobody collides in any drive with the leader heeded",
@@ -128,30 +139,31 @@ def main():
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--vehicles", type=int, default=20)
     parser.add_argument("--seconds", type=int, default=60, help="of each drive of processes")
+    parser.add_argument("--drives", type=int, default=5, help="of processes, at 50 Hz with each loss")
     parser.add_argument("--quick", action="store_true", help="small and short: that it works, not how fast")
     parser.add_argument("--plots", help="a folder for plots of the drives")
     parser.add_argument("-o", "--output", default="-")
     options = parser.parse_args()
     if options.quick:
-        options.seeds, options.vehicles, options.seconds = 2, 4, 8
+        options.seeds, options.vehicles, options.seconds, options.drives = 2, 4, 8, 1
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     program = os.path.join(options.programs, "cles-platoon")
     before = machine()  # while nothing of ours runs
     print("platoon: in virtual time", file=sys.stderr, flush=True)
     rows = simulated(program, options.vehicles, options.seeds)
     drives, pictures = [], []
-    for hz in (50,) if options.quick else (10, 25, 50):
-        for loss in (10,) if options.quick else (0, 10):
-            print(f"platoon: processes at {hz} Hz, {loss} % lost", file=sys.stderr, flush=True)
-            with tempfile.TemporaryDirectory() as passing:
-                folder = Path(options.plots) / f"{hz}hz_{loss}_percent" if options.plots else Path(passing)
-                folder.mkdir(parents=True, exist_ok=True)
-                file = folder / "record.json"
-                drives.append(driven(program, options.vehicles, options.seconds, file, "--hz", hz, "--loss", loss))
-                record = json.loads(file.read_text(encoding="utf-8"))
-            if options.plots:
-                platoon_plot.draw(record, folder)
-            pictures = pictures_of(record)  # of the last, the most frequent with losses
+    slower = [] if options.quick else [(hz, loss) for hz in (10, 25) for loss in (0, 10)]
+    for hz, loss in slower + [(50, loss) for _ in range(options.drives) for loss in ((10,) if options.quick else (0, 10))]:
+        print(f"platoon: processes at {hz} Hz, {loss} % lost", file=sys.stderr, flush=True)
+        with tempfile.TemporaryDirectory() as passing:
+            folder = Path(options.plots) / f"{hz}hz_{loss}_percent" if options.plots else Path(passing)
+            folder.mkdir(parents=True, exist_ok=True)
+            file = folder / "record.json"
+            drives.append(driven(program, options.vehicles, options.seconds, file, "--hz", hz, "--loss", loss))
+            record = json.loads(file.read_text(encoding="utf-8"))
+        if options.plots:
+            platoon_plot.draw(record, folder)
+        pictures = pictures_of(record)  # of the last, the most frequent with losses
     last = options.vehicles - 1
     kills = [{"killed": who, **driven(program, options.vehicles, 8 if options.quick else 25, None, "--hz", 25,
                                       "--vanish", f"{who}@4")}
@@ -161,12 +173,7 @@ def main():
               "driven": drives, "killed": kills, "checks": checks, "quick": options.quick, "machine": before,
               "figures": list(figures_of(checks, rows, drives)), "pictures": pictures, "date": date(),
               "command": command("perf/evaluate/platoon.py")}
-    text = json.dumps(result, indent=1)
-    if options.output == "-":
-        print(text)
-    else:
-        with open(options.output, "w", encoding="utf-8") as file:
-            file.write(text + "\n")
+    write(result, options.output)
     return 0
 
 

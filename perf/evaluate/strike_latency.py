@@ -29,6 +29,7 @@ from clean_environment import clean_environment
 from in_one_piece import InOnePiece
 from interval import summary
 from provenance import command, date, machine
+from result_file import write
 
 WANTED = 2.0
 
@@ -171,12 +172,7 @@ def main():
               "quick": options.quick, "orders": options.orders, "streams": options.streams, "workers": options.workers,
               "real_time": options.real_time, "figures": figures(idle, loaded, loads),
               "rounds": {"idle": idle, "loaded": loaded, "load": loads}}
-    text = json.dumps(result, indent=1)
-    if options.output == "-":
-        print(text)
-    else:
-        with open(options.output, "w", encoding="utf-8") as file:
-            file.write(text + "\n")
+    write(result, options.output)
     return 0
 
 

@@ -3,9 +3,9 @@
 
 #include <cles/service.hpp>
 
+#include "perf/bare_socket.hpp"
 #include "perf/icd_exchange.hpp"
 #include "perf/icd_packet.hpp"
-#include "perf/stream_socket.hpp"
 #include "timed_sample.hpp"
 
 #include <boost/asio/awaitable.hpp>

@@ -3,10 +3,10 @@
 
 #include <cles/service.hpp>
 
+#include "perf/bare_socket.hpp"
 #include "perf/icd_exchange.hpp"
 #include "perf/icd_packet.hpp"
 #include "perf/pull_exchange.hpp"
-#include "perf/stream_socket.hpp"
 #include "timed_sample.hpp"
 
 #include <boost/asio/awaitable.hpp>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "ordered_fan_out.hpp"
 
-#include "perf/stream_socket.hpp"
+#include "perf/bare_socket.hpp"
 #include "perf/wait_until.hpp"
 
 #include <array>

@@ -1,12 +1,40 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The picture of Table 2: how long each row took, beside the paper's."""
+"""The pictures of distributed stochastic gradient descent: Table 2, how long each row took, beside the paper's; the data
+set with its classifier, and the same where the classes meet (Figs. 5 and 6)."""
 
 from .gnuplot import block, draw
 
 
 def kinds(raw, note):
-    return [("dsgd", "Distributed stochastic gradient descent, elapsed time of each row of Table 2: medians with their 95 % "
+    shown = [("dsgd", "Distributed stochastic gradient descent, elapsed time of each row of Table 2: medians with their 95 % "
              "intervals, and what the paper's machines took. The paper does not say how many steps it counts: compare rows.", lambda: elapsed(raw, note))]
+    if "pictured" in raw:
+        data = raw["pictured"]
+        shown += [
+            ("data_set", f"Data set with classifier (the paper's Fig. 5): {len(data['some'])} of {data['of']} points, evenly "
+             "drawn, and the line that the shards' averaged classifier parts them by.",
+             lambda: data_set("data_set", data, data["some"], None, note)),
+            ("data_set_zoomed", "The same where the classes meet (the paper's Fig. 6), with every point there.",
+             lambda: data_set("data_set_zoomed", data, data["near"], data["box"], note))]
+    return shown
+
+
+def data_set(name, data, points, half_a_side, note):
+    (a, b), bias = data["classifier"]["weights"], data["classifier"]["bias"]
+    wrong = sum((a * x + b * y + bias > 0.5) != bool(of_class) for x, y, of_class in points)
+    within = f"[{-half_a_side}:{half_a_side}]" if half_a_side else "[-7:7]"
+    return draw(name, "".join(block(f"class{k}", [(x, y) for x, y, of_class in points if of_class == k]) for k in (0, 1))
+                + f"""set xrange {within}
+set yrange {within}
+set size ratio 1
+set xlabel 'x'
+set ylabel 'y'
+set key outside right top Left reverse samplen 2
+set title '{len(points)} points, {wrong} of them on the wrong side' font 'sans-serif,12'
+plot $class0 using 1:2 with points pointtype 7 pointsize {0.35 if half_a_side else 0.22} linecolor '#0072b2' title 'class 0', \\
+     $class1 using 1:2 with points pointtype 9 pointsize {0.4 if half_a_side else 0.26} linecolor '#d55e00' title 'class 1', \\
+     (0.5 - {bias!r} - {a!r} * x) / {b!r} with lines linewidth 2 linecolor '#222222' title 'classifier'
+""", 620, 480, note)
 
 
 def elapsed(raw, note):

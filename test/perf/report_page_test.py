@@ -218,6 +218,17 @@ class Pictures(unittest.TestCase):
         self.assertIn("p99 of the saturated node, to the idle one", words(root))
         self.assertIn("Left out: what is not allowed here", words(root))
 
+    def test_the_data_set_is_drawn_with_its_classifier(self):
+        sample = json.loads((SAMPLES / "dsgd.json").read_text(encoding="utf-8"))
+        sample["pictured"] = {"of": 4, "box": 1, "classifier": {"weights": [0.1, 0.1], "bias": 0.5},
+                              "some": [[-2, -2, 0], [2, 2, 1], [-1, -3, 1]], "near": [[-0.5, -0.5, 0], [0.5, 0.5, 1]]}
+        folder = Folder(self, dsgd=sample)
+        self.assertEqual(evaluate("--from", folder.raw, "-o", folder.out).returncode, 0)
+        root = ElementTree.fromstring(folder.page())
+        shown = {each.get("id"): words(each) for each in root.iter("{http://www.w3.org/1999/xhtml}figure")}
+        self.assertIn("3 points, 1 of them on the wrong side", shown["picture-data_set"])
+        self.assertIn("2 points, 0 of them on the wrong side", shown["picture-data_set_zoomed"])
+
     def test_they_say_what_they_show(self):
         folder = Folder(self)
         self.assertEqual(evaluate("--from", folder.raw, "-o", folder.out).returncode, 0)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "stream_socket.hpp"
+#include "bare_socket.hpp"
 
 #include <cstring>
 #include <memory>
@@ -17,6 +17,7 @@ namespace cles::perf {
 namespace {
 
 constexpr int stream = SOCK_STREAM | SOCK_CLOEXEC;
+constexpr int datagrams = SOCK_DGRAM | SOCK_CLOEXEC;
 
 sockaddr_in address_of(const url& where) {
     sockaddr_in address{};
@@ -35,17 +36,23 @@ void tune(const descriptor& socket) {
     checked(::setsockopt(socket.get(), SOL_SOCKET, SO_KEEPALIVE, &on, sizeof on), "SO_KEEPALIVE");
 }
 
-descriptor connect_tcp(const url& where) {
+descriptor connect_internet(const url& where) {
+    const bool udp = where.scheme == "udp";
     addrinfo hints{};
-    hints.ai_socktype = SOCK_STREAM;
+    hints.ai_socktype = udp ? SOCK_DGRAM : SOCK_STREAM;
     addrinfo* found = nullptr;
     const int code = ::getaddrinfo(where.host.c_str(), std::to_string(where.port).c_str(), &hints, &found);
     if (code != 0) {
         throw std::runtime_error(to_string(where) + ": " + ::gai_strerror(code));
     }
     const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses{found, &::freeaddrinfo};
-    descriptor socket{checked(::socket(found->ai_family, stream, 0), "socket")};
-    tune(socket);
+    descriptor socket{checked(::socket(found->ai_family, udp ? datagrams : stream, 0), "socket")};
+    if (udp) {
+        const timeval silence{.tv_sec = 1, .tv_usec = 0};
+        checked(::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &silence, sizeof silence), "SO_RCVTIMEO");
+    } else {
+        tune(socket);
+    }
     checked(::connect(socket.get(), found->ai_addr, found->ai_addrlen), "connect");
     return socket;
 }
@@ -76,13 +83,16 @@ descriptor connect_unix(const url& where) {
     return socket;
 }
 
-listener listen_tcp(const url& where) {
-    listener made{descriptor{checked(::socket(AF_INET, stream, 0), "socket")}, where};
+listener listen_internet(const url& where) {
+    const bool udp = where.scheme == "udp";
+    listener made{descriptor{checked(::socket(AF_INET, udp ? datagrams : stream, 0), "socket")}, where};
     auto address = address_of(where);
     socklen_t length = sizeof address;
     auto* generic = reinterpret_cast<sockaddr*>(&address);
     checked(::bind(made.socket.get(), generic, length), "bind");
-    checked(::listen(made.socket.get(), SOMAXCONN), "listen");
+    if (!udp) {
+        checked(::listen(made.socket.get(), SOMAXCONN), "listen");
+    }
     checked(::getsockname(made.socket.get(), generic, &length), "getsockname");
     made.where.port = ntohs(address.sin_port);
     return made;
@@ -99,13 +109,13 @@ listener listen_unix(const url& where) {
 } // namespace
 
 listener listen_on(const url& where) {
-    if (where.scheme == "tcp") {
-        return listen_tcp(where);
+    if (where.scheme == "tcp" || where.scheme == "udp") {
+        return listen_internet(where);
     }
     if (where.scheme == "unix") {
         return listen_unix(where);
     }
-    throw std::runtime_error(to_string(where) + ": neither tcp nor unix");
+    throw std::runtime_error(to_string(where) + ": none of tcp, udp and unix");
 }
 
 descriptor accept_from(const listener& at) {
@@ -117,13 +127,13 @@ descriptor accept_from(const listener& at) {
 }
 
 descriptor connect_to(const url& where) {
-    if (where.scheme == "tcp") {
-        return connect_tcp(where);
+    if (where.scheme == "tcp" || where.scheme == "udp") {
+        return connect_internet(where);
     }
     if (where.scheme == "unix") {
         return connect_unix(where);
     }
-    throw std::runtime_error(to_string(where) + ": neither tcp nor unix");
+    throw std::runtime_error(to_string(where) + ": none of tcp, udp and unix");
 }
 
 void send_all(int socket, std::span<const std::byte> bytes) {
