@@ -12,35 +12,39 @@ constexpr auto longest = cles::core::update_gathering::longest;
 
 BOOST_AUTO_TEST_SUITE(update_gathering)
 
-BOOST_AUTO_TEST_CASE(updates_wait_while_each_turn_brings_more) {
+BOOST_AUTO_TEST_CASE(one_alone_goes_at_once) {
     cles::core::update_gathering all;
-    BOOST_TEST(all.waits(1, start));
+    BOOST_TEST(!all.waits(1, start));
+    all.gone(1, start);
+    BOOST_TEST(!all.waits(2, start + longest));
+    all.gone(2, start + longest);
+    BOOST_TEST(!all.waits(2, start + longest)); // and where there is none, none waits
+}
+
+BOOST_AUTO_TEST_CASE(behind_others_they_wait_while_each_turn_brings_more) {
+    cles::core::update_gathering all;
+    all.gone(1, start);
     BOOST_TEST(all.waits(2, start));
-    BOOST_TEST(!all.waits(2, start));
+    BOOST_TEST(all.waits(3, start));
+    BOOST_TEST(!all.waits(3, start));
 }
 
 BOOST_AUTO_TEST_CASE(never_for_longer_than_a_moment) {
     cles::core::update_gathering all;
+    all.gone(0, start);
     BOOST_TEST(all.waits(1, start));
     BOOST_TEST(all.waits(2, start + longest / 2));
     BOOST_TEST(!all.waits(3, start + longest));
+    all.gone(3, start + longest);
+    BOOST_TEST(all.waits(4, start + longest));
+    BOOST_TEST(!all.waits(5, start + 2 * longest));
 }
 
 BOOST_AUTO_TEST_CASE(nor_for_more_than_binders_have_room_for) {
     cles::core::update_gathering all;
-    all.gone(100);
+    all.gone(100, start);
     BOOST_TEST(all.waits(100 + all.most - 1, start));
     BOOST_TEST(!all.waits(100 + all.most, start));
-}
-
-BOOST_AUTO_TEST_CASE(the_time_begins_anew_when_they_have_gone) {
-    cles::core::update_gathering all;
-    BOOST_TEST(all.waits(1, start));
-    BOOST_TEST(!all.waits(2, start + longest));
-    all.gone(2);
-    BOOST_TEST(!all.waits(2, start + longest));
-    BOOST_TEST(all.waits(3, start + longest));
-    BOOST_TEST(!all.waits(4, start + 2 * longest));
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -10,7 +10,8 @@
 namespace cles::core {
 
 /// Whether updates go out in this turn of the executor, or wait for more to come with the next, so that one write
-/// carries them all. They wait while each turn brings more, until there are `most` or the first has waited `longest`.
+/// carries them all. They wait while each turn brings more, until there are `most` or `longest` has passed since some
+/// went out last. So one that comes alone, after a while, goes at once.
 class update_gathering {
   public:
     static constexpr std::chrono::microseconds longest{100};
@@ -21,23 +22,20 @@ class update_gathering {
         if (published == seen_) {
             return false;
         }
-        if (!since_) {
-            since_ = now;
-        }
         seen_ = published;
-        return now - *since_ < longest && published - gone_ < most;
+        return gone_at_ && now - *gone_at_ < longest && published - gone_ < most;
     }
     /// All have gone out, `published` of them.
-    void gone(std::uint64_t published) noexcept {
+    void gone(std::uint64_t published, time_point now) noexcept {
         seen_ = published;
         gone_ = published;
-        since_.reset();
+        gone_at_ = now;
     }
 
   private:
     std::uint64_t seen_ = 0;
     std::uint64_t gone_ = 0;
-    std::optional<time_point> since_; // when the first was let wait
+    std::optional<time_point> gone_at_; // when the last did
 };
 
 } // namespace cles::core

@@ -171,7 +171,7 @@ void engine::turn() {
             ask_for_turn();
         } else {
             published.drain(at);
-            gathering_.gone(published.published());
+            gathering_.gone(published.published(), at);
         }
     }
     if (routing_) {
