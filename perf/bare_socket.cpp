@@ -18,6 +18,7 @@ namespace {
 
 constexpr int stream = SOCK_STREAM | SOCK_CLOEXEC;
 constexpr int datagrams = SOCK_DGRAM | SOCK_CLOEXEC;
+constexpr int most_silence_s = 10;
 
 sockaddr_in address_of(const url& where) {
     sockaddr_in address{};
@@ -48,7 +49,7 @@ descriptor connect_internet(const url& where) {
     const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses{found, &::freeaddrinfo};
     descriptor socket{checked(::socket(found->ai_family, udp ? datagrams : stream, 0), "socket")};
     if (udp) {
-        const timeval silence{.tv_sec = 1, .tv_usec = 0};
+        const timeval silence{.tv_sec = most_silence_s, .tv_usec = 0};
         checked(::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &silence, sizeof silence), "SO_RCVTIMEO");
     } else {
         tune(socket);
@@ -152,6 +153,9 @@ bool receive_all(int socket, std::span<std::byte> bytes) {
         const auto got = ::recv(socket, bytes.data() + have, bytes.size() - have, 0);
         if (got < 0 && errno == EINTR) {
             continue;
+        }
+        if (got < 0 && errno == EAGAIN) {
+            throw std::runtime_error("no datagram came for " + std::to_string(most_silence_s) + " s");
         }
         if (checked(got, "recv") == 0) {
             if (have == 0) {

@@ -23,7 +23,7 @@ listener listen_on(const url& where);
 /// Takes the next connection of a stream. This and `connect_to` set the flags that the library sets on its own sockets.
 descriptor accept_from(const listener& at);
 
-/// Connects to a `tcp`, `udp` or `unix` URL. Where it hears nothing by `udp` for a second, receiving fails.
+/// Connects to a `tcp`, `udp` or `unix` URL. Where nothing comes by `udp` for ten seconds, receiving fails.
 /// \throws std::system_error, or std::runtime_error where the host has no address or the scheme is another
 descriptor connect_to(const url& where);
 

@@ -41,7 +41,7 @@ void server::serve_datagrams() {
         const auto got = ::recvfrom(socket, request.data(), request.size(), MSG_TRUNC, whom, &length);
         if (got == static_cast<ssize_t>(request.size()) && is_request(request)) {
             const auto reply = pack_reply(sample(served_++));
-            ::sendto(socket, reply.data(), reply.size(), 0, whom, length); // what is lost is asked for again
+            ::sendto(socket, reply.data(), reply.size(), 0, whom, length); // what is lost ends the measurement
         }
     }
 }

@@ -48,6 +48,10 @@ def pull_figures(reports):
         yield figure(f"pull_{name}_p99", f"PULL over {meaning}, p99", (r["cles"]["p99_us"] for r in rounds), "us")
         yield figure(f"pull_{name}_ratio", f"PULL over {meaning}, p50, to the exchange by hand over TCP",
                      (r["cles"]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times", at_most=PULL_RATIOS[name])
+        bare = f"icd_{name}"  # the same sockets by hand
+        if rounds[0].get(bare):
+            yield figure(f"pull_{name}_bare_ratio", f"the exchange by hand over {meaning}, p50, to that over TCP",
+                         (r[bare]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times")
     if tcp:
         yield figure("pull_overhead", "what a PULL over TCP takes longer than the exchange by hand, p50",
                      ((r["cles"]["p50_us"] - r["icd"]["p50_us"]) / 1e3 for r in tcp), "ms", paper=PAPER_OVERHEAD_MS,

@@ -164,24 +164,24 @@ class Nouns(unittest.TestCase):
         wait_until(lambda: set(offered("pull", "--peer", "")) == {"car1=", "car2="}, "both nodes are heard")
 
     def test_in_less_than_100_ms(self):
-        def best(*words, wanted, env=ENVIRONMENT):
-            """The shortest of as many as it takes: whatever else the machine does only adds to it."""
-            shortest = float("inf")
-            for _ in range(100):
+        def has_quick_ones(wanted, *words, env=ENVIRONMENT):
+            """Three of forty: whatever else the machine does only adds to the time that they take."""
+            quick = 0
+            for _ in range(40):
                 begin = time.monotonic()
                 offered(*words, env=env)
-                shortest = min(shortest, time.monotonic() - begin)
-                if shortest < wanted:
-                    break
-            return shortest
+                quick += time.monotonic() - begin < wanted
+                if quick == 3:
+                    return True
+            return False
 
         # A sanitizer costs more than what is measured here.
         limit = 0.1 * max(1.0, float(os.environ.get("CLES_TEST_PATIENCE", "30")) / 30)
         for words in (("pull", ""), ("pull", "car1:"), ("delegate", "any:")):
-            self.assertLess(best(*words, wanted=limit), limit, words)
+            self.assertTrue(has_quick_ones(limit, *words), words)
         alone = environment(CLES_MULTICAST=f"lo,239.255.25.38:{free_port()}")
         for words in (("pull", ""), ("pull", "car1:")):
-            self.assertLess(best(*words, wanted=limit / 2, env=alone), limit / 2, words)  # nobody is waited for
+            self.assertTrue(has_quick_ones(limit / 2, *words, env=alone), words)  # nobody is waited for
 
     def test_a_silent_node_is_not_waited_for(self):
         with socket.create_server(("127.0.0.1", 0)) as silent:

@@ -14,6 +14,8 @@ import xml.etree.ElementTree
 from pathlib import Path
 
 SCRIPTS, PROGRAMS = Path(sys.argv[1]), sys.argv[2]
+sys.path.insert(0, str(SCRIPTS))
+import platoon  # noqa: E402
 
 
 class Evaluation(unittest.TestCase):
@@ -41,6 +43,20 @@ class Evaluation(unittest.TestCase):
         self.assertGreater(result["driven"][0]["latency"]["count"], 0)
         self.assertEqual(result["killed"][0]["killed"], 1)
         self.assertIn("gone", [event["mode"] for event in result["killed"][0]["events"]])
+
+    def test_of_several_drives_the_median_counts(self):
+        def drive(hz, loss, p999_us):
+            return {"hz": hz, "loss_percent": loss, "collision": False, "latency": {"p999_us": p999_us, "late": 0}}
+
+        drives = [drive(25, 0, 9e6), drive(50, 0, 1500), drive(50, 10.0, 2500), drive(50, 0, 5000), drive(50, 10.0, 2100),
+                  drive(50, 0, 500), drive(50, 10.0, 100)]
+        checks = platoon.checks_of([], drives, [])
+        self.assertEqual(checks["p999_ms_at_50_hz"], {"0": [0.5, 1.5, 5.0], "10": [0.1, 2.1, 2.5]})
+        self.assertFalse(checks["p999_reached"])
+        found = {each["name"]: each for each in platoon.figures_of(checks, [], drives)}
+        self.assertEqual((found["p999_50_hz_0"]["value"], found["p999_50_hz_0"]["reached"]), (1.5, True))
+        self.assertEqual((found["p999_50_hz_10"]["value"], found["p999_50_hz_10"]["reached"]), (2.1, False))
+        self.assertEqual((found["p999_50_hz_10"]["low"], found["p999_50_hz_10"]["high"]), (0.1, 2.5))
 
     def test_a_record_that_is_none(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -8,6 +8,8 @@
 #include <boost/asio/post.hpp>
 
 #include <algorithm>
+#include <cstdint>
+#include <optional>
 #include <random>
 #include <utility>
 
@@ -165,13 +167,14 @@ void engine::turn() {
         return;
     }
     auto& published = node_->published;
+    std::optional<std::uint64_t> going;
     if (published.dirty()) {
         const auto at = now();
         if (gathering_.waits(published.published(), at)) {
             ask_for_turn();
         } else {
             published.drain(at);
-            gathering_.gone(published.published(), at);
+            going = published.published();
         }
     }
     if (routing_) {
@@ -183,6 +186,9 @@ void engine::turn() {
         c->flush();
     }
     flushing_.clear();
+    if (going) {
+        gathering_.gone(*going, now()); // not before: to write to many binders takes longer than updates may wait
+    }
     settle();
 }
 

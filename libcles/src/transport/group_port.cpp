@@ -21,11 +21,6 @@ group_port::group_port(const asio::any_io_executor& executor, const ip_interface
     set_ip_option(own_, IP_MULTICAST_LOOP, 1); // other nodes of this host hear it too
     own_.non_blocking(true);
     source_ = own_.local_endpoint();
-    // So the system finds the way, and numbers packets, once for the socket and not for each datagram. Where there is
-    // no way yet, each datagram looks for it.
-    error_code no_way;
-    own_.connect(group_, no_way);
-    connected_ = !no_way;
 }
 
 void group_port::start(group_events& owner) {
@@ -46,11 +41,7 @@ void group_port::close() {
 
 bool group_port::try_to_send(std::string_view line) {
     error_code code;
-    if (connected_) {
-        own_.send(asio::buffer(line.data(), line.size()), 0, code);
-    } else {
-        own_.send_to(asio::buffer(line.data(), line.size()), group_, 0, code);
-    }
+    own_.send_to(asio::buffer(line.data(), line.size()), group_, 0, code);
     return code != asio::error::would_block;
 }
 

@@ -49,7 +49,6 @@ class group_port : public std::enable_shared_from_this<group_port> {
     udp::endpoint source_;
     std::shared_ptr<group_receiver> receiver_;
     udp::socket own_;
-    bool connected_ = false;
     group_events* owner_ = nullptr; // null: closed
     std::string waiting_;
     std::size_t waiting_at_ = 0;
