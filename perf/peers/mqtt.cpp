@@ -5,7 +5,7 @@
 #include "ordered_fan_out.hpp"
 #include "packets.hpp"
 #include "peer.hpp"
-#include "perf/descriptor.hpp"
+#include "polled_subscriptions.hpp"
 
 #include <exception>
 #include <fstream>
@@ -16,7 +16,6 @@
 #include <vector>
 
 #include <mosquitto.h>
-#include <poll.h>
 #include <sys/socket.h>
 
 namespace cles::perf::peers {
@@ -171,8 +170,7 @@ class mqtt_caller final : public caller {
     client bus_;
 };
 
-/// A connection for each; one thread waits for all and has the library read where something is.
-class mqtt_subscriptions final : public subscriptions {
+class mqtt_subscriptions final : public polled_subscriptions {
   public:
     mqtt_subscriptions(int port, std::size_t count, inbox& into) {
         for (std::size_t i = 0; i < count; ++i) {
@@ -181,28 +179,14 @@ class mqtt_subscriptions final : public subscriptions {
                 into.take(i, read_update(packet));
             };
             all_.back()->connect(port, updates);
-            sockets_.push_back({.fd = all_.back()->socket(), .events = POLLIN, .revents = 0});
-        }
-    }
-
-    void take_for(std::chrono::milliseconds at_most, inbox& into) override {
-        const auto end = std::chrono::steady_clock::now() + at_most;
-        for (auto left = at_most; left.count() > 0 && !(into.look().complete && into.all_reached());
-             left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now())) {
-            if (checked(::poll(sockets_.data(), sockets_.size(), static_cast<int>(left.count())), "poll") == 0) {
-                return;
-            }
-            for (std::size_t i = 0; i < sockets_.size(); ++i) {
-                if (sockets_[i].revents != 0) {
-                    all_[i]->read();
-                }
-            }
+            wait_for_socket(all_.back()->socket());
         }
     }
 
   private:
+    void read(std::size_t number, inbox&) override { all_[number]->read(); } // which tells what came
+
     std::vector<std::unique_ptr<client>> all_;
-    std::vector<pollfd> sockets_;
 };
 
 class mqtt final : public peer {

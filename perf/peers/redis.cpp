@@ -6,7 +6,7 @@
 #include "ordered_fan_out.hpp"
 #include "packets.hpp"
 #include "peer.hpp"
-#include "perf/descriptor.hpp"
+#include "polled_subscriptions.hpp"
 
 #include <hiredis/hiredis.h>
 
@@ -15,7 +15,6 @@
 #include <thread>
 #include <vector>
 
-#include <poll.h>
 #include <sys/socket.h>
 
 namespace cles::perf::peers {
@@ -155,35 +154,19 @@ class redis_caller final : public caller {
     connection waiting_;
 };
 
-/// A connection for each; one thread waits for all.
-class redis_subscriptions final : public subscriptions {
+class redis_subscriptions final : public polled_subscriptions {
   public:
     redis_subscriptions(const std::string& where, std::size_t count) {
         for (std::size_t i = 0; i < count; ++i) {
             all_.push_back(std::make_unique<connection>(where));
             all_.back()->put("SUBSCRIBE localization");
             (void)all_.back()->get();
-            sockets_.push_back({.fd = all_.back()->socket(), .events = POLLIN, .revents = 0});
-        }
-    }
-
-    void take_for(std::chrono::milliseconds at_most, inbox& into) override {
-        const auto end = std::chrono::steady_clock::now() + at_most;
-        for (auto left = at_most; left.count() > 0 && !(into.look().complete && into.all_reached());
-             left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now())) {
-            if (checked(::poll(sockets_.data(), sockets_.size(), static_cast<int>(left.count())), "poll") == 0) {
-                return;
-            }
-            for (std::size_t i = 0; i < sockets_.size(); ++i) {
-                if (sockets_[i].revents != 0) {
-                    take_from(i, into);
-                }
-            }
+            wait_for_socket(all_.back()->socket());
         }
     }
 
   private:
-    void take_from(std::size_t number, inbox& into) {
+    void read(std::size_t number, inbox& into) override {
         all_[number]->read();
         while (const auto message = all_[number]->next_read()) {
             if (message->type == REDIS_REPLY_ARRAY && message->elements == 3) {
@@ -193,7 +176,6 @@ class redis_subscriptions final : public subscriptions {
     }
 
     std::vector<std::unique_ptr<connection>> all_;
-    std::vector<pollfd> sockets_;
 };
 
 class redis final : public peer {

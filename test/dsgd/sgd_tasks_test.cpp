@@ -5,6 +5,7 @@
 #include "sgd/tasks.hpp"
 #include "sgd/training.hpp"
 #include "support/answer.hpp"
+#include "support/asked_node.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -14,17 +15,8 @@
 
 namespace {
 
-struct fixture {
+struct fixture : cles::test::asked_node {
     fixture() { sgd::register_tasks(node, {.per_class = 1'000}); }
-    std::string ask(const std::string& command) {
-        try {
-            return node.request(command);
-        } catch (const cles::error& e) {
-            return e.what();
-        }
-    }
-    boost::asio::io_context io;
-    cles::service node{io, {.name = "node"}};
 };
 
 } // namespace

@@ -7,6 +7,7 @@
 #include "fmv/tasks.hpp"
 #include "jadc2/scene.hpp"
 #include "support/answer.hpp"
+#include "support/asked_node.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
@@ -17,15 +18,8 @@ namespace {
 
 using jadc2::scene;
 
-struct fixture {
+struct fixture : cles::test::asked_node {
     fixture() { fmv::register_tasks(node, {.streams = 2}); }
-    std::string ask(const std::string& command) {
-        try {
-            return node.request(command);
-        } catch (const cles::error& e) {
-            return e.what();
-        }
-    }
     std::string send(const fmv::frame_message& what) {
         return ask("DELEGATE self:FMV_Processing " + cles::to_json(what));
     }
@@ -39,8 +33,6 @@ struct fixture {
     }
 
     scene ground{1};
-    boost::asio::io_context io;
-    cles::service node{io, {.name = "node"}};
 };
 
 } // namespace

@@ -4,6 +4,7 @@
 #include "strike/order.hpp"
 #include "strike/tasks.hpp"
 #include "support/answer.hpp"
+#include "support/asked_node.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
@@ -17,22 +18,12 @@ namespace {
 
 double now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
 
-struct fixture {
+struct fixture : cles::test::asked_node {
     fixture() { strike::register_tasks(node, {.weapons = 2, .x = 0, .y = 0, .speed = 100, .oldest_s = 60}); }
-    std::string ask(const std::string& command) {
-        try {
-            return node.request(command);
-        } catch (const cles::error& e) {
-            return e.what();
-        }
-    }
     std::string give(const strike::order& what) { return ask("DELEGATE self:strike " + cles::to_json(what)); }
     static strike::order order(const std::string& id) {
         return {.id = id, .x = 300, .y = 400, .utc = now(), .deadline_ms = 30'000};
     }
-
-    boost::asio::io_context io;
-    cles::service node{io, {.name = "node"}};
 };
 
 } // namespace

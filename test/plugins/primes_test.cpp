@@ -3,6 +3,7 @@
 
 #include "primes/primes.hpp"
 #include "support/answer.hpp"
+#include "support/asked_node.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -13,17 +14,8 @@
 
 namespace {
 
-struct fixture {
+struct fixture : cles::test::asked_node {
     fixture() { primes::register_tasks(node, {.limit = 1'000'000, .parts_by = "self"}); }
-    std::string ask(const std::string& command) {
-        try {
-            return node.request(command);
-        } catch (const cles::error& e) {
-            return e.what();
-        }
-    }
-    boost::asio::io_context io;
-    cles::service node{io, {.name = "node"}};
 };
 
 } // namespace

@@ -8,41 +8,15 @@ FOLDER is emptied first. PROGRAM loads a plugin as the daemon does.
 """
 
 import argparse
-import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
-
-def expect(holds: bool, what: str) -> None:
-    if not holds:
-        raise AssertionError(what)
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "consumers"))
+from foreign_project import ForeignProject, expect  # noqa: E402
 
 
-class Maker:
-    def __init__(self, options: argparse.Namespace):
-        self.options = options
-        self.scratch: Path = options.scratch
-        shutil.rmtree(self.scratch, ignore_errors=True)
-        self.scratch.mkdir(parents=True)
-        self.environment = {k: v for k, v in os.environ.items() if not k.startswith("CMAKE_")}
-
-    def run(self, *command: object, fails: bool = False) -> str:
-        words = [str(word) for word in command]
-        print("$", " ".join(words), flush=True)
-        done = subprocess.run(words, cwd=self.scratch, env=self.environment, stdout=subprocess.PIPE,
-                              stderr=subprocess.STDOUT, text=True, check=False)
-        expect((done.returncode != 0) == fails, f"ended with {done.returncode}:\n{done.stdout}")
-        return done.stdout
-
-    def install(self) -> Path:
-        """Installs, and moves what was installed: nothing of the tree that it comes from may be needed."""
-        first, prefix = self.scratch / "first", self.scratch / "sdk"
-        self.run(self.options.cmake, "--install", self.options.build, "--prefix", first)
-        first.rename(prefix)
-        return prefix
-
+class Maker(ForeignProject):
     def make(self, prefix: Path) -> Path:
         copy = self.scratch / "mine"
         shutil.copytree(prefix / "share" / "doc" / "cles" / "plugins" / "template", copy)

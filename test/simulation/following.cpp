@@ -46,39 +46,22 @@ void following::on_start(node_run& n) {
     published_[n.host()] = {};
 }
 
-void following::on_crash(node_run& n) {
-    std::erase_if(followers_, [&](const auto& f) { return &f->at() == &n; });
-}
+void following::on_crash(node_run& n) { followers_.forget(n); }
 
 void following::perform(const action& a) {
     switch (a.what) {
     case deed::follow: follow(a); break;
-    case deed::hold:
-        if (const auto f = find(a["feed"])) {
-            f->hold(milliseconds{a["for"]});
-        }
-        break;
-    case deed::leave:
-        if (const auto f = find(a["feed"]); f && !f->at().frozen()) {
-            f->at().run([&] { f->close(); });
-            std::erase(followers_, f);
-        }
-        break;
+    case deed::hold: followers_.hold(a); break;
+    case deed::leave: followers_.leave(a); break;
     case deed::publish: publish(a["host"], a["noun"], a["count"], a["size"]); break;
     case deed::offer: offer(a["host"], a["count"], a["size"]); break;
     default: break;
     }
 }
 
-std::shared_ptr<follower> following::find(std::uint32_t label) const {
-    const auto found =
-        std::find_if(followers_.begin(), followers_.end(), [&](const auto& f) { return f->label() == label; });
-    return found == followers_.end() ? nullptr : *found;
-}
-
 void following::follow(const action& a) {
     auto* n = world_.node(a["from"]);
-    if (n == nullptr || n->frozen() || find(a["feed"])) {
+    if (n == nullptr || n->frozen() || followers_.find(a["feed"])) {
         return;
     }
     const auto target = world::name_of(a["to"]);
@@ -90,7 +73,7 @@ void following::follow(const action& a) {
                                                             .every_ms = a["every"],
                                                             .keep = a["keep"]},
                                                  target, path, milliseconds{a["slow"]});
-    followers_.push_back(made);
+    followers_.add(made);
     n->run([&] { made->start(); });
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "simulation/follower.hpp"
+#include "simulation/follower_list.hpp"
 #include "simulation/part.hpp"
 
 #include <array>
@@ -38,11 +39,10 @@ class following final : public part {
     void follow(const action& a);
     void publish(unsigned host, unsigned noun, unsigned count, std::size_t size);
     void offer(unsigned host, unsigned count, std::size_t size);
-    [[nodiscard]] std::shared_ptr<follower> find(std::uint32_t label) const;
     [[nodiscard]] std::string body(unsigned host, unsigned noun, std::size_t size);
 
     world& world_;
-    std::vector<std::shared_ptr<follower>> followers_;
+    follower_list<follower> followers_;
     std::map<std::uint32_t, std::uint64_t> seen_before_probe_;
     std::vector<std::array<std::uint64_t, own_nouns>> published_; // by the present run of each host
     std::size_t offers_ = 0;                                      // that have not ended

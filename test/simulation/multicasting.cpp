@@ -30,7 +30,7 @@ void multicasting::on_start(node_run& n) {
 }
 
 void multicasting::on_crash(node_run& n) {
-    std::erase_if(followers_, [&](const auto& f) { return &f->at() == &n; });
+    followers_.forget(n);
     std::erase_if(nouns_, [&](const auto& each) { return each.first.first == &n; });
 }
 
@@ -40,30 +40,15 @@ void multicasting::perform(const action& a) {
     }
     switch (a.what) {
     case deed::gather: gather(a); break;
-    case deed::hold:
-        if (const auto f = find(a["feed"])) {
-            f->hold(milliseconds{a["for"]});
-        }
-        break;
-    case deed::leave:
-        if (const auto f = find(a["feed"]); f && !f->at().frozen()) {
-            f->at().run([&] { f->close(); });
-            std::erase(followers_, f);
-        }
-        break;
+    case deed::hold: followers_.hold(a); break;
+    case deed::leave: followers_.leave(a); break;
     default: break;
     }
 }
 
-std::shared_ptr<group_follower> multicasting::find(std::uint32_t label) const {
-    const auto found =
-        std::find_if(followers_.begin(), followers_.end(), [&](const auto& f) { return f->label() == label; });
-    return found == followers_.end() ? nullptr : *found;
-}
-
 void multicasting::gather(const action& a) {
     auto* n = world_.node(a["from"]);
-    if (n != nullptr && !n->frozen() && !find(a["feed"])) {
+    if (n != nullptr && !n->frozen() && !followers_.find(a["feed"])) {
         follow(*n, a["all"] != 0 ? "all" : world::name_of(a["to"]), group_path(a["noun"]), a["feed"], a["slow"]);
     }
 }
@@ -71,7 +56,7 @@ void multicasting::gather(const action& a) {
 std::shared_ptr<group_follower> multicasting::follow(node_run& n, const std::string& target, const std::string& path,
                                                      std::uint32_t label, std::uint32_t slow) {
     auto made = std::make_shared<group_follower>(n, label, target, path, milliseconds{slow});
-    followers_.push_back(made);
+    followers_.add(made);
     n.run([&] { made->start(); });
     return made;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/group_source.hpp"
+#include "simulation/follower_list.hpp"
 #include "simulation/group_follower.hpp"
 #include "simulation/part.hpp"
 
@@ -45,12 +46,11 @@ class multicasting final : public part {
     void gather(const action& a);
     std::shared_ptr<group_follower> follow(node_run& n, const std::string& target, const std::string& path,
                                            std::uint32_t label, std::uint32_t slow);
-    [[nodiscard]] std::shared_ptr<group_follower> find(std::uint32_t label) const;
     void judge_first(const std::vector<std::shared_ptr<group_follower>>& newcomers);
 
     world& world_;
     const following& published_;
-    std::vector<std::shared_ptr<group_follower>> followers_;
+    follower_list<group_follower> followers_;
     std::map<std::pair<const node_run*, std::string>, noun> nouns_;
     std::uint32_t next_probe_ = 10'000'000;
 };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/presence.hpp"
-#include "support/manual_clock.hpp"
+#include "support/watched_presence.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -14,23 +14,11 @@ using namespace std::chrono_literals;
 using cles::peer_state;
 using cles::core::announcement;
 using cles::core::group_source;
-using neighbours = cles::core::presence;
-using change = neighbours::change;
-using verdict = neighbours::verdict;
 
 constexpr group_source here{0x0A000007, 40000};
 constexpr group_source there{0x0A000008, 41000};
 
-struct fixture : neighbours::watcher {
-    fixture() { table.watch(this); }
-
-    void on_peer(std::string_view node, change what, std::string_view where) override {
-        static constexpr const char* words[] = {"appeared", "moved", "silent", "returned", "left", "gone", "clash"};
-        told.push_back(std::string{node} + " " + words[static_cast<int>(what)] +
-                       (where.empty() ? std::string{} : " " + std::string{where}));
-    }
-    std::vector<std::string> take_told() { return std::exchange(told, {}); }
-
+struct fixture : cles::test::watched_presence {
     static announcement saying(std::string node, std::string endpoint = "tcp://0.0.0.0:1") {
         return {.node = std::move(node), .endpoints = {std::move(endpoint)}};
     }
@@ -40,25 +28,7 @@ struct fixture : neighbours::watcher {
     verdict leave(const std::string& node, std::uint32_t epoch, std::uint64_t seq, const group_source& from = here) {
         return hear({.node = node, .leaving = true}, epoch, seq, from);
     }
-    void pass(std::chrono::milliseconds by) {
-        clock.advance(by);
-        deadlines.expire(clock.now());
-    }
-    [[nodiscard]] std::string where(std::string_view node) const {
-        const auto found = table.find(node);
-        return found ? std::string{*found} : "nowhere";
-    }
-    [[nodiscard]] std::vector<cles::peer> list() const { return table.list(clock.now()); }
-
-    std::vector<std::string> told;
-    cles::test::manual_clock clock;
-    cles::core::deadline_queue deadlines;
-    neighbours table{"me", 0xAAAA, deadlines, 5};
 };
-
-void check(const std::vector<std::string>& told, const std::vector<std::string>& expected) {
-    BOOST_TEST(told == expected, boost::test_tools::per_element());
-}
 
 } // namespace
 

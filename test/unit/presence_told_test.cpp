@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // What a node makes of what others tell it (docs/protocol.md, "Gossip").
 #include "core/presence.hpp"
-#include "support/manual_clock.hpp"
+#include "support/watched_presence.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -19,24 +19,12 @@ using cles::core::group_source;
 using cles::core::news_item;
 using cles::core::peer_report;
 using cles::core::teller;
-using neighbours = cles::core::presence;
-using change = neighbours::change;
-using verdict = neighbours::verdict;
 
 constexpr group_source in_group{0x0A000009, 40000};
 const auto by_other_host = teller::at("tcp://10.0.0.7:25370");
 const auto by_this_host = teller::at("tcp://127.0.0.1:25370");
 
-struct fixture : neighbours::watcher {
-    fixture() { table.watch(this); }
-
-    void on_peer(std::string_view node, change what, std::string_view where) override {
-        static constexpr const char* words[] = {"appeared", "moved", "silent", "returned", "left", "gone", "clash"};
-        told.push_back(std::string{node} + " " + words[static_cast<int>(what)] +
-                       (where.empty() ? std::string{} : " " + std::string{where}));
-    }
-    std::vector<std::string> take_told() { return std::exchange(told, {}); }
-
+struct fixture : cles::test::watched_presence {
     static peer_report report(std::string node, std::uint32_t epoch, std::uint64_t seq, std::chrono::milliseconds age,
                               std::string endpoint = "tcp://10.0.0.9:1") {
         return {.said = {.node = std::move(node), .endpoints = {std::move(endpoint)}, .tasks = "00"},
@@ -58,28 +46,10 @@ struct fixture : neighbours::watcher {
         r.said.leaving = true;
         return tell(r);
     }
-    void pass(std::chrono::milliseconds by) {
-        clock.advance(by);
-        deadlines.expire(clock.now());
-    }
-    [[nodiscard]] std::string where(std::string_view node) const {
-        const auto found = table.find(node);
-        return found ? std::string{*found} : "nowhere";
-    }
-    [[nodiscard]] std::vector<cles::peer> list() const { return table.list(clock.now()); }
     [[nodiscard]] std::vector<news_item> news(std::uint64_t since = 0) const {
         return table.news_since(since, clock.now());
     }
-
-    std::vector<std::string> told;
-    cles::test::manual_clock clock;
-    cles::core::deadline_queue deadlines;
-    neighbours table{"me", 0xAAAA, deadlines, 5};
 };
-
-void check(const std::vector<std::string>& told, const std::vector<std::string>& expected) {
-    BOOST_TEST(told == expected, boost::test_tools::per_element());
-}
 
 } // namespace
 

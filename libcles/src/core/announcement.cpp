@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/announcement.hpp"
 
-#include <cles/json_reader.hpp>
-
+#include "core/json_members.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/grammar.hpp"
 
@@ -42,21 +41,13 @@ bool read_count(json_reader& r, std::uint32_t& out) {
 
 bool read_load(json_reader& r, node_load& out) {
     out = {};
-    if (!r.begin_object()) {
-        return false;
-    }
-    std::string_view key;
-    while (r.next_key(key)) {
-        const bool good = key == "queued"       ? read_count(r, out.queued)
-                          : key == "running"    ? read_count(r, out.running)
-                          : key == "workers"    ? read_count(r, out.workers)
-                          : key == "service_us" ? read_count(r, out.service_us)
-                                                : r.skip();
-        if (!good) {
-            return false;
-        }
-    }
-    return r.ok();
+    return read_members(r, [&](std::string_view key) {
+        return key == "queued"       ? read_count(r, out.queued)
+               : key == "running"    ? read_count(r, out.running)
+               : key == "workers"    ? read_count(r, out.workers)
+               : key == "service_us" ? read_count(r, out.service_us)
+                                     : r.skip();
+    });
 }
 
 bool read_interval(json_reader& r, std::chrono::milliseconds& out) {
@@ -102,19 +93,16 @@ bool read_announcement_member(json_reader& r, std::string_view key, announcement
 
 namespace {
 
-bool read_members(json_reader& r, announcement& out) {
-    if (!r.begin_object()) {
-        return false;
-    }
-    std::string_view key;
-    while (r.next_key(key)) {
+bool read_body(json_reader& r, announcement& out) {
+    const bool good = read_members(r, [&](std::string_view key) {
         const std::string name{key};
         if (!read_announcement_member(r, name, out)) {
             r.inside_member(name);
             return false;
         }
-    }
-    return r.ok() && r.at_end();
+        return true;
+    });
+    return good && r.at_end();
 }
 
 void append_body(std::string& out, const announcement& said, std::size_t endpoints) {
@@ -168,7 +156,7 @@ bool read_announcement(const protocol::request_line& update, announcement& out, 
     }
     out.node = noun.target;
     json_reader reader{update.body.empty() ? std::string_view{"{}"} : update.body, depth};
-    if (!read_members(reader, out)) {
+    if (!read_body(reader, out)) {
         why = reader.error();
         return false;
     }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/peer_table.hpp"
 
-#include <cles/json_reader.hpp>
-
+#include "core/json_members.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/message.hpp"
 #include "protocol/parts.hpp"
@@ -193,32 +192,26 @@ bool read_entry(std::string_view json, peer_report& out) {
     out = {};
     bool has_epoch = false;
     json_reader r{json, table_depth};
-    if (!r.begin_object()) {
-        return false;
-    }
-    std::string_view key;
-    while (r.next_key(key)) {
-        const std::string name{key};
-        bool good = true;
-        if (name == "epoch") {
-            good = has_epoch = read_epoch(r, out.epoch);
-        } else if (name == "seq") {
-            good = r.read(out.seq);
-        } else if (name == "age_ms") {
-            good = read_age(r, out.age);
-        } else if (name == "state") {
-            good = read_state(r, out.said.leaving);
-        } else if (name == "leaving") {
-            good = r.skip();
-        } else {
-            out.has_interval |= name == "interval_ms";
-            good = read_announcement_member(r, name, out.said);
+    const bool good = read_members(r, [&](std::string_view key) {
+        if (key == "epoch") {
+            return has_epoch = read_epoch(r, out.epoch);
         }
-        if (!good) {
-            return false;
+        if (key == "seq") {
+            return r.read(out.seq);
         }
-    }
-    return r.ok() && has_epoch && protocol::is_name(out.said.node) && !protocol::is_reserved_target(out.said.node);
+        if (key == "age_ms") {
+            return read_age(r, out.age);
+        }
+        if (key == "state") {
+            return read_state(r, out.said.leaving);
+        }
+        if (key == "leaving") {
+            return r.skip();
+        }
+        out.has_interval |= key == "interval_ms";
+        return read_announcement_member(r, key, out.said);
+    });
+    return good && has_epoch && protocol::is_name(out.said.node) && !protocol::is_reserved_target(out.said.node);
 }
 
 bool read_entries(json_reader& r, std::size_t most, table_reader& to) {
@@ -269,18 +262,11 @@ bool read_beat(json_reader& r, peer_beat& out) {
 }
 
 bool read_beats(json_reader& r, std::size_t most, table_reader& to) {
-    if (!r.begin_object()) {
-        return false;
-    }
-    std::string_view key;
-    while (r.next_key(key)) {
+    return read_members(r, [&](std::string_view key) {
         peer_beat beat;
         const auto epoch = protocol::parse_epoch(key);
         if (!epoch || most == 0) {
-            if (!r.skip()) {
-                return false;
-            }
-            continue;
+            return r.skip();
         }
         --most;
         beat.epoch = *epoch;
@@ -288,8 +274,8 @@ bool read_beats(json_reader& r, std::size_t most, table_reader& to) {
             return false;
         }
         to.on_beat(beat);
-    }
-    return r.ok();
+        return true;
+    });
 }
 
 } // namespace
@@ -339,59 +325,35 @@ void write_own_entry(json_writer& w, const announcement& said, std::string_view 
 bool read_table(std::string_view json, std::size_t most_entries, table_reader& to, table_head& head) {
     head = {};
     json_reader r{json, table_depth};
-    if (!r.begin_object()) {
-        return false;
-    }
     bool has_peers = false;
-    std::string_view key;
-    while (r.next_key(key)) {
-        bool good = true;
+    const bool good = read_members(r, [&](std::string_view key) {
         if (key == "peers") {
             has_peers = true;
-            good = read_entries(r, most_entries, to);
-        } else if (key == "beats") {
-            good = read_beats(r, most_entries, to);
-        } else if (key == "node") {
-            good = r.read(head.node);
-        } else if (key == "epoch") {
-            good = r.read(head.epoch);
-        } else if (key == "next") {
-            good = r.read(head.next);
-        } else if (key == "more") {
-            good = r.read(head.more);
-        } else {
-            good = r.skip();
+            return read_entries(r, most_entries, to);
         }
-        if (!good) {
-            return false;
+        if (key == "beats") {
+            return read_beats(r, most_entries, to);
         }
-    }
-    return r.ok() && has_peers;
+        return key == "node"    ? r.read(head.node)
+               : key == "epoch" ? r.read(head.epoch)
+               : key == "next"  ? r.read(head.next)
+               : key == "more"  ? r.read(head.more)
+                                : r.skip();
+    });
+    return good && has_peers;
 }
 
 bool read_description(std::string_view json, peer_report& out) {
     out = {};
     bool has_epoch = false;
     json_reader r{json};
-    if (!r.begin_object()) {
-        return false;
-    }
-    std::string_view key;
-    while (r.next_key(key)) {
-        const std::string name{key};
-        bool good = true;
-        if (name == "epoch") {
-            good = has_epoch = read_epoch(r, out.epoch);
-        } else if (name == "node" || name == "endpoints") {
-            good = read_announcement_member(r, name, out.said);
-        } else {
-            good = r.skip();
+    const bool good = read_members(r, [&](std::string_view key) {
+        if (key == "epoch") {
+            return has_epoch = read_epoch(r, out.epoch);
         }
-        if (!good) {
-            return false;
-        }
-    }
-    return r.ok() && has_epoch && protocol::is_name(out.said.node) && !protocol::is_reserved_target(out.said.node);
+        return key == "node" || key == "endpoints" ? read_announcement_member(r, key, out.said) : r.skip();
+    });
+    return good && has_epoch && protocol::is_name(out.said.node) && !protocol::is_reserved_target(out.said.node);
 }
 
 } // namespace cles::core

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/task_list.hpp"
 
-#include <cles/json_reader.hpp>
-
+#include "core/json_members.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
@@ -14,25 +13,21 @@ namespace {
 bool read_entry(json_reader& r, task_list& out) {
     task_list::entry found;
     std::string name;
-    std::string_view key;
-    if (!r.begin_object()) {
+    const bool good = read_members(r, [&](std::string_view key) {
+        return key == "verb"         ? r.read(name)
+               : key == "task"       ? r.read(found.task)
+               : key == "idempotent" ? r.read(found.idempotent)
+                                     : r.skip();
+    });
+    if (!good) {
         return false;
-    }
-    while (r.next_key(key)) {
-        const bool good = key == "verb"         ? r.read(name)
-                          : key == "task"       ? r.read(found.task)
-                          : key == "idempotent" ? r.read(found.idempotent)
-                                                : r.skip();
-        if (!good) {
-            return false;
-        }
     }
     const auto verb = verb_from(name);
     if (verb && protocol::is_name(found.task) && out.entries.size() < most_tasks_of_a_node) {
         found.verb = *verb;
         out.entries.push_back(std::move(found));
     }
-    return r.ok();
+    return true;
 }
 
 bool read_entries(json_reader& r, task_list& out) {
@@ -59,11 +54,9 @@ std::optional<task_list> read_task_list(std::string_view description, std::strin
     json_reader r{description};
     task_list list;
     std::string name;
-    std::string_view key;
-    bool good = r.begin_object();
-    while (good && r.next_key(key)) {
-        good = key == "node" ? r.read(name) : key == "tasks" ? read_entries(r, list) : r.skip();
-    }
+    const bool good = read_members(r, [&](std::string_view key) {
+        return key == "node" ? r.read(name) : key == "tasks" ? read_entries(r, list) : r.skip();
+    });
     if (!good || !r.at_end() || name != node) {
         return std::nullopt;
     }

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/service.hpp>
+
+#include <boost/asio/io_context.hpp>
+
+#include <string>
+
+namespace cles::test {
+
+/// A node whose own tasks are asked, each as somebody types it.
+struct asked_node {
+    /// The reply, or what the failure says.
+    std::string ask(const std::string& command) {
+        try {
+            return node.request(command);
+        } catch (const error& e) {
+            return e.what();
+        }
+    }
+
+    boost::asio::io_context io;
+    service node{io, {.name = "node"}};
+};
+
+} // namespace cles::test
