@@ -17,7 +17,7 @@ class host final : public detail::routing_host {
   public:
     explicit host(detail::engine& engine)
         : ways_(engine), routing_(std::make_shared<core::routing>(engine.shared_node(), ways_, std::random_device{}(),
-                                                                  [&engine] { engine.ask_for_turn(); })) {}
+                                                                  [&engine] { engine.turns().ask(); })) {}
 
     void hold() override { routing_->hold(); }
     void release(time_point now) override { routing_->release(now); }

@@ -21,6 +21,15 @@ BOOST_AUTO_TEST_CASE(one_alone_goes_at_once) {
     BOOST_TEST(!all.waits(2, start + longest)); // and where there is none, none waits
 }
 
+BOOST_AUTO_TEST_CASE(the_first_and_those_that_come_after_a_while_are_alone) {
+    cles::core::update_gathering all;
+    BOOST_TEST(all.alone(start));
+    all.gone(1, start);
+    BOOST_TEST(!all.alone(start));
+    BOOST_TEST(!all.alone(start + longest - std::chrono::nanoseconds{1}));
+    BOOST_TEST(all.alone(start + longest));
+}
+
 BOOST_AUTO_TEST_CASE(behind_others_they_wait_while_each_turn_brings_more) {
     cles::core::update_gathering all;
     all.gone(1, start);

@@ -17,13 +17,15 @@ class update_gathering {
     static constexpr std::chrono::microseconds longest{100};
     static constexpr std::uint64_t most = 32; // half of what is kept for a binder unless it asks for more or less
 
+    /// None has gone out for a while.
+    [[nodiscard]] bool alone(time_point now) const noexcept { return !gone_at_ || now - *gone_at_ >= longest; }
     /// `published`: how many there have been so far, of which some have not gone out.
     [[nodiscard]] bool waits(std::uint64_t published, time_point now) noexcept {
         if (published == seen_) {
             return false;
         }
         seen_ = published;
-        return gone_at_ && now - *gone_at_ < longest && published - gone_ < most;
+        return !alone(now) && published - gone_ < most;
     }
     /// All have gone out, `published` of them.
     void gone(std::uint64_t published, time_point now) noexcept {

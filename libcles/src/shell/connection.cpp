@@ -101,7 +101,7 @@ void connection::on_room() {
 
 void connection::wake() {
     if (!now_) { // else the batch ends with a flush
-        engine_->flush_soon(*this);
+        engine_->turns().flush_soon(*this);
     }
 }
 
@@ -136,7 +136,7 @@ void connection::put_updates(std::string_view lines) {
     } else {
         link_->output().append(lines);
     }
-    engine_->flush_soon(*this);
+    engine_->turns().flush_soon(*this);
 }
 
 // -- output --------------------------------------------------------------------------------------------------------
@@ -149,13 +149,22 @@ void connection::flush() {
     send_output();
     follow_backlog();
     if (may_serve_more()) {
-        engine_->flush_soon(*this);
+        engine_->turns().flush_soon(*this);
     }
     if (updates_wait_ && !engine_->stopped() && link_->unsent() < updates_wait_past) {
         // The link took all at once, and so will not say that it has room.
         updates_wait_ = false;
         session_.serving().drain(engine_->now());
     }
+}
+
+bool connection::write() {
+    if (gone_) {
+        return true;
+    }
+    send_output();
+    follow_backlog();
+    return !updates_wait_ && !may_serve_more();
 }
 
 void connection::send_output() {

@@ -47,8 +47,12 @@ class connection final : public link_events,
     [[nodiscard]] bool at_rest() const override { return session_.at_rest() && link_->unsent() == 0; }
     /// Whether requests can still be sent.
     [[nodiscard]] bool usable() const noexcept { return usable_; }
-    /// Writes what is there.
+    /// Writes what is there, and has more served and published where there is room again.
     void flush();
+    /// Writes what is there; no handler runs. False where `flush` would do more.
+    [[nodiscard]] bool write();
+    /// Whether no other request of this node's waits here for its answer.
+    [[nodiscard]] bool asks_alone() noexcept { return session_.asking().in_flight() <= 1; }
     /// Ends it at once, without a word to its owner.
     void abandon(std::string_view why);
     /// Sends a BIND for a feed and follows it from then on.
@@ -80,7 +84,7 @@ class connection final : public link_events,
     void put_updates(std::string_view lines) override;
 
   private:
-    friend detail::engine;
+    friend class turns;
 
     struct stall_watch final : core::deadline {
         explicit stall_watch(connection& c) : owner(c) {}
@@ -113,7 +117,7 @@ class connection final : public link_events,
     unsigned lines_ = 0;            // of this batch
     bool usable_ = true;
     bool gone_ = false;
-    bool flush_asked_ = false;          // the engine will flush it
+    bool flush_asked_ = false;          // the next turn will flush it
     mutable bool updates_wait_ = false; // some were not taken
     bool pause_for_queue_ = false;
     bool pause_for_backlog_ = false;

@@ -18,9 +18,6 @@ namespace asio = boost::asio;
 
 namespace {
 
-// Publishers that go on in one turn, before others have theirs.
-constexpr int most_go_on = 8;
-
 core::node_setup setup_of(service_options& options) {
     std::random_device source;
     // Room for as many ids as a run may draw, and short enough for clients that read numbers as doubles.
@@ -55,7 +52,7 @@ engine::engine(asio::any_io_executor executor, service_options options)
     for (const auto& [name, where] : options.peers) {
         routes_.set_peer(name, where);
     }
-    node_ = std::make_shared<core::node>(setup_of(options), clock_, [this] { ask_for_turn(); });
+    node_ = std::make_shared<core::node>(setup_of(options), clock_, [this] { turns_.ask(); });
     neighbours_ = std::make_unique<shell::neighbours>(*this, std::random_device{}());
 }
 
@@ -137,76 +134,6 @@ std::string engine::stranger(const identity& peer) const {
     return peer.local || !peer.name.empty() || networks_.contain(host) ? std::string{} : host;
 }
 
-// -- turns ---------------------------------------------------------------------------------------------------------
-
-void engine::flush_soon(shell::connection& c) {
-    // Once stopped there are no more turns; stop() itself flushes whatever is said on the way, like a farewell.
-    if (!c.flush_asked_ && !stopped_) {
-        c.flush_asked_ = true;
-        to_flush_.push_back(c.shared_from_this());
-        ask_for_turn();
-    }
-}
-
-void engine::ask_for_turn() {
-    if (!turn_asked_ && !stopped_) {
-        turn_asked_ = true;
-        asio::post(executor_, [self = shared_from_this()] {
-            self->turn_asked_ = false;
-            self->turn();
-        });
-    }
-}
-
-void engine::turn() {
-    if (stopped_) {
-        return;
-    }
-    let_publishers_go_on();
-    if (stopped_) {
-        return;
-    }
-    auto& published = node_->published;
-    std::optional<std::uint64_t> going;
-    if (published.dirty()) {
-        const auto at = now();
-        if (gathering_.waits(published.published(), at)) {
-            ask_for_turn();
-        } else {
-            published.drain(at);
-            going = published.published();
-        }
-    }
-    if (routing_) {
-        routing_->drain(now());
-    }
-    flushing_.swap(to_flush_);
-    for (const auto& c : flushing_) {
-        c->flush_asked_ = false;
-        c->flush();
-    }
-    flushing_.clear();
-    if (going) {
-        gathering_.gone(*going, now()); // not before: to write to many binders takes longer than updates may wait
-    }
-    settle();
-}
-
-// Each may publish again at once, and then waits here anew. The next turn is asked for first: what they do may throw.
-void engine::let_publishers_go_on() {
-    if (!node_->published.has_results()) {
-        return;
-    }
-    ask_for_turn();
-    for (int i = 0; i < most_go_on; ++i) {
-        auto next = node_->published.next_result();
-        if (!next) {
-            return;
-        }
-        next->tell();
-    }
-}
-
 // -- asking --------------------------------------------------------------------------------------------------------
 
 void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message) {
@@ -239,14 +166,16 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
     limit = std::min(limit, std::chrono::milliseconds{protocol::max_deadline_ms});
     const auto id = draw_id();
     const auto begun = now();
-    r->send({.verb = request.verb,
-             .noun = request.noun,
-             .body = request.body,
-             .id = id,
-             .urgent = options.urgent_,
-             .begun = begun,
-             .deadline = begun + limit},
-            std::move(operation), options.on_progress_);
+    turns_.let([&] {
+        r->send({.verb = request.verb,
+                 .noun = request.noun,
+                 .body = request.body,
+                 .id = id,
+                 .urgent = options.urgent_,
+                 .begun = begun,
+                 .deadline = begun + limit},
+                std::move(operation), options.on_progress_);
+    });
     settle();
     return id;
 }
@@ -300,7 +229,8 @@ void engine::publish(std::string_view noun, const std::function<void(json_writer
     if (node_->published.find(noun) == nullptr) {
         check_path(noun);
     }
-    node_->published.publish(noun, write);
+    turns_.let([&] { node_->published.publish(noun, write); });
+    settle();
 }
 
 std::shared_ptr<update_sink> engine::outside_updates() {
@@ -334,7 +264,8 @@ void engine::publish_when_room(std::string_view noun, std::string_view json, pen
         if (node_->published.find(noun) == nullptr) {
             check_path(noun);
         }
-        node_->published.publish_when_room(noun, json, operation);
+        turns_.let([&] { node_->published.publish_when_room(noun, json, operation); });
+        settle();
     } catch (const error& e) {
         fail_later(std::move(operation), e.code(), e.message());
     }
@@ -354,9 +285,7 @@ void engine::stop() {
     if (routing_) {
         routing_->stop();
     }
-    for (const auto& c : std::exchange(to_flush_, {})) {
-        c->flush();
-    }
+    turns_.stop();
     // Whoever waits hears of it on the executor, never from inside this call.
     const auto tell = [this](std::vector<pending_ptr> waiting) {
         for (auto& operation : waiting) {

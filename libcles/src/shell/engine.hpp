@@ -7,7 +7,6 @@
 
 #include "core/feed_machine.hpp"
 #include "core/node.hpp"
-#include "core/update_gathering.hpp"
 #include "protocol/grammar.hpp"
 #include "shell/connection.hpp"
 #include "shell/connections.hpp"
@@ -21,6 +20,7 @@
 #include "shell/routes.hpp"
 #include "shell/routing_part.hpp"
 #include "shell/steady_clock.hpp"
+#include "shell/turns.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 
@@ -65,10 +65,9 @@ class engine final : public std::enable_shared_from_this<engine> {
     void on_round_over();
     /// A connection has ended.
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
-    /// Has its output written when what runs now has ended.
-    void flush_soon(shell::connection& c);
-    /// Has what waits carried on when what runs now has ended.
-    void ask_for_turn();
+    [[nodiscard]] shell::turns& turns() noexcept { return turns_; }
+    /// What routing has to do; null where it is off.
+    [[nodiscard]] routing_host* routing() noexcept { return routing_.get(); }
     /// To be called when something has happened: sets the timer.
     void settle() { timer_->follow(node_->deadlines); }
 
@@ -90,8 +89,6 @@ class engine final : public std::enable_shared_from_this<engine> {
   private:
     void join_group();
     void expire(bool was_away);
-    void turn();
-    void let_publishers_go_on();
     void check_path(std::string_view noun) const;
 
     boost::asio::any_io_executor executor_;
@@ -111,10 +108,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     std::shared_ptr<shell::outside_updates> outside_updates_; ///< once somebody wants to publish from elsewhere
     const routing_part* routing_wanted_;
     std::unique_ptr<routing_host> routing_; // null: off
-    std::vector<std::shared_ptr<shell::connection>> to_flush_;
-    std::vector<std::shared_ptr<shell::connection>> flushing_;
-    core::update_gathering gathering_;
-    bool turn_asked_ = false;
+    shell::turns turns_{*this};
     bool stopped_ = false;
 };
 
