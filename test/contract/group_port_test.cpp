@@ -72,7 +72,7 @@ struct fixture {
 BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixture) {
     member one{io, where};
     member two{io, where};
-    BOOST_TEST(one.port->send("BIND all:x\n"));
+    BOOST_TEST(one.port->send("BIND all:x\n").bytes == 11U);
     run_until(io, [&] { return one.heard.size() == 1 && two.heard.size() == 1; });
     BOOST_TEST(two.heard[0] == "BIND all:x\n");
     BOOST_TEST((two.sources[0] == one.port->source()));
@@ -136,6 +136,29 @@ BOOST_FIXTURE_TEST_CASE(datagrams_keep_their_order_and_their_bounds, fixture) {
     BOOST_TEST(two.batches >= 2);
 }
 
+BOOST_FIXTURE_TEST_CASE(lines_sent_together_are_a_datagram_each, fixture) {
+    member one{io, where};
+    member two{io, where};
+    std::string lines;
+    for (int i = 0; i < 100; ++i) { // more than one system call sends
+        lines += std::to_string(i) + "\n";
+    }
+    BOOST_TEST(one.port->send(lines).bytes == lines.size());
+    run_until(io, [&] { return two.heard.size() == 100; });
+    for (std::size_t i = 0; i < 100; ++i) {
+        BOOST_TEST(two.heard[i] == std::to_string(i) + "\n");
+    }
+}
+
+BOOST_FIXTURE_TEST_CASE(a_line_that_cannot_be_sent_is_lost_alone, fixture) {
+    member one{io, where};
+    member two{io, where};
+    const std::string lines = "1\n" + std::string(70'000, 'x') + "\n2\n"; // more than UDP carries
+    BOOST_TEST(one.port->send(lines).bytes == lines.size());
+    run_until(io, [&] { return two.heard.size() == 2; });
+    BOOST_TEST(two.heard == (std::vector<std::string>{"1\n", "2\n"}), boost::test_tools::per_element());
+}
+
 BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_hears_hears_no_more, fixture) {
     member one{io, where};
     member two{io, where};
@@ -145,7 +168,7 @@ BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_hears_hears_no_more, fixtu
     run_until(io, [&] { return one.heard.size() == 2; });
     run_ready(io);
     BOOST_TEST(two.heard.size() == 1U);
-    BOOST_TEST(two.port->send("into the void\n"));
+    BOOST_TEST(two.port->send("into the void\n").bytes == 14U); // as good as lost on its way
 }
 
 BOOST_FIXTURE_TEST_CASE(what_one_member_throws_keeps_nothing_from_the_others, fixture) {

@@ -58,6 +58,10 @@ bool read_json(json_reader& r, T& value) {
 template <class T>
 std::string to_json(const T& value) {
     std::string out;
+    if constexpr (std::is_class_v<T>) {
+        constexpr std::size_t usual = 200; // room for most at once
+        out.reserve(usual);
+    }
     json_writer writer{out};
     write_json(writer, value);
     return out;

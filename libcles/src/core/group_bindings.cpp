@@ -129,15 +129,23 @@ void group_bindings::repeat(noun& n, time_point now) {
 }
 
 void group_bindings::put_updates(std::string_view lines) {
-    while (!lines.empty()) {
-        const auto size = lines.find('\n') + 1; // updates are whole lines
-        if (const auto line = lines.substr(0, size); size > protocol::datagram_bytes) {
+    std::size_t begin = 0; // of those that fit and have not been sent
+    for (std::size_t at = 0; at < lines.size();) {
+        const auto next = lines.find('\n', at) + 1; // updates are whole lines
+        if (next - at > protocol::datagram_bytes) {
+            send(lines.substr(begin, at - begin));
             ++node_.counts.updates_too_large;
-            note_too_large(line);
-        } else {
-            out_.send(line);
+            note_too_large(lines.substr(at, next - at));
+            begin = next;
         }
-        lines.remove_prefix(size);
+        at = next;
+    }
+    send(lines.substr(begin));
+}
+
+void group_bindings::send(std::string_view lines) {
+    if (!lines.empty()) {
+        out_.send_all(lines);
     }
 }
 

@@ -67,6 +67,7 @@ class group_bindings final : private binder {
     void repeat_soon(noun& n, bool put_off, time_point now);
     void repeat(noun& n, time_point now);
     void note_too_large(std::string_view line);
+    void send(std::string_view lines);
 
     // binder
     [[nodiscard]] bool takes_updates() const override { return out_.has_room(); }

@@ -13,6 +13,14 @@ class group_output {
     group_output& operator=(const group_output&) = delete;
     /// Sends a line, its LF included, as one datagram. False where it was not sent: it is too large, or too much waits.
     virtual bool send(std::string_view line) = 0;
+    /// Sends lines, none of them too large, each as one datagram, as far as there is room.
+    virtual void send_all(std::string_view lines) {
+        while (!lines.empty()) {
+            const auto size = lines.find('\n') + 1;
+            send(lines.substr(0, size));
+            lines.remove_prefix(size);
+        }
+    }
     /// Nothing waits; if something does, `group_bindings::drain` is called once it has been sent.
     [[nodiscard]] virtual bool has_room() const = 0;
 

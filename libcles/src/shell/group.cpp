@@ -6,6 +6,8 @@
 
 #include <boost/asio/post.hpp>
 
+#include <algorithm>
+#include <cstdint>
 #include <random>
 #include <string>
 #include <utility>
@@ -66,13 +68,23 @@ void group::stop() {
 }
 
 bool group::send(std::string_view line) {
-    auto& counts = engine_.node().counts;
-    if (line.size() > protocol::datagram_bytes || !port_->send(line)) {
-        ++counts.group_unsent;
+    if (line.size() > protocol::datagram_bytes) {
+        ++engine_.node().counts.group_unsent;
         return false;
     }
-    ++counts.group_sent;
-    return true;
+    return put(line);
+}
+
+void group::send_all(std::string_view lines) { put(lines); }
+
+// True where all of it has been sent, or waits for room.
+bool group::put(std::string_view lines) {
+    auto& counts = engine_.node().counts;
+    const auto taken = port_->send(lines);
+    counts.group_sent += taken.lines;
+    const auto left = lines.substr(taken.bytes);
+    counts.group_unsent += static_cast<std::uint64_t>(std::ranges::count(left, '\n'));
+    return left.empty();
 }
 
 void group::on_datagram(const transport::group_datagram& datagram) {

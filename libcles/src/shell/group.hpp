@@ -30,12 +30,14 @@ class group final : public core::group_output, private transport::group_events {
     void stop();
     /// To all nodes of the group. What is not sent is counted.
     bool send(std::string_view line) override;
+    void send_all(std::string_view lines) override;
     [[nodiscard]] bool has_room() const override { return port_->unsent() == 0; }
     [[nodiscard]] core::group_session& session() noexcept { return session_; }
     /// Where what this node sends comes from.
     [[nodiscard]] const core::group_source& source() const noexcept { return source_; }
 
   private:
+    bool put(std::string_view lines);
     void on_datagram(const transport::group_datagram& datagram) override;
     void on_batch() override;
     void on_room() override;

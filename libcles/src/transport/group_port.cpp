@@ -3,7 +3,6 @@
 
 #include "transport/group_socket_option.hpp"
 
-#include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
 
 #include <utility>
@@ -19,6 +18,7 @@ group_port::group_port(const asio::any_io_executor& executor, const ip_interface
     set_ip_option(own_, IP_MULTICAST_IF, membership(group_, by.index));
     set_ip_option(own_, IP_MULTICAST_TTL, 1);
     set_ip_option(own_, IP_MULTICAST_LOOP, 1); // other nodes of this host hear it too
+    own_.connect(group_);                      // so that the system looks for the way there once
     own_.non_blocking(true);
     source_ = own_.local_endpoint();
 }
@@ -39,29 +39,36 @@ void group_port::close() {
 
 // -- sending -------------------------------------------------------------------------------------------------------
 
-bool group_port::try_to_send(std::string_view line) {
-    error_code code;
-    own_.send_to(asio::buffer(line.data(), line.size()), group_, 0, code);
-    return code != asio::error::would_block;
-}
-
-bool group_port::send(std::string_view line) {
-    if (!own_.is_open() || (unsent() == 0 && try_to_send(line))) {
-        return true;
+lines_done group_port::send(std::string_view lines) {
+    if (!own_.is_open()) {
+        return {.bytes = lines.size()}; // all of it is lost
     }
-    if (unsent() + line.size() > most_waiting) {
-        return false;
+    lines_done taken;
+    while (unsent() == 0 && taken.bytes < lines.size()) {
+        const auto sent = send_burst(own_, lines.substr(taken.bytes));
+        if (sent.lines == 0) {
+            break;
+        }
+        taken.lines += sent.lines;
+        taken.bytes += sent.bytes;
     }
-    waiting_.append(line);
+    while (taken.bytes < lines.size()) {
+        const auto line = lines.substr(taken.bytes, lines.find('\n', taken.bytes) + 1 - taken.bytes);
+        if (unsent() + line.size() > most_waiting) {
+            break;
+        }
+        waiting_.append(line);
+        ++taken.lines;
+        taken.bytes += line.size();
+    }
     send_rest();
-    return true;
+    return taken;
 }
 
 void group_port::send_rest() {
     while (unsent() != 0) {
-        const auto line =
-            std::string_view{waiting_}.substr(waiting_at_, waiting_.find('\n', waiting_at_) + 1 - waiting_at_);
-        if (!try_to_send(line)) {
+        const auto sent = send_burst(own_, std::string_view{waiting_}.substr(waiting_at_));
+        if (sent.lines == 0) {
             if (!waits_for_room_) {
                 waits_for_room_ = true;
                 own_.async_wait(udp::socket::wait_write, [self = shared_from_this()](error_code code) {
@@ -76,7 +83,7 @@ void group_port::send_rest() {
             }
             return;
         }
-        waiting_at_ += line.size();
+        waiting_at_ += sent.bytes;
     }
     waiting_.clear();
     waiting_at_ = 0;

@@ -3,6 +3,7 @@
 
 #include <cles/multicast.hpp>
 
+#include "transport/datagram_burst.hpp"
 #include "transport/group_events.hpp"
 #include "transport/group_receiver.hpp"
 #include "transport/ip_interface.hpp"
@@ -28,9 +29,10 @@ class group_port : public std::enable_shared_from_this<group_port> {
 
     /// Begins to hand over what comes. The owner stays until `close`.
     void start(group_events& owner);
-    /// Sends a line, its LF included, as one datagram; what finds no room in the socket waits for it. False where as
-    /// much waits as may. A datagram that cannot be sent for another reason is as good as lost on its way.
-    bool send(std::string_view line);
+    /// Sends whole lines, each with its LF as one datagram; what finds no room in the socket waits for it. A datagram
+    /// that cannot be sent for another reason is as good as lost on its way.
+    /// \return what it took; less than all where as much waits as may
+    lines_done send(std::string_view lines);
     /// Bytes that wait for room.
     [[nodiscard]] std::size_t unsent() const noexcept { return waiting_.size() - waiting_at_; }
     void close();
@@ -42,7 +44,6 @@ class group_port : public std::enable_shared_from_this<group_port> {
     static constexpr std::size_t most_waiting = 1U << 16U;
 
   private:
-    bool try_to_send(std::string_view line);
     void send_rest();
 
     udp::endpoint group_;
