@@ -3,34 +3,113 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdint>
+#include <cstring>
 
+#include <netinet/in.h>
+#include <netinet/udp.h>
 #include <sys/socket.h>
 
 namespace cles::transport {
 namespace {
 
-constexpr std::size_t most = 32;
+constexpr std::size_t most_runs = 32;
+constexpr std::size_t most_in_run = 64;        // UDP_MAX_SEGMENTS, which no header tells
+constexpr std::size_t longest_run = 1U << 15U; // of the 64 KiB of one datagram
+
+using segment_size = std::uint16_t;
+
+// Lines of one length; the last may be shorter.
+struct run {
+    std::string_view text;
+    std::size_t lines;
+    segment_size each;
+};
+
+std::string_view first_line(std::string_view lines) noexcept { return lines.substr(0, lines.find('\n') + 1); }
+
+run first_run(std::string_view lines, std::size_t most) noexcept {
+    const auto length = first_line(lines).size();
+    std::size_t bytes = length;
+    std::size_t count = 1;
+    for (bool alike = true; alike && count < most && bytes < lines.size(); ++count) {
+        const auto next = first_line(lines.substr(bytes)).size();
+        if (next > length || bytes + next > longest_run) {
+            break;
+        }
+        bytes += next;
+        alike = next == length;
+    }
+    return {.text = lines.substr(0, bytes), .lines = count, .each = static_cast<segment_size>(length)};
+}
+
+struct segment_control {
+    alignas(cmsghdr) std::array<char, CMSG_SPACE(sizeof(segment_size))> bytes;
+};
+
+void segment(msghdr& message, segment_control& control, segment_size each) noexcept {
+    control = {};
+    message.msg_control = control.bytes.data();
+    message.msg_controllen = control.bytes.size();
+    auto* const head = CMSG_FIRSTHDR(&message);
+    head->cmsg_level = SOL_UDP;
+    head->cmsg_type = UDP_SEGMENT;
+    head->cmsg_len = CMSG_LEN(sizeof each);
+    std::memcpy(CMSG_DATA(head), &each, sizeof each);
+}
+
+// No checksums by the interface, or longer than its frames.
+bool cannot_segment(int code) noexcept { return code == EIO || code == EINVAL || code == EMSGSIZE; }
 
 } // namespace
 
-lines_done send_burst(boost::asio::ip::udp::socket& socket, std::string_view lines) noexcept {
-    std::array<iovec, most> texts;     // NOLINT(cppcoreguidelines-pro-type-member-init): as far as it is used
-    std::array<mmsghdr, most> headers; // NOLINT(cppcoreguidelines-pro-type-member-init): the same
+datagram_burst::datagram_burst(udp::socket& socket) noexcept : socket_(socket) {
+    const int not_by_itself = 0;
+    segments_ = ::setsockopt(socket.native_handle(), SOL_UDP, UDP_SEGMENT, &not_by_itself, sizeof not_by_itself) == 0;
+}
+
+lines_done datagram_burst::send(std::string_view lines, const udp::endpoint* to) noexcept {
+    // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): as far as they are used
+    std::array<std::size_t, most_runs> in_each;
+    std::array<iovec, most_runs> texts;
+    std::array<mmsghdr, most_runs> messages;
+    std::array<segment_control, most_runs> controls;
+    // NOLINTEND(cppcoreguidelines-pro-type-member-init)
     unsigned count = 0;
-    for (auto rest = lines; !rest.empty() && count < most; ++count) {
-        const auto line = rest.substr(0, rest.find('\n') + 1);
-        rest.remove_prefix(line.size());
-        texts[count] = {.iov_base = const_cast<char*>(line.data()), .iov_len = line.size()};
-        headers[count] = {};
-        headers[count].msg_hdr.msg_iov = &texts[count];
-        headers[count].msg_hdr.msg_iovlen = 1;
+    for (auto rest = lines; !rest.empty() && count < most_runs; ++count) {
+        const auto now = first_run(rest, segments_ ? most_in_run : 1);
+        rest.remove_prefix(now.text.size());
+        in_each[count] = now.lines;
+        texts[count] = {.iov_base = const_cast<char*>(now.text.data()), .iov_len = now.text.size()};
+        messages[count] = {};
+        messages[count].msg_hdr.msg_iov = &texts[count];
+        messages[count].msg_hdr.msg_iovlen = 1;
+        if (to != nullptr) {
+            messages[count].msg_hdr.msg_name = const_cast<sockaddr*>(to->data());
+            messages[count].msg_hdr.msg_namelen = static_cast<socklen_t>(to->size());
+        }
+        if (now.lines > 1) {
+            segment(messages[count].msg_hdr, controls[count], now.each);
+        }
     }
-    const auto sent = ::sendmmsg(socket.native_handle(), headers.data(), count, MSG_DONTWAIT);
+    const auto try_it = [&] { return ::sendmmsg(socket_.native_handle(), messages.data(), count, MSG_DONTWAIT); };
+    auto sent = try_it();
+    if (sent < 0 && errno == ECONNREFUSED) { // an earlier datagram was; of these none has been sent
+        sent = try_it();
+    }
     if (sent < 0) {
-        return errno == EAGAIN ? lines_done{} : lines_done{.lines = 1, .bytes = texts[0].iov_len};
+        if (errno == EAGAIN) {
+            return {};
+        }
+        if (in_each[0] > 1 && cannot_segment(errno)) {
+            segments_ = false;
+            return send(lines, to);
+        }
+        return {.lines = in_each[0], .bytes = texts[0].iov_len};
     }
-    lines_done done{.lines = static_cast<std::size_t>(sent)};
-    for (std::size_t i = 0; i < done.lines; ++i) {
+    lines_done done;
+    for (int i = 0; i < sent; ++i) {
+        done.lines += in_each[i];
         done.bytes += texts[i].iov_len;
     }
     return done;

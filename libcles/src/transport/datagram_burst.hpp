@@ -14,9 +14,25 @@ struct lines_done {
     std::size_t bytes = 0;
 };
 
-/// Sends whole lines, each with its LF as a datagram of its own, as many as go by one system call (sendmmsg(2)). One
-/// that cannot be sent is as good as lost on its way, and done with. \return what is done; nothing: there is no room
-/// \pre the socket is connected, and does not block; there is a line
-lines_done send_burst(boost::asio::ip::udp::socket& socket, std::string_view lines) noexcept;
+/// Sends whole lines, each with its LF as a datagram of its own, as many as go by one system call (sendmmsg(2)). Those
+/// of one length that follow each other pass through the system as one, until the network or a socket that does not
+/// take them so parts them (UDP_SEGMENT, udp(7)): finding the way is most of what a datagram costs.
+///
+/// Where the interface cannot do that, each goes alone.
+class datagram_burst {
+  public:
+    using udp = boost::asio::ip::udp;
+
+    /// \pre the socket outlives it, and does not block
+    explicit datagram_burst(udp::socket& socket) noexcept;
+
+    /// To whom the socket is connected, or else to `to`. A line that cannot be sent is as good as lost on its way, and
+    /// done with. \return what is done; nothing: there is no room \pre there is a line
+    lines_done send(std::string_view lines, const udp::endpoint* to = nullptr) noexcept;
+
+  private:
+    udp::socket& socket_;
+    bool segments_;
+};
 
 } // namespace cles::transport

@@ -13,12 +13,11 @@ using boost::system::error_code;
 
 group_port::group_port(const asio::any_io_executor& executor, const ip_interface& by, const multicast_options& where)
     : group_(asio::ip::make_address_v4(where.group), where.port), receiver_(group_receiver::of(executor, by, group_)),
-      own_(executor, udp::v4()) {
+      own_(executor, udp::v4()), burst_(own_) {
     own_.bind({by.address, 0});
     set_ip_option(own_, IP_MULTICAST_IF, membership(group_, by.index));
     set_ip_option(own_, IP_MULTICAST_TTL, 1);
     set_ip_option(own_, IP_MULTICAST_LOOP, 1); // other nodes of this host hear it too
-    own_.connect(group_);                      // so that the system looks for the way there once
     own_.non_blocking(true);
     source_ = own_.local_endpoint();
 }
@@ -44,13 +43,12 @@ lines_done group_port::send(std::string_view lines) {
         return {.bytes = lines.size()}; // all of it is lost
     }
     lines_done taken;
-    while (unsent() == 0 && taken.bytes < lines.size()) {
-        const auto sent = send_burst(own_, lines.substr(taken.bytes));
-        if (sent.lines == 0) {
-            break;
-        }
+    bool room = unsent() == 0;
+    while (room && taken.bytes < lines.size()) {
+        const auto sent = burst_.send(lines.substr(taken.bytes), &group_);
         taken.lines += sent.lines;
         taken.bytes += sent.bytes;
+        room = sent.lines != 0;
     }
     while (taken.bytes < lines.size()) {
         const auto line = lines.substr(taken.bytes, lines.find('\n', taken.bytes) + 1 - taken.bytes);
@@ -61,26 +59,31 @@ lines_done group_port::send(std::string_view lines) {
         ++taken.lines;
         taken.bytes += line.size();
     }
-    send_rest();
+    wait_for_room();
     return taken;
+}
+
+void group_port::wait_for_room() {
+    if (unsent() == 0 || waits_for_room_) {
+        return;
+    }
+    waits_for_room_ = true;
+    own_.async_wait(udp::socket::wait_write, [self = shared_from_this()](error_code code) {
+        self->waits_for_room_ = false;
+        if (!code && self->owner_ != nullptr) {
+            self->send_rest();
+            if (self->unsent() == 0 && self->owner_ != nullptr) {
+                self->owner_->on_room();
+            }
+        }
+    });
 }
 
 void group_port::send_rest() {
     while (unsent() != 0) {
-        const auto sent = send_burst(own_, std::string_view{waiting_}.substr(waiting_at_));
+        const auto sent = burst_.send(std::string_view{waiting_}.substr(waiting_at_), &group_);
         if (sent.lines == 0) {
-            if (!waits_for_room_) {
-                waits_for_room_ = true;
-                own_.async_wait(udp::socket::wait_write, [self = shared_from_this()](error_code code) {
-                    self->waits_for_room_ = false;
-                    if (!code && self->owner_ != nullptr) {
-                        self->send_rest();
-                        if (self->unsent() == 0 && self->owner_ != nullptr) {
-                            self->owner_->on_room();
-                        }
-                    }
-                });
-            }
+            wait_for_room();
             return;
         }
         waiting_at_ += sent.bytes;

@@ -45,11 +45,13 @@ class group_port : public std::enable_shared_from_this<group_port> {
 
   private:
     void send_rest();
+    void wait_for_room();
 
     udp::endpoint group_;
     udp::endpoint source_;
     std::shared_ptr<group_receiver> receiver_;
     udp::socket own_;
+    datagram_burst burst_;
     group_events* owner_ = nullptr; // null: closed
     std::string waiting_;
     std::size_t waiting_at_ = 0;

@@ -67,6 +67,7 @@ group_receiver::group_receiver(const asio::any_io_executor& executor, const ip_i
     error_code ignored;
     constexpr int room = 1 << 20; // a burst waits here while others have their turn
     socket_.set_option(asio::socket_base::receive_buffer_size{room}, ignored);
+    datagram_batch::keep_together(socket_);
 }
 
 // Only its own executor may ask whether the socket is open; from others the executor differs.
@@ -123,9 +124,13 @@ void group_receiver::receive() {
 
 void group_receiver::hand_over() {
     telling_ = true;
+    const auto go_on_soon = [this] {
+        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+    };
+    bool left = false;
     try {
         tell_others();
-        arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) {
+        left = arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) {
             said_ = {};
             const bool good = protocol::parse_group_message(one.text, said_);
             said_.reading = hearing_ > 1 ? &reading_ : nullptr;
@@ -134,7 +139,7 @@ void group_receiver::hand_over() {
             tell_others();
         });
     } catch (...) { // a handler's, for whoever runs the context; it is none of the business of all else that has come
-        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+        go_on_soon();
         throw;
     }
     // NOLINTNEXTLINE(modernize-loop-convert): each may add others, which may move them all
@@ -145,7 +150,9 @@ void group_receiver::hand_over() {
     }
     telling_ = false;
     std::erase_if(listeners_, [](const auto& each) { return each.events == nullptr; });
-    if (hearing_ != 0) {
+    if (left) {
+        go_on_soon();
+    } else if (hearing_ != 0) {
         receive();
     }
 }

@@ -70,17 +70,16 @@ void udp_link::flush() {
 
 void udp_link::send_rest() {
     while (sending_at_ < sending_.size()) {
-        const auto line =
-            std::string_view{sending_}.substr(sending_at_, sending_.find('\n', sending_at_) + 1 - sending_at_);
-        if (!port_->send(*this, line)) {
+        const auto done = port_->send(*this, std::string_view{sending_}.substr(sending_at_));
+        if (done.lines == 0) {
             if (!waiting_) {
                 waiting_ = true;
                 port_->wait_for_room(weak_from_this());
             }
             return;
         }
-        sent_ += line.size();
-        sending_at_ += line.size();
+        sent_ += done.bytes;
+        sending_at_ += done.bytes;
     }
     constexpr std::size_t largest_kept = 65536;
     if (sending_.capacity() > largest_kept) {

@@ -3,8 +3,6 @@
 
 #include "transport/ip_host.hpp"
 
-#include <boost/asio/buffer.hpp>
-#include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/container_hash/hash.hpp>
 
@@ -36,6 +34,7 @@ udp_port::udp_port(udp::socket socket) : socket_(std::move(socket)) {
     socket_.non_blocking(true, ignored);
     constexpr int room = 1 << 20; // a burst waits here while others have their turn
     socket_.set_option(asio::socket_base::receive_buffer_size{room}, ignored);
+    datagram_batch::keep_together(socket_);
 }
 
 udp_port::udp::endpoint udp_port::local() const {
@@ -96,11 +95,19 @@ void udp_port::receive() {
 
 // Until all is handed over it counts as receiving: a link that starts meanwhile must not begin to wait.
 void udp_port::hand_over() {
-    try {
-        arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) { hand_over(one); });
-    } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+    const auto go_on_soon = [this] {
         asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+    };
+    bool left = false;
+    try {
+        left = arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) { hand_over(one); });
+    } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+        go_on_soon();
         throw;
+    }
+    if (left) {
+        go_on_soon();
+        return;
     }
     receiving_ = false;
     receive();
@@ -141,21 +148,8 @@ std::shared_ptr<udp_link> udp_port::link_of(const udp::endpoint& sender) {
 
 // -- sending -------------------------------------------------------------------------------------------------------
 
-bool udp_port::send(const udp_link& to, std::string_view datagram) {
-    error_code code;
-    const auto bytes = asio::buffer(datagram.data(), datagram.size());
-    const auto try_it = [&] {
-        if (connected_) {
-            socket_.send(bytes, 0, code);
-        } else {
-            socket_.send_to(bytes, to.endpoint(), 0, code);
-        }
-    };
-    try_it();
-    if (code == asio::error::connection_refused) { // of an earlier datagram; this one has not been sent
-        try_it();
-    }
-    return code != asio::error::would_block;
+lines_done udp_port::send(const udp_link& to, std::string_view lines) {
+    return burst_.send(lines, connected_ ? nullptr : &to.endpoint());
 }
 
 void udp_port::wait_for_room(std::weak_ptr<udp_link> link) {

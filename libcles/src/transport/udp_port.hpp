@@ -4,6 +4,7 @@
 #include <cles/link.hpp>
 
 #include "transport/datagram_batch.hpp"
+#include "transport/datagram_burst.hpp"
 #include "transport/udp_link.hpp"
 
 #include <boost/asio/ip/udp.hpp>
@@ -38,9 +39,9 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
 
     // For its links.
     void receive();
-    /// False: the socket has no room just now. A datagram that cannot be sent for another reason is as good as lost on
-    /// its way.
-    bool send(const udp_link& to, std::string_view datagram);
+    /// Sends whole lines, each with its LF as a datagram. One that cannot be sent is as good as lost on its way.
+    /// \return what is done; nothing: the socket has no room just now \pre there is a line
+    lines_done send(const udp_link& to, std::string_view lines);
     void wait_for_room(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
@@ -56,6 +57,7 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
     void close_if_done();
 
     udp::socket socket_;
+    datagram_burst burst_{socket_};
     bool connected_ = false;
     bool receiving_ = false;
     std::function<void(link_ptr)> on_link_;
