@@ -96,7 +96,7 @@ void connection::on_room() {
 
 void connection::wake() {
     if (!in_batch_) {
-        node_.flush_soon(*this);
+        node_.turns().flush_soon(*this);
     }
 }
 
@@ -131,7 +131,7 @@ void connection::put_updates(std::string_view lines) {
     } else {
         link_->output().append(lines);
     }
-    node_.flush_soon(*this);
+    node_.turns().flush_soon(*this);
 }
 
 // -- output --------------------------------------------------------------------------------------------------------
@@ -147,12 +147,21 @@ void connection::flush() {
     send_output();
     follow_backlog();
     if (may_serve_more()) {
-        node_.flush_soon(*this);
+        node_.turns().flush_soon(*this);
     }
     if (updates_wait_ && link_->unsent() < updates_wait_past) {
         updates_wait_ = false;
         session_.serving().drain(node_.now());
     }
+}
+
+bool connection::write() {
+    if (gone_) {
+        return true;
+    }
+    send_output();
+    follow_backlog();
+    return !updates_wait_ && !may_serve_more();
 }
 
 void connection::send_output() {

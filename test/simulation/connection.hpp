@@ -9,6 +9,7 @@
 #include "core/session.hpp"
 #include "core/source_life.hpp"
 #include "core/topic.hpp"
+#include "core/turns.hpp"
 
 #include <cstdint>
 #include <memory>
@@ -26,6 +27,7 @@ class node_run;
 class connection final : public link_events,
                          public core::outlet,
                          public core::binder,
+                         public core::turn_taker,
                          private core::source_life::keeper,
                          public std::enable_shared_from_this<connection> {
   public:
@@ -41,7 +43,6 @@ class connection final : public link_events,
     [[nodiscard]] bool at_rest() const override { return session_.at_rest() && link_->unsent() == 0; }
     [[nodiscard]] bool usable() const noexcept { return usable_; }
     [[nodiscard]] std::size_t unsent() const noexcept { return link_->unsent(); }
-    void flush();
     void abandon(std::string_view why);
     /// The process is gone: the system closes the link, and nobody here hears of it.
     void vanish();
@@ -57,6 +58,11 @@ class connection final : public link_events,
     void on_lost(boost::system::error_code why) override;
     void on_room() override;
 
+    void flush() override;
+    [[nodiscard]] bool write() override;
+    [[nodiscard]] bool asks_alone() override { return session_.asking().in_flight() <= 1; }
+    [[nodiscard]] std::shared_ptr<core::turn_taker> share() override { return shared_from_this(); }
+
     std::string& output() override { return link_->output(); }
     [[nodiscard]] std::size_t datagram() const noexcept override { return link_->datagram(); }
     void wake() override;
@@ -67,8 +73,6 @@ class connection final : public link_events,
 
     [[nodiscard]] bool takes_updates() const override;
     void put_updates(std::string_view lines) override;
-
-    bool flush_asked = false; ///< the node will flush it
 
   private:
     struct stall_watch final : core::deadline {

@@ -95,7 +95,7 @@ void following::publish(unsigned host, unsigned noun, unsigned count, std::size_
     }
     n->run([&] {
         for (; count != 0; --count) {
-            n->node()->published.publish_body(path_of(noun), body(host, noun, size));
+            n->turns().let([&] { n->node()->published.publish_body(path_of(noun), body(host, noun, size)); });
             ++published_[host][noun];
         }
     });
@@ -110,7 +110,8 @@ void following::offer(unsigned host, unsigned count, std::size_t size) {
         for (; count != 0; --count) {
             detail::pending_ptr operation{new offered_update{offers_}};
             const auto text = body(host, when_there_is_room, size);
-            n->node()->published.publish_when_room(path_of(when_there_is_room), text, operation);
+            n->turns().let(
+                [&] { n->node()->published.publish_when_room(path_of(when_there_is_room), text, operation); });
             ++published_[host][when_there_is_room];
         }
     });

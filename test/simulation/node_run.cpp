@@ -11,7 +11,7 @@ namespace cles::simulation {
 
 node_run::node_run(network& net, unsigned host, unsigned run, core::node_setup setup)
     : place(net.time(), host, setup.name), net_(net), run_(run),
-      node_(std::make_shared<core::node>(std::move(setup), *this, [this] { ask_for_turn(); })) {}
+      node_(std::make_shared<core::node>(std::move(setup), *this, [this] { turns_.ask(); })) {}
 
 node_run::~node_run() = default;
 
@@ -37,7 +37,6 @@ void node_run::crash() {
     for (const auto& c : open_) {
         c->vanish();
     }
-    to_flush_.clear();
     seat_.reset();
 }
 
@@ -88,38 +87,11 @@ void node_run::forget(connection& c) {
     std::erase_if(open_, [&](const auto& held) { return held.get() == &c; });
 }
 
-void node_run::flush_soon(connection& c) {
-    if (!c.flush_asked) {
-        c.flush_asked = true;
-        to_flush_.push_back(c.shared_from_this());
-        ask_for_turn();
-    }
+void node_run::post_turn() {
+    later({}, [this] { turns_.turn(); });
 }
 
-// -- turns ---------------------------------------------------------------------------------------------------------
-
-void node_run::ask_for_turn() {
-    if (!turn_asked_) {
-        turn_asked_ = true;
-        later({}, [this] {
-            turn_asked_ = false;
-            turn();
-        });
-    }
-}
-
-void node_run::turn() {
-    while (auto result = node_->published.next_result()) {
-        result->tell();
-    }
-    if (node_->published.dirty()) {
-        node_->published.drain(now());
-    }
-    for (const auto& c : std::exchange(to_flush_, {})) {
-        c->flush_asked = false;
-        c->flush();
-    }
-}
+// -- time ----------------------------------------------------------------------------------------------------------
 
 // The timer goes off, if it is due by now; `follow_deadlines` comes next.
 void node_run::after_jump() {
@@ -160,7 +132,7 @@ route& node_run::route_to(unsigned to, carrier by) {
 std::uint64_t node_run::ask(unsigned to, carrier by, route::request r, detail::pending_ptr operation,
                             core::outbound::progress_function progress) {
     r.id = draw_id();
-    route_to(to, by).send(r, std::move(operation), std::move(progress));
+    turns_.let([&] { route_to(to, by).send(r, std::move(operation), std::move(progress)); });
     return r.id;
 }
 

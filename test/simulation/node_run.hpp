@@ -5,6 +5,7 @@
 
 #include "core/absence.hpp"
 #include "core/node.hpp"
+#include "core/turns.hpp"
 #include "simulation/connection.hpp"
 #include "simulation/feed_ties.hpp"
 #include "simulation/group_seat.hpp"
@@ -28,7 +29,7 @@ class datagram_port;
 
 /// One run of a node, from its start to its end or crash: the machines of core, its links and routes, and what drives
 /// them. Does what shell/engine.hpp does, in virtual time.
-class node_run final : public place {
+class node_run final : public place, private core::turn_host {
   public:
     node_run(network& net, unsigned host, unsigned run, core::node_setup setup);
     ~node_run() override;
@@ -60,7 +61,7 @@ class node_run final : public place {
 
     std::shared_ptr<connection> adopt(link_ptr made, connection::origin from);
     void forget(connection& c);
-    void flush_soon(connection& c);
+    [[nodiscard]] core::turns& turns() noexcept { return turns_; }
 
     /// Looks whether its memory is within its limits.
     void check_bounds();
@@ -69,10 +70,13 @@ class node_run final : public place {
 
   private:
     void after() override { follow_deadlines(); }
+    void post_turn() override;
+    [[nodiscard]] bool stopped() const override { return false; }
+    [[nodiscard]] core::publications& published() override { return node_->published; }
+    void route_on(time_point) override {}
+    void settle() override {} // `after` does
     void after_jump() override;
     void follow_deadlines();
-    void ask_for_turn();
-    void turn();
     void on_accepted(link_ptr made);
     [[nodiscard]] bool has_room(bool for_source);
     void complain(rule which, const std::string& what) { watcher().broken(which, name() + ": " + what); }
@@ -85,11 +89,10 @@ class node_run final : public place {
     feed_ties feeds_{*this};
     std::shared_ptr<datagram_port> door_;
     std::unique_ptr<group_seat> seat_;
-    std::vector<std::shared_ptr<connection>> to_flush_;
     std::optional<time_point> set_for_;
     core::absence absence_;
     std::uint64_t timer_ = 0; // the one that counts
-    bool turn_asked_ = false;
+    core::turns turns_{*this, *this};
 };
 
 } // namespace cles::simulation

@@ -30,6 +30,25 @@ BOOST_AUTO_TEST_CASE(the_first_and_those_that_come_after_a_while_are_alone) {
     BOOST_TEST(all.alone(start + longest));
 }
 
+BOOST_AUTO_TEST_CASE(where_several_came_together_the_next_is_not_taken_for_one_alone) {
+    constexpr auto cycle = 10 * longest;
+    cles::core::update_gathering all;
+    all.gone(1, start);
+    BOOST_TEST(all.waits(3, start));
+    BOOST_TEST(!all.waits(3, start));
+    all.gone(3, start); // two behind the first
+    BOOST_TEST(!all.alone(start + cycle));
+    BOOST_TEST(!all.waits(6, start + cycle)); // they go with the turn
+    all.gone(6, start + cycle);
+    BOOST_TEST(!all.alone(start + 2 * cycle));
+    BOOST_TEST(!all.waits(7, start + 2 * cycle));
+    all.gone(7, start + 2 * cycle); // one alone
+    BOOST_TEST(all.alone(start + 3 * cycle));
+    all.gone(8, start + 3 * cycle);
+    all.gone(9, start + 3 * cycle + longest / 2); // one that followed it closely
+    BOOST_TEST(!all.alone(start + 4 * cycle));
+}
+
 BOOST_AUTO_TEST_CASE(behind_others_they_wait_while_each_turn_brings_more) {
     cles::core::update_gathering all;
     all.gone(1, start);

@@ -29,6 +29,15 @@
 /// as in "route[2].lat: expected a number, got a string".
 
 namespace cles {
+namespace detail {
+
+template <class T>
+concept described_struct = std::is_class_v<T> && boost::describe::has_describe_members<T>::value;
+
+template <class T>
+concept described_enum = std::is_enum_v<T> && boost::describe::has_describe_enumerators<T>::value;
+
+} // namespace detail
 
 /// JSON text as a value of its own. Reading copies it; writing checks it and drops its white space.
 struct json_text {
@@ -58,7 +67,7 @@ bool read_json(json_reader& r, T& value) {
 template <class T>
 std::string to_json(const T& value) {
     std::string out;
-    if constexpr (std::is_class_v<T>) {
+    if constexpr (detail::described_struct<T>) {
         constexpr std::size_t usual = 200; // room for most at once
         out.reserve(usual);
     }
@@ -95,12 +104,6 @@ namespace detail {
 
 /// \throws cles::error with `failed` where the text is not JSON
 void write_text(json_writer& w, std::string_view json);
-
-template <class T>
-concept described_struct = std::is_class_v<T> && boost::describe::has_describe_members<T>::value;
-
-template <class T>
-concept described_enum = std::is_enum_v<T> && boost::describe::has_describe_enumerators<T>::value;
 
 } // namespace detail
 

@@ -8,6 +8,7 @@
 #include "core/session.hpp"
 #include "core/source_life.hpp"
 #include "core/topic.hpp"
+#include "core/turns.hpp"
 
 #include <cstdint>
 #include <memory>
@@ -29,6 +30,7 @@ namespace cles::shell {
 class connection final : public link_events,
                          public core::outlet,
                          public core::binder,
+                         public core::turn_taker,
                          private core::source_life::keeper,
                          public std::enable_shared_from_this<connection> {
   public:
@@ -47,12 +49,6 @@ class connection final : public link_events,
     [[nodiscard]] bool at_rest() const override { return session_.at_rest() && link_->unsent() == 0; }
     /// Whether requests can still be sent.
     [[nodiscard]] bool usable() const noexcept { return usable_; }
-    /// Writes what is there, and has more served and published where there is room again.
-    void flush();
-    /// Writes what is there; no handler runs. False where `flush` would do more.
-    [[nodiscard]] bool write();
-    /// Whether no other request of this node's waits here for its answer.
-    [[nodiscard]] bool asks_alone() noexcept { return session_.asking().in_flight() <= 1; }
     /// Ends it at once, without a word to its owner.
     void abandon(std::string_view why);
     /// Sends a BIND for a feed and follows it from then on.
@@ -69,6 +65,12 @@ class connection final : public link_events,
     void on_lost(boost::system::error_code why) override;
     void on_room() override;
 
+    // turn_taker
+    void flush() override;
+    [[nodiscard]] bool write() override;
+    [[nodiscard]] bool asks_alone() override { return session_.asking().in_flight() <= 1; }
+    [[nodiscard]] std::shared_ptr<core::turn_taker> share() override { return shared_from_this(); }
+
     // outlet
     std::string& output() override { return link_->output(); }
     std::string& urgent_output() override { return link_->urgent_output(); }
@@ -84,8 +86,6 @@ class connection final : public link_events,
     void put_updates(std::string_view lines) override;
 
   private:
-    friend class turns;
-
     struct stall_watch final : core::deadline {
         explicit stall_watch(connection& c) : owner(c) {}
         void on_deadline(time_point now) override { owner.on_stall(now); }
@@ -117,7 +117,6 @@ class connection final : public link_events,
     unsigned lines_ = 0;            // of this batch
     bool usable_ = true;
     bool gone_ = false;
-    bool flush_asked_ = false;          // the next turn will flush it
     mutable bool updates_wait_ = false; // some were not taken
     bool pause_for_queue_ = false;
     bool pause_for_backlog_ = false;

@@ -134,6 +134,18 @@ std::string engine::stranger(const identity& peer) const {
     return peer.local || !peer.name.empty() || networks_.contain(host) ? std::string{} : host;
 }
 
+// -- turns ---------------------------------------------------------------------------------------------------------
+
+void engine::post_turn() {
+    asio::post(executor_, [self = shared_from_this()] { self->turns_.turn(); });
+}
+
+void engine::route_on(time_point now) {
+    if (routing_) {
+        routing_->drain(now);
+    }
+}
+
 // -- asking --------------------------------------------------------------------------------------------------------
 
 void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message) {
@@ -190,12 +202,19 @@ void engine::cancel(std::uint64_t ticket) {
 // -- serving and publishing ----------------------------------------------------------------------------------------
 
 void engine::add(registration task) {
-    core::handler entry{.info = std::move(task.info), .plain = std::move(task.plain)};
+    core::handler entry{.info = std::move(task.info)};
+    if (task.plain) {
+        entry.plain = [this, handler = std::move(task.plain)](auto&&... what) {
+            const core::turns::serving during{turns_};
+            return handler(std::forward<decltype(what)>(what)...);
+        };
+    }
     if (task.async) {
-        entry.start = [handler = std::move(task.async), executor = executor_,
+        entry.start = [this, handler = std::move(task.async), executor = executor_,
                        self = weak_from_this()](const request& r, const std::shared_ptr<core::call>& call) {
             // Held here too, so that what a handler throws is the answer, and not that its responder went without one.
             const auto control = std::make_shared<shell::service_call>(call, executor, self);
+            const core::turns::serving during{turns_};
             try {
                 handler(r, responder{control});
             } catch (...) {
@@ -267,6 +286,9 @@ void engine::publish_when_room(std::string_view noun, std::string_view json, pen
         turns_.let([&] { node_->published.publish_when_room(noun, json, operation); });
         settle();
     } catch (const error& e) {
+        if (operation == nullptr) { // it has been taken, and is told of its end elsewhere
+            throw;
+        }
         fail_later(std::move(operation), e.code(), e.message());
     }
 }

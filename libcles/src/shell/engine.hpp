@@ -7,6 +7,7 @@
 
 #include "core/feed_machine.hpp"
 #include "core/node.hpp"
+#include "core/turns.hpp"
 #include "protocol/grammar.hpp"
 #include "shell/connection.hpp"
 #include "shell/connections.hpp"
@@ -20,7 +21,6 @@
 #include "shell/routes.hpp"
 #include "shell/routing_part.hpp"
 #include "shell/steady_clock.hpp"
-#include "shell/turns.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 
@@ -33,7 +33,7 @@
 namespace cles::detail {
 
 /// The inside of a service: the node, its links and routes, and what drives them.
-class engine final : public std::enable_shared_from_this<engine> {
+class engine final : public std::enable_shared_from_this<engine>, private core::turn_host {
   public:
     engine(boost::asio::any_io_executor executor, service_options options);
     ~engine();
@@ -42,15 +42,14 @@ class engine final : public std::enable_shared_from_this<engine> {
     void start(const std::vector<std::string>& listen_at);
     std::string listen(std::string_view where);
     void stop();
-    [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
     // For the rooms beneath.
     [[nodiscard]] core::node& node() noexcept { return *node_; }
     [[nodiscard]] const std::shared_ptr<core::node>& shared_node() const noexcept { return node_; }
     [[nodiscard]] const limits& bounds() const noexcept { return node_->bounds; }
     [[nodiscard]] core::deadline_queue& deadlines() noexcept { return node_->deadlines; }
-    [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
     [[nodiscard]] time_point now() const { return clock_.now(); }
+    [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
     /// The address of a peer that might be another than it says, for which there is a limit on what is sent there;
     /// empty for others.
     [[nodiscard]] std::string stranger(const identity& peer) const;
@@ -65,11 +64,17 @@ class engine final : public std::enable_shared_from_this<engine> {
     void on_round_over();
     /// A connection has ended.
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
-    [[nodiscard]] shell::turns& turns() noexcept { return turns_; }
+    [[nodiscard]] core::turns& turns() noexcept { return turns_; }
     /// What routing has to do; null where it is off.
     [[nodiscard]] routing_host* routing() noexcept { return routing_.get(); }
+
+    // turn_host
+    void post_turn() override;
+    [[nodiscard]] bool stopped() const override { return stopped_; }
+    [[nodiscard]] core::publications& published() override { return node_->published; }
+    void route_on(time_point now) override;
     /// To be called when something has happened: sets the timer.
-    void settle() { timer_->follow(node_->deadlines); }
+    void settle() override { timer_->follow(node_->deadlines); }
 
     // For the façade.
     void add(registration task);
@@ -108,7 +113,7 @@ class engine final : public std::enable_shared_from_this<engine> {
     std::shared_ptr<shell::outside_updates> outside_updates_; ///< once somebody wants to publish from elsewhere
     const routing_part* routing_wanted_;
     std::unique_ptr<routing_host> routing_; // null: off
-    shell::turns turns_{*this};
+    core::turns turns_{*this, clock_};
     bool stopped_ = false;
 };
 

@@ -1,0 +1,148 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "core/turns.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace cles::core {
+namespace {
+
+// Publishers that go on in one turn, before others have theirs.
+constexpr int most_go_on = 8;
+
+} // namespace
+
+class turns::round {
+  public:
+    explicit round(turns& of) noexcept : of_(of), these_(std::exchange(of.waiting_, std::exchange(of.spare_, {}))) {}
+    round(const round&) = delete;
+    round& operator=(const round&) = delete;
+    ~round() {
+        std::erase(these_, nullptr);
+        if (!these_.empty()) {
+            std::ranges::move(of_.waiting_, std::back_inserter(these_));
+            of_.waiting_.swap(these_);
+            these_.clear();
+        }
+        of_.spare_ = std::move(these_);
+    }
+
+    /// `flush` is asked of each; true: it is done with. While it runs it may begin to wait again.
+    template <class F>
+    void each(F&& flush) {
+        for (auto& place : these_) {
+            auto one = std::exchange(place, nullptr);
+            one->waits_ = false;
+            if (!flush(*one) && !one->waits_) {
+                one->waits_ = true;
+                place = std::move(one);
+            }
+        }
+    }
+
+  private:
+    turns& of_;
+    std::vector<std::shared_ptr<turn_taker>> these_;
+};
+
+void turns::ask() {
+    if (!asked_ && !host_.stopped()) {
+        host_.post_turn();
+        asked_ = true;
+    }
+}
+
+void turns::flush_soon(turn_taker& which) {
+    // Once stopped there are no more turns; `stop` itself flushes whatever is said on the way, like a farewell.
+    if (!which.waits_ && !host_.stopped()) {
+        waiting_.push_back(which.share());
+        which.waits_ = true;
+        ask();
+    }
+}
+
+void turns::stop() {
+    for (const auto& each : std::exchange(waiting_, {})) {
+        each->flush();
+    }
+}
+
+void turns::turn() {
+    asked_ = false;
+    if (host_.stopped()) {
+        return;
+    }
+    try {
+        carry_on();
+    } catch (...) {
+        ask_if_something_waits();
+        throw;
+    }
+    ask_if_something_waits();
+    host_.settle();
+}
+
+void turns::carry_on() {
+    let_publishers_go_on();
+    if (host_.stopped()) {
+        return;
+    }
+    host_.route_on(time_.now());
+    const auto gone = publish(false);
+    round{*this}.each([](turn_taker& one) {
+        one.flush();
+        return true;
+    });
+    if (gone) {
+        gathering_.gone(*gone, time_.now()); // not before: to write to many binders takes longer than updates may wait
+    }
+}
+
+// Each may publish again at once, and then waits here anew. What they do may throw.
+void turns::let_publishers_go_on() {
+    auto& published = host_.published();
+    for (int i = 0; i < most_go_on; ++i) {
+        auto next = published.next_result();
+        if (!next) {
+            return;
+        }
+        if (i == 0) {
+            ask();
+        }
+        next->tell();
+    }
+}
+
+std::optional<std::uint64_t> turns::publish(bool alone) {
+    auto& published = host_.published();
+    if (!published.dirty()) {
+        return std::nullopt;
+    }
+    const auto now = time_.now();
+    if (alone ? !gathering_.alone(now) : gathering_.waits(published.published(), now)) {
+        return std::nullopt;
+    }
+    const posts_none during{*this}; // it is flushed right behind
+    published.drain(now);
+    return published.published();
+}
+
+void turns::say_at_once() {
+    if (host_.stopped()) {
+        return;
+    }
+    const auto gone = publish(true);
+    round{*this}.each([&](turn_taker& one) { return (gone || one.asks_alone()) && one.write(); });
+    if (gone) {
+        gathering_.gone(*gone, time_.now());
+    }
+    ask_if_something_waits();
+}
+
+void turns::ask_if_something_waits() {
+    if (host_.published().dirty() || host_.published().has_results() || !waiting_.empty()) {
+        ask();
+    }
+}
+
+} // namespace cles::core
