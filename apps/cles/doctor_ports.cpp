@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/error.hpp>
+#include <cles/url.hpp>
 
 #include "client.hpp"
 #include "doctor_checks.hpp"
@@ -24,7 +25,6 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr std::uint16_t usual_port = 25370;
 constexpr auto port_patience = 500ms;
 
 struct listener {
@@ -78,16 +78,16 @@ boost::system::error_code try_to_bind(asio::io_context& io, std::uint16_t port) 
 }
 
 finding taken(const std::string& url, std::string_view protocol, const std::string& why) {
-    const auto holder = holder_of(protocol, usual_port);
+    const auto holder = holder_of(protocol, cles::default_port);
     return {"ports", verdict::failure,
             url + ": " + (holder.empty() ? "another program" : holder) + " is there, and it is no node: " + why,
             "stop it, or let nodes listen elsewhere: --listen of cles serve, listen in clesd.yaml"};
 }
 
 asio::awaitable<void> check_usual(client& asker, std::string_view protocol, findings& found) {
-    const auto url = std::string{protocol} + "://127.0.0.1:" + std::to_string(usual_port);
-    const auto code = protocol == "tcp" ? try_to_bind<asio::ip::tcp>(asker.context(), usual_port)
-                                        : try_to_bind<asio::ip::udp>(asker.context(), usual_port);
+    const auto url = std::string{protocol} + "://127.0.0.1:" + std::to_string(cles::default_port);
+    const auto code = protocol == "tcp" ? try_to_bind<asio::ip::tcp>(asker.context(), cles::default_port)
+                                        : try_to_bind<asio::ip::udp>(asker.context(), cles::default_port);
     if (!code) {
         found.push_back({"ports", verdict::ok, url + " is free"});
         co_return;

@@ -200,7 +200,7 @@ class overseer {
             }
             const int status = process.status();
             const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
-            book_.gone(name, now(), well);
+            book_.gone(name, well);
             unsteady_ = true;
             note(name, well ? "left" : "gone", well ? "in good order" : how_ended(status) + last_line(name));
         }

@@ -29,11 +29,11 @@ void logbook::take(const std::string& vehicle, const state& told) {
     }
 }
 
-void logbook::gone(const std::string& vehicle, double t, bool left) { gone_.try_emplace(vehicle, departure{t, left}); }
+void logbook::gone(const std::string& vehicle, bool left) { gone_.try_emplace(vehicle, left); }
 
 bool logbook::has_left(const std::string& vehicle) const {
     const auto found = gone_.find(vehicle);
-    return found != gone_.end() && found->second.left;
+    return found != gone_.end() && found->second;
 }
 
 const state* logbook::last(const std::string& vehicle) const {
@@ -53,7 +53,7 @@ std::optional<motion> logbook::where(const std::string& vehicle, double t) const
         return between(before, *next, t);
     }
     const auto end = gone_.find(vehicle);
-    if (end != gone_.end() && end->second.left) {
+    if (end != gone_.end() && end->second) {
         return std::nullopt;
     }
     return advance(before.where(), end != gone_.end() ? without_driver(before.u) : before.u, lag_, t - before.t);

@@ -19,7 +19,7 @@ class logbook {
     void take(const std::string& vehicle, const state& told);
     /// Its process has gone at that time. \param left in good order: it is not on the lane any more; otherwise it stays
     /// there, and its brakes apply
-    void gone(const std::string& vehicle, double t, bool left);
+    void gone(const std::string& vehicle, bool left);
     /// Nothing before its first state and after it has left.
     [[nodiscard]] std::optional<motion> where(const std::string& vehicle, double t) const;
     /// The last it told; null: nothing yet.
@@ -28,14 +28,9 @@ class logbook {
     [[nodiscard]] bool has_left(const std::string& vehicle) const;
 
   private:
-    struct departure {
-        double t = 0;
-        bool left = false;
-    };
-
     double lag_;
     std::map<std::string, std::vector<state>> told_; ///< of each, in the order of time
-    std::map<std::string, departure> gone_;
+    std::map<std::string, bool> gone_;               ///< whether by leaving
 };
 
 } // namespace platoon

@@ -26,7 +26,6 @@ class daemon_log {
     void set(log_config how);
     void write(log_level level, const log_entry& entry) const;
 
-    void debug(std::string_view text) const { write(log_level::debug, text); }
     void info(std::string_view text) const { write(log_level::info, text); }
     void warning(std::string_view text) const { write(log_level::warning, text); }
     void error(std::string_view text) const { write(log_level::error, text); }

@@ -11,16 +11,10 @@ import time
 import unittest
 
 import shells
-from support import CLES, Node, ScriptedNode, cles, environment, id_of, wait_until
+from support import CLES, Node, ScriptedNode, cles, environment, free_port, id_of, wait_until
 
 # The program by its name, so that the scripts find it as they do where it is installed.
 FOLDER = os.path.dirname(os.path.abspath(shutil.which(CLES) or CLES))
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 GROUP = f"lo,239.255.25.37:{free_port()}"

@@ -5,10 +5,9 @@ tests' own."""
 
 import json
 import signal
-import socket
 import unittest
 
-from support import PATIENCE, Node, cles, environment, finish, read_line, start, wait_until
+from support import PATIENCE, Node, cles, environment, finish, free_port, read_line, start, wait_until
 
 
 def told(process, text):
@@ -17,12 +16,6 @@ def told(process, text):
         if text in line:
             return line
     raise AssertionError(f"it ended, and did not say '{text}'")
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 PORT = free_port()

@@ -6,20 +6,13 @@ import json
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import unittest
 
-from support import CLES, PATIENCE, cles, environment, finish, read_line, start, wait_until
+from support import CLES, PATIENCE, cles, environment, finish, free_port, read_line, start, wait_until
 
 GROUP = "239.255.25.37"
-
-
-def free_port():
-    with socket.socket(type=socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 class Processes(unittest.TestCase):

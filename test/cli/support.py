@@ -74,6 +74,13 @@ def finish(process):
     return process.returncode, out, err
 
 
+def free_port():
+    """A UDP port that nobody has, for a multicast group of the test's own."""
+    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
 def wait_until(condition, what):
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:

@@ -4,16 +4,9 @@
 
 import json
 import signal
-import socket
 import unittest
 
-from support import Node, cles, environment, finish, on_terminal, read_line, start
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+from support import Node, cles, environment, finish, free_port, on_terminal, read_line, start
 
 
 GROUP = f"lo,239.255.25.37:{free_port()}"

@@ -30,8 +30,8 @@ BOOST_AUTO_TEST_CASE(one_that_was_killed_brakes_and_one_that_left_is_not_there) 
     book.take("v1", told(1, 0, 20));
     book.take("v2", told(1, -15, 20));
     BOOST_TEST(std::abs(book.where("v1", 3)->v - 20) < 1e-9);
-    book.gone("v1", 1, false);
-    book.gone("v2", 1, true);
+    book.gone("v1", false);
+    book.gone("v2", true);
     BOOST_TEST(std::abs(book.where("v1", 3)->v - 14.9) < 0.02);
     BOOST_TEST(!book.where("v2", 3));
     BOOST_TEST(book.where("v2", 1).has_value() == false);
