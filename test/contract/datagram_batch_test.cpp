@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/datagram_batch.hpp"
+#include "transport/datagram_burst.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/io_context.hpp>
@@ -7,7 +8,10 @@
 
 #include <cstddef>
 #include <string>
+#include <string_view>
 #include <vector>
+
+#include <sys/eventfd.h>
 
 namespace {
 
@@ -76,6 +80,55 @@ BOOST_AUTO_TEST_CASE(one_of_the_longest_is_whole_and_a_longer_one_shows_as_such)
     BOOST_REQUIRE(texts.size() == 2U);
     BOOST_TEST(texts[0].size() == 1200U);
     BOOST_TEST(texts[1].size() == 9000U);
+}
+
+BOOST_AUTO_TEST_CASE(a_turn_hands_over_so_many_and_leaves_the_rest_where_it_is) {
+    cles::transport::datagram_batch::keep_together(here);
+    here.set_option(asio::socket_base::receive_buffer_size{1 << 20});
+    one.connect(here.local_endpoint());
+    std::string lines;
+    constexpr std::size_t sent = 600;
+    for (std::size_t i = 0; i < sent; ++i) {
+        lines += std::to_string(1000 + i) + "\n";
+    }
+    cles::transport::datagram_burst burst{one};
+    for (std::string_view rest = lines; !rest.empty();) {
+        rest.remove_prefix(burst.send(rest).bytes);
+    }
+    std::vector<std::string> come;
+    const auto keep = [&](const auto& each) { come.emplace_back(each.text); };
+    int turns = 0;
+    std::size_t before = 0;
+    for (; come.size() < sent && turns < 10; ++turns) {
+        const bool left = batch.hand_over(here, keep);
+        BOOST_TEST(left == !batch.empty());
+        BOOST_TEST(come.size() - before <= 256U);
+        before = come.size();
+    }
+    BOOST_TEST(turns == 3);
+    BOOST_REQUIRE(come.size() == sent);
+    for (std::size_t i = 0; i < sent; ++i) {
+        BOOST_TEST(come[i] == std::to_string(1000 + i) + "\n");
+    }
+}
+
+BOOST_AUTO_TEST_CASE(one_that_ends_in_the_middle_gets_no_more) {
+    for (const auto* text : {"1", "2", "3"}) {
+        send(one, text);
+    }
+    int came = 0;
+    BOOST_TEST(!batch.hand_over(here, [&](const auto&) {
+        ++came;
+        here.close();
+    }));
+    BOOST_TEST(came == 1);
+}
+
+BOOST_AUTO_TEST_CASE(what_always_fails_does_not_hold_up_the_others) {
+    udp::socket no_socket{io};
+    no_socket.assign(udp::v4(), ::eventfd(0, EFD_NONBLOCK));
+    BOOST_TEST(!batch.hand_over(no_socket, [](const auto&) { BOOST_ERROR("nothing came"); }));
+    BOOST_TEST(no_socket.is_open());
 }
 
 BOOST_AUTO_TEST_CASE(what_the_network_tells_of_is_passed_over) {

@@ -159,19 +159,6 @@ BOOST_AUTO_TEST_CASE(what_a_handler_publishes_goes_behind_its_answer) {
     }
 }
 
-BOOST_AUTO_TEST_CASE(several_of_each_cycle_are_written_together) {
-    publishing p;
-    for (std::size_t cycle = 0; cycle < 3; ++cycle) {
-        p.car.update("speed", cycle);
-        p.car.update("course", cycle);
-        const std::size_t at_once = cycle == 0 ? 1 : 0; // it is not known before
-        BOOST_TEST(count(p.come(), "UPDATE ") == 2 * cycle + at_once);
-        run_until(p.io, [&] { return count(p.come(), "UPDATE ") == 2 * cycle + 2; });
-        const auto due = std::chrono::steady_clock::now() + std::chrono::milliseconds{1};
-        run_until(p.io, [&] { return std::chrono::steady_clock::now() >= due; });
-    }
-}
-
 struct asking {
     asking() : tower(io, {.name = "tower", .peers = {{"car1", far.url()}}}) {
         ask(); // dials

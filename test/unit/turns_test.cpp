@@ -4,10 +4,15 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace {
@@ -15,7 +20,8 @@ namespace {
 using namespace cles::test;
 namespace core = cles::core;
 
-struct link final : core::turn_taker, std::enable_shared_from_this<link> {
+struct link final : core::turn_taker, core::binder, std::enable_shared_from_this<link> {
+    explicit link(core::turns& all) : turns(all) {}
     void flush() override { act("flush"); }
     bool write() override {
         act("write");
@@ -23,6 +29,11 @@ struct link final : core::turn_taker, std::enable_shared_from_this<link> {
     }
     bool asks_alone() override { return alone; }
     std::shared_ptr<core::turn_taker> share() override { return shared_from_this(); }
+    [[nodiscard]] bool takes_updates() const override { return true; }
+    void put_updates(std::string_view lines) override {
+        updates += static_cast<std::size_t>(std::ranges::count(lines, '\n'));
+        turns.flush_soon(*this);
+    }
     void act(const std::string& what) {
         done.push_back(what);
         if (during) {
@@ -30,7 +41,9 @@ struct link final : core::turn_taker, std::enable_shared_from_this<link> {
         }
     }
 
+    core::turns& turns;
     std::vector<std::string> done;
+    std::size_t updates = 0;
     std::function<void()> during; // once
     bool takes_all = true;
     bool alone = false;
@@ -59,11 +72,15 @@ struct fixture {
             node.turns.turn();
         }
     }
+    void update(const std::string& noun) {
+        node.turns.let([&] { node.node.publish(noun, "1"); });
+    }
+    void bind(const std::string& noun) { node.published().open(noun).bind(*one, {}); }
     using calls = std::vector<std::string>;
 
     host node;
-    std::shared_ptr<link> one = std::make_shared<link>();
-    std::shared_ptr<link> two = std::make_shared<link>();
+    std::shared_ptr<link> one = std::make_shared<link>(node.turns);
+    std::shared_ptr<link> two = std::make_shared<link>(node.turns);
 };
 
 } // namespace
@@ -143,6 +160,48 @@ BOOST_AUTO_TEST_CASE(others_may_begin_to_wait_while_one_is_written) {
         BOOST_TEST(two->done == calls{"flush"}, boost::test_tools::per_element());
         one->done.clear();
         two->done.clear();
+    }
+}
+
+BOOST_AUTO_TEST_CASE(what_throws_while_it_is_written_keeps_nothing_from_the_others) {
+    one->alone = two->alone = true;
+    one->during = [] { throw std::runtime_error{"a log's"}; };
+    const auto say = [&] {
+        node.turns.flush_soon(*one);
+        node.turns.flush_soon(*two);
+    };
+    BOOST_CHECK_THROW(node.turns.let(say), std::runtime_error);
+    BOOST_TEST(two->done.empty());
+    take_turns();
+    BOOST_TEST(two->done == calls{"flush"}, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(several_of_each_cycle_are_written_together_once_that_is_known) {
+    bind("speed");
+    bind("course");
+    for (int cycle = 0; cycle < 3; ++cycle) {
+        one->done.clear();
+        update("speed");
+        BOOST_TEST(one->done.size() == (cycle == 0 ? 1U : 0U));
+        update("course");
+        node.node.clock.advance(std::chrono::milliseconds{5}); // the turn is late
+        take_turns();
+        BOOST_TEST(one->done == (cycle == 0 ? calls{"write", "flush"} : calls{"flush"}),
+                   boost::test_tools::per_element());
+        BOOST_TEST(one->updates == 2U * (static_cast<unsigned>(cycle) + 1));
+        node.node.clock.advance(std::chrono::milliseconds{5});
+    }
+}
+
+BOOST_AUTO_TEST_CASE(what_nobody_is_bound_to_is_not_one_of_several) {
+    bind("speed");
+    for (int cycle = 0; cycle < 3; ++cycle) {
+        one->done.clear();
+        update("course");
+        update("speed");
+        BOOST_TEST(one->done == calls{"write"}, boost::test_tools::per_element());
+        BOOST_TEST(node.posted == 0);
+        node.node.clock.advance(std::chrono::milliseconds{10});
     }
 }
 

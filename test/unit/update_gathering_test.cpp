@@ -25,9 +25,10 @@ BOOST_AUTO_TEST_CASE(the_first_and_those_that_come_after_a_while_are_alone) {
     cles::core::update_gathering all;
     BOOST_TEST(all.alone(start));
     all.gone(1, start);
-    BOOST_TEST(!all.alone(start));
-    BOOST_TEST(!all.alone(start + longest - std::chrono::nanoseconds{1}));
     BOOST_TEST(all.alone(start + longest));
+    BOOST_TEST(!all.alone(start + longest - std::chrono::nanoseconds{1}));
+    all.gone(1, start);
+    BOOST_TEST(!all.alone(start));
 }
 
 BOOST_AUTO_TEST_CASE(where_several_came_together_the_next_is_not_taken_for_one_alone) {
@@ -45,7 +46,8 @@ BOOST_AUTO_TEST_CASE(where_several_came_together_the_next_is_not_taken_for_one_a
     all.gone(7, start + 2 * cycle); // one alone
     BOOST_TEST(all.alone(start + 3 * cycle));
     all.gone(8, start + 3 * cycle);
-    all.gone(9, start + 3 * cycle + longest / 2); // one that followed it closely
+    BOOST_TEST(!all.alone(start + 3 * cycle + longest / 2)); // one that followed it closely
+    all.gone(9, start + 3 * cycle + 2 * longest);            // however late it went
     BOOST_TEST(!all.alone(start + 4 * cycle));
 }
 

@@ -138,7 +138,7 @@ class service : public registrar {
     /// Publishes a value to all that are bound to the task (or to "task/parameter/..."), and keeps it as the last one.
     /// Opens the task for BIND. Never blocks: what a slow binder does not take in time is dropped for it, and it is
     /// told. One alone, 100 us or more behind the last, is written in this call; those that come together are written
-    /// together, soon after, and what a handler publishes behind its answer.
+    /// together, soon after, and what a handler publishes before it first waits behind an answer that it gives then.
     /// \throws cles::error: `invalid_name`, `too_large`, `busy` (too many nouns), `failed` (begins like a
     /// failure)
     template <class T>

@@ -107,6 +107,7 @@ void publications::end(topic& t, std::size_t body_at) {
         ++nouns_.find(task_of(t.path()))->second.published;
     }
     recent_ = &t;
+    to_binders_ += t.is_bound() ? 1U : 0U;
     mark(t);
 }
 

@@ -67,7 +67,8 @@ class publications final : public topic_source {
     /// Publishes what waits for room in this topic, as far as there is some.
     void admit(topic& t) override;
 
-    [[nodiscard]] std::uint64_t published() const noexcept { return shared_.counts.updates_published; }
+    /// How many updates there have been for somebody.
+    [[nodiscard]] std::uint64_t published_to_binders() const noexcept { return to_binders_; }
     /// Takes out all that wait for room.
     [[nodiscard]] std::vector<detail::pending_ptr> take_waiters();
 
@@ -93,6 +94,7 @@ class publications final : public topic_source {
     text_map<task_nouns> nouns_; // per task
     std::vector<topic*> dirty_;
     std::deque<publication_result> results_;
+    std::uint64_t to_binders_ = 0;
     topic* recent_ = nullptr; // most publish the same noun again
 };
 

@@ -76,6 +76,7 @@ void turns::turn() {
         carry_on();
     } catch (...) {
         ask_if_something_waits();
+        host_.settle();
         throw;
     }
     ask_if_something_waits();
@@ -119,15 +120,15 @@ std::optional<std::uint64_t> turns::publish(bool alone) {
         return std::nullopt;
     }
     const auto now = time_.now();
-    if (alone ? !gathering_.alone(now) : gathering_.waits(published.published(), now)) {
+    if (alone ? !gathering_.alone(now) : gathering_.waits(published.published_to_binders(), now)) {
         return std::nullopt;
     }
     const posts_none during{*this}; // it is flushed right behind
     published.drain(now);
-    return published.published();
+    return published.published_to_binders();
 }
 
-void turns::say_at_once() {
+void turns::write_what_is_alone() {
     if (host_.stopped()) {
         return;
     }
@@ -136,7 +137,6 @@ void turns::say_at_once() {
     if (gone) {
         gathering_.gone(*gone, time_.now());
     }
-    ask_if_something_waits();
 }
 
 void turns::ask_if_something_waits() {

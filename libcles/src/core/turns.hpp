@@ -64,7 +64,7 @@ class turn_host {
 ///
 /// An update or a request of the program's own that is alone goes at once, in the call that said it: it has nothing to
 /// be gathered with, and until the next turn its caller may do much that it would have to wait for, such as setting a
-/// timer. But not while a handler runs: the answer goes first.
+/// timer. But not while a handler runs, until it first waits for something: an answer that it gives then goes first.
 class turns {
   public:
     turns(turn_host& host, const clock& time) noexcept : host_(host), time_(time) {}
@@ -86,18 +86,18 @@ class turns {
             return;
         }
         try {
-            const posts_none during{*this};
-            std::forward<F>(say)();
+            say_alone(std::forward<F>(say));
+            write_what_is_alone();
         } catch (...) {
             ask_if_something_waits();
             throw;
         }
-        say_at_once();
+        ask_if_something_waits();
     }
     /// Writes the last. From now on there are no more turns.
     void stop();
 
-    /// While it stands, a handler runs.
+    /// While it stands, a handler runs. Not to be kept while that waits: there is one for the whole node.
     class serving {
       public:
         explicit serving(turns& of) noexcept : of_(of), before_(std::exchange(of.serving_, true)) {}
@@ -126,9 +126,14 @@ class turns {
     /// Those that wait, but what begins to wait meanwhile. Who has not been told `done` waits on when it ends.
     class round;
 
+    template <class F>
+    void say_alone(F&& say) {
+        const posts_none during{*this};
+        std::forward<F>(say)();
+    }
     void carry_on();
     void let_publishers_go_on();
-    void say_at_once();
+    void write_what_is_alone();
     /// Puts what has been published to its binders. How much it was in all; none: nothing, or it waits for more.
     std::optional<std::uint64_t> publish(bool alone);
     void ask_if_something_waits();

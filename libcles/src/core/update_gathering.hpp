@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 namespace cles::core {
 
@@ -18,8 +19,11 @@ class update_gathering {
     static constexpr std::chrono::microseconds longest{100};
     static constexpr std::uint64_t most = 32; // half of what is kept for a binder unless it asks for more or less
 
-    /// None has gone out for a while, and the last that did was alone.
-    [[nodiscard]] bool alone(time_point now) const noexcept { return !several_ && is_late(now); }
+    /// One has come and nothing has asked for a turn: none has gone out for a while, and the last that did was alone.
+    [[nodiscard]] bool alone(time_point now) noexcept {
+        followed_ = followed_ || !is_late(now);
+        return !several_ && !followed_;
+    }
     /// `published`: how many there have been so far, of which some have not gone out.
     [[nodiscard]] bool waits(std::uint64_t published, time_point now) noexcept {
         if (published == seen_) {
@@ -30,7 +34,7 @@ class update_gathering {
     }
     /// All have gone out, `published` of them.
     void gone(std::uint64_t published, time_point now) noexcept {
-        several_ = published - gone_ > 1 || !is_late(now);
+        several_ = std::exchange(followed_, false) || published - gone_ > 1;
         seen_ = published;
         gone_ = published;
         gone_at_ = now;
@@ -42,6 +46,7 @@ class update_gathering {
     std::uint64_t seen_ = 0;
     std::uint64_t gone_ = 0;
     std::optional<time_point> gone_at_; // when the last did
+    bool followed_ = false;             // by one that came soon behind it
     bool several_ = false;              // went out together, or soon behind each other
 };
 

@@ -204,9 +204,9 @@ void engine::cancel(std::uint64_t ticket) {
 void engine::add(registration task) {
     core::handler entry{.info = std::move(task.info)};
     if (task.plain) {
-        entry.plain = [this, handler = std::move(task.plain)](auto&&... what) {
+        entry.plain = [this, handler = std::move(task.plain)](const request& r, json_writer& w) {
             const core::turns::serving during{turns_};
-            return handler(std::forward<decltype(what)>(what)...);
+            handler(r, w);
         };
     }
     if (task.async) {

@@ -17,11 +17,11 @@ namespace cles::transport {
 /// taken when its taker throws is still there.
 ///
 /// Those of one sender that the system keeps together (UDP_GRO, udp(7)) fill one place. A place has room for as many as
-/// there may be; of that, memory is used as far as something came there.
+/// there may be; of that, memory is used as far as something came there, unless the program locks all it has.
 class datagram_batch {
   public:
     using endpoint = boost::asio::ip::udp::endpoint;
-    static constexpr std::size_t most = 16; ///< places
+    static constexpr std::size_t most = 4; ///< places
 
     datagram_batch();
     datagram_batch(const datagram_batch&) = delete;
@@ -45,10 +45,10 @@ class datagram_batch {
         int turn = datagrams_per_turn;
         bool more = true;
         while (socket.is_open() && turn > 0 && (!empty() || more)) {
+            --turn;
             if (empty()) {
                 more = fetch(socket);
             } else {
-                --turn;
                 each(take());
             }
         }
@@ -60,7 +60,7 @@ class datagram_batch {
     bool fetch(boost::asio::ip::udp::socket& socket) noexcept;
 
   private:
-    static constexpr int datagrams_per_turn = 256; // then others have theirs
+    static constexpr int datagrams_per_turn = 256; // about, since fetches count as well; then others have theirs
     static constexpr std::size_t longest = 1U << 16U;
     using text = std::array<char, longest>;
     struct control {

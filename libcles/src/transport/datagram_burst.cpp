@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/datagram_burst.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
@@ -14,7 +15,7 @@ namespace cles::transport {
 namespace {
 
 constexpr std::size_t most_runs = 32;
-constexpr std::size_t most_in_run = 64;        // UDP_MAX_SEGMENTS, which no header tells
+constexpr std::size_t most_in_run = 63; // UDP_MAX_SEGMENTS is 64, and took the headers for a part of one before 5.16
 constexpr std::size_t longest_run = 1U << 15U; // of the 64 KiB of one datagram
 
 using segment_size = std::uint16_t;
@@ -58,9 +59,6 @@ void segment(msghdr& message, segment_control& control, segment_size each) noexc
     std::memcpy(CMSG_DATA(head), &each, sizeof each);
 }
 
-// No checksums by the interface, or longer than its frames.
-bool cannot_segment(int code) noexcept { return code == EIO || code == EINVAL || code == EMSGSIZE; }
-
 } // namespace
 
 datagram_burst::datagram_burst(udp::socket& socket) noexcept : socket_(socket) {
@@ -69,6 +67,16 @@ datagram_burst::datagram_burst(udp::socket& socket) noexcept : socket_(socket) {
 }
 
 lines_done datagram_burst::send(std::string_view lines, const udp::endpoint* to) noexcept {
+    if (segments_) {
+        if (const auto done = send_runs(lines, most_in_run, to)) {
+            return *done;
+        }
+    }
+    return *send_runs(lines, 1, to);
+}
+
+std::optional<lines_done> datagram_burst::send_runs(std::string_view lines, std::size_t longest,
+                                                    const udp::endpoint* to) noexcept {
     // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): as far as they are used
     std::array<std::size_t, most_runs> in_each;
     std::array<iovec, most_runs> texts;
@@ -77,7 +85,7 @@ lines_done datagram_burst::send(std::string_view lines, const udp::endpoint* to)
     // NOLINTEND(cppcoreguidelines-pro-type-member-init)
     unsigned count = 0;
     for (auto rest = lines; !rest.empty() && count < most_runs; ++count) {
-        const auto now = first_run(rest, segments_ ? most_in_run : 1);
+        const auto now = first_run(rest, longest);
         rest.remove_prefix(now.text.size());
         in_each[count] = now.lines;
         texts[count] = {.iov_base = const_cast<char*>(now.text.data()), .iov_len = now.text.size()};
@@ -97,18 +105,15 @@ lines_done datagram_burst::send(std::string_view lines, const udp::endpoint* to)
     if (sent < 0 && errno == ECONNREFUSED) { // an earlier datagram was; of these none has been sent
         sent = try_it();
     }
-    if (sent < 0) {
-        if (errno == EAGAIN) {
-            return {};
-        }
-        if (in_each[0] > 1 && cannot_segment(errno)) {
-            segments_ = false;
-            return send(lines, to);
-        }
-        return {.lines = in_each[0], .bytes = texts[0].iov_len};
+    if (sent < 0 && errno == EAGAIN) {
+        return lines_done{};
+    }
+    if (sent < 0 && in_each[0] > 1) { // each alone might go: the way there may have short frames, for one
+        segments_ = errno != EIO;     // that is the interface's
+        return std::nullopt;
     }
     lines_done done;
-    for (int i = 0; i < sent; ++i) {
+    for (int i = 0; i < std::max(sent, 1); ++i) { // the first is sent, or lost
         done.lines += in_each[i];
         done.bytes += texts[i].iov_len;
     }

@@ -4,6 +4,7 @@
 #include <boost/asio/ip/udp.hpp>
 
 #include <cstddef>
+#include <optional>
 #include <string_view>
 
 namespace cles::transport {
@@ -18,7 +19,7 @@ struct lines_done {
 /// of one length that follow each other pass through the system as one, until the network or a socket that does not
 /// take them so parts them (UDP_SEGMENT, udp(7)): finding the way is most of what a datagram costs.
 ///
-/// Where the interface cannot do that, each goes alone.
+/// Where the system or the interface cannot do that, each goes alone.
 class datagram_burst {
   public:
     using udp = boost::asio::ip::udp;
@@ -31,6 +32,9 @@ class datagram_burst {
     lines_done send(std::string_view lines, const udp::endpoint* to = nullptr) noexcept;
 
   private:
+    // Nothing: the first run cannot go as one.
+    std::optional<lines_done> send_runs(std::string_view lines, std::size_t longest, const udp::endpoint* to) noexcept;
+
     udp::socket& socket_;
     bool segments_;
 };

@@ -2,6 +2,7 @@
 #include "transport/group_port.hpp"
 
 #include "transport/group_socket_option.hpp"
+#include "transport/source_filter.hpp"
 
 #include <boost/asio/error.hpp>
 
@@ -19,6 +20,7 @@ group_port::group_port(const asio::any_io_executor& executor, const ip_interface
     set_ip_option(own_, IP_MULTICAST_TTL, 1);
     set_ip_option(own_, IP_MULTICAST_LOOP, 1); // other nodes of this host hear it too
     own_.non_blocking(true);
+    drop_all(own_); // nobody reads there
     source_ = own_.local_endpoint();
 }
 

@@ -2,12 +2,24 @@
 #include "transport/source_filter.hpp"
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 #include <linux/filter.h>
 #include <sys/socket.h>
 
 namespace cles::transport {
+
+namespace {
+
+template <std::size_t N>
+void attach(boost::asio::ip::udp::socket& socket, std::array<sock_filter, N>& program) noexcept {
+    const sock_fprog filter{.len = static_cast<unsigned short>(N), .filter = program.data()};
+    static_cast<void>(
+        ::setsockopt(socket.native_handle(), SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof filter)); // see the header
+}
+
+} // namespace
 
 void drop_from(boost::asio::ip::udp::socket& socket, const boost::asio::ip::udp::endpoint& source) noexcept {
     constexpr auto whole = UINT32_MAX;
@@ -21,9 +33,12 @@ void drop_from(boost::asio::ip::udp::socket& socket, const boost::asio::ip::udp:
         {BPF_RET | BPF_K, 0, 0, 0},
         {BPF_RET | BPF_K, 0, 0, whole},
     }};
-    const sock_fprog filter{.len = static_cast<unsigned short>(program.size()), .filter = program.data()};
-    static_cast<void>(
-        ::setsockopt(socket.native_handle(), SOL_SOCKET, SO_ATTACH_FILTER, &filter, sizeof filter)); // see the header
+    attach(socket, program);
+}
+
+void drop_all(boost::asio::ip::udp::socket& socket) noexcept {
+    std::array<sock_filter, 1> program{{{BPF_RET | BPF_K, 0, 0, 0}}};
+    attach(socket, program);
 }
 
 void drop_nothing(boost::asio::ip::udp::socket& socket) noexcept {
