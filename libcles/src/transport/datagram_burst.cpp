@@ -113,7 +113,8 @@ std::optional<lines_done> datagram_burst::send_runs(std::string_view lines, std:
         return std::nullopt;
     }
     lines_done done;
-    for (int i = 0; i < std::max(sent, 1); ++i) { // the first is sent, or lost
+    const auto count_done = static_cast<std::size_t>(std::max(sent, 1)); // the first is sent, or lost
+    for (std::size_t i = 0; i < count_done; ++i) {
         done.lines += in_each[i];
         done.bytes += texts[i].iov_len;
     }
