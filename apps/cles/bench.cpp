@@ -10,6 +10,8 @@
 #include "output.hpp"
 #include "perf/pinning.hpp"
 
+#include <boost/asio/io_context.hpp>
+
 #include <CLI/CLI.hpp>
 
 #include <memory>
@@ -30,6 +32,7 @@ constexpr const char* examples = "Examples:\n"
                                  "  cles bench --transport unix\n"
                                  "  cles bench --in-flight 64 --style callback -o json\n"
                                  "  cles bench --busy-poll 50\n"
+                                 "  cles bench --wake-within 0\n"
                                  "  cles bench --stress\n"
                                  "  cles bench --urgent\n"
                                  "  cles bench --against tcp://10.0.0.2\n"
@@ -38,9 +41,16 @@ constexpr const char* examples = "Examples:\n"
                                  "  cles bench --bytes\n"
                                  "  cles bench --parse -o json\n";
 
+// It is the children that keep the cores awake; a refusal is better told before there are any.
+void check_waking(const bench_options& options) {
+    boost::asio::io_context nothing_to_do;
+    cles::run(nothing_to_do, {.wake_within = options.how.wake_within});
+}
+
 void run(const CLI::App& command, bench_arguments& given) {
     settle(command, given);
     const auto& options = given.options;
+    check_waking(options);
     const bool has_two_ends = given.what != measurement::bytes && given.what != measurement::parse;
     if (has_two_ends && options.against.empty() && options.transport != carrier::inproc && !options.one_core &&
         !cles::perf::place_ends().apart()) {

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t most_in_flight = 4096;
 constexpr std::size_t most_binders = 1024;
-constexpr int most_busy_poll_us = 1'000'000;
+constexpr int most_wait_us = 1'000'000;
 
 const std::map<std::string, carrier> carriers{{"tcp", carrier::tcp},
                                               {"udp", carrier::udp},
@@ -73,16 +73,16 @@ const std::vector<mode> modes{
     {"--bytes",
      "Count what each verb puts on the wire, over TCP and UDP, against the packed struct",
      measurement::bytes,
-     {"--transport", "--in-flight", "--against", "--duration", "--rounds", "--style", "--busy-poll", "--one-core",
-      "--binders", "--keep"},
+     {"--transport", "--in-flight", "--against", "--duration", "--rounds", "--style", "--busy-poll", "--wake-within",
+      "--one-core", "--binders", "--keep"},
      {carrier::tcp},
      ""},
     {"--parse",
      "Measure what requests and replies from 64 bytes to 1 MiB cost by their length, without sockets, beside the "
      "packed struct",
      measurement::parse,
-     {"--transport", "--in-flight", "--against", "--duration", "--style", "--busy-poll", "--one-core", "--binders",
-      "--keep"},
+     {"--transport", "--in-flight", "--against", "--duration", "--style", "--busy-poll", "--wake-within", "--one-core",
+      "--binders", "--keep"},
      {carrier::tcp},
      ""},
 };
@@ -170,7 +170,13 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     command
         .add_option("--busy-poll", given.busy_poll_us,
                     "Let both ends of CLES look for work so long before they sleep, in microseconds (0)")
-        ->check(CLI::Range(0, most_busy_poll_us).description(""))
+        ->check(CLI::Range(0, most_wait_us).description(""))
+        ->type_name("US");
+    command
+        .add_option("--wake-within", given.wake_within_us,
+                    "Keep this host's cores, for all that is measured, from sleeping deeper than lets them wake within "
+                    "so many microseconds; 0: awake")
+        ->check(CLI::Range(0, most_wait_us).description(""))
         ->type_name("US");
     command.add_flag("--one-core", options.one_core, "Put both ends on one core");
     for (const auto& each : modes) {
@@ -194,6 +200,9 @@ void settle(const CLI::App& command, bench_arguments& given) {
     given.options.transport = carriers.at(given.transport);
     given.options.style = styles.at(given.style);
     given.options.how.busy_poll = std::chrono::microseconds{given.busy_poll_us};
+    if (given.wake_within_us) {
+        given.options.how.wake_within = std::chrono::microseconds{*given.wake_within_us};
+    }
     settle_mode(command, given);
     settle_binders(given);
     if (!given.options.against.empty() && is_given(command, "--transport")) {

@@ -3,6 +3,7 @@
 
 #include "bench_options.hpp"
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct bench_arguments {
     std::string form = "table";
     std::vector<std::size_t> binders{};
     int busy_poll_us = 0;
+    std::optional<int> wake_within_us{};
 };
 
 /// Adds the options to the command.

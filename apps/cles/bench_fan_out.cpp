@@ -38,6 +38,7 @@ fan_out_report bench_fan_out(const bench_options& options) {
                           .rounds = options.rounds,
                           .rate_hz = rate_hz,
                           .busy_poll_us = options.how.busy_poll.count(),
+                          .wake_within_us = wake_within_us(options),
                           .client_core = cores.client,
                           .server_core = cores.server};
     bench_progress progress{options.rounds * options.binders.size() * 2};

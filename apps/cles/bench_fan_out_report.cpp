@@ -82,7 +82,8 @@ std::string table_of(const fan_out_report& report) {
            " updates/s and as fast as possible; medians of " + std::to_string(report.rounds) + " rounds over " +
            report.transport + ", binders in one process, each with a socket of its own" +
            (report.transport == "multicast" ? " by hand, and with one for all in CLES, " : ", ") + report.style + "s" +
-           polling(report.busy_poll_us) + ", CPU per delivery; " + cores(report.client_core, report.server_core) + "\n";
+           waiting(report.busy_poll_us, report.wake_within_us) + ", CPU per delivery; " +
+           cores(report.client_core, report.server_core) + "\n";
 }
 
 } // namespace tool

@@ -65,12 +65,14 @@ struct fan_out_report {
     std::size_t rounds = 0;
     std::uint64_t rate_hz = 0; ///< of the paced passes
     std::int64_t busy_poll_us = 0;
+    std::optional<std::int64_t> wake_within_us{}; ///< nothing: as the host has it
     int client_core = 0;
     int server_core = 0;
     std::vector<fan_out_row> rows{};
 };
 BOOST_DESCRIBE_STRUCT(fan_out_report, (),
-                      (bench, transport, style, rounds, rate_hz, busy_poll_us, client_core, server_core, rows))
+                      (bench, transport, style, rounds, rate_hz, busy_poll_us, wake_within_us, client_core, server_core,
+                       rows))
 
 fan_out_figures median_of(const std::vector<fan_out_figures>& passes);
 fan_out_ratio ratio_of(const fan_out_figures& cles, const fan_out_figures& icd);

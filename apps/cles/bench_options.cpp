@@ -13,6 +13,11 @@ cles::perf::placement places_of(const bench_options& options) {
     return cores;
 }
 
+std::optional<std::int64_t> wake_within_us(const bench_options& options) {
+    const auto& within = options.how.wake_within;
+    return within ? std::optional<std::int64_t>{within->count()} : std::nullopt;
+}
+
 std::chrono::nanoseconds limit_of(const bench_options& options) {
     return options.duration ? std::chrono::nanoseconds{*options.duration} : std::chrono::nanoseconds::max();
 }

@@ -39,6 +39,9 @@ cles::perf::placement places_of(const bench_options& options);
 /// How long a pass may take.
 std::chrono::nanoseconds limit_of(const bench_options& options);
 
+/// In microseconds, as `how` has it.
+std::optional<std::int64_t> wake_within_us(const bench_options& options);
+
 /// As in a URL.
 const char* to_string(carrier c);
 const char* to_string(cles::perf::handler_style s);

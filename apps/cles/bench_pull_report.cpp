@@ -77,8 +77,8 @@ std::string table_of(const pull_report& report) {
                  times(ratio.requests_per_s), times(ratio.cpu), times(ratio.bytes)});
     }
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds, " + std::to_string(report.in_flight) +
-           " in flight, " + report.style + "s" + polling(report.busy_poll_us) + "; " + where(report) +
-           (report.against ? "; against " + *report.against : std::string{}) + "\n";
+           " in flight, " + report.style + "s" + waiting(report.busy_poll_us, report.wake_within_us) + "; " +
+           where(report) + (report.against ? "; against " + *report.against : std::string{}) + "\n";
 }
 
 } // namespace tool

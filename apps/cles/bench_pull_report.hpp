@@ -49,6 +49,7 @@ struct pull_report {
     std::size_t rounds = 0;
     std::uint64_t requests = 0; ///< counted in all passes of CLES together
     std::int64_t busy_poll_us = 0;
+    std::optional<std::int64_t> wake_within_us{}; ///< nothing: as the host has it
     int client_core = 0;
     std::optional<int> server_core{}; ///< nothing where both ends are one process, or the server is none of ours
     std::optional<std::string> against{};
@@ -59,8 +60,8 @@ struct pull_report {
     std::optional<exchange_ratio> ratio{};
 };
 BOOST_DESCRIBE_STRUCT(pull_report, (),
-                      (bench, transport, style, in_flight, rounds, requests, busy_poll_us, client_core, server_core,
-                       against, icd, icd_unix, icd_udp, cles, ratio))
+                      (bench, transport, style, in_flight, rounds, requests, busy_poll_us, wake_within_us, client_core,
+                       server_core, against, icd, icd_unix, icd_udp, cles, ratio))
 
 /// Each figure's median over the passes.
 exchange_figures median_of(const std::vector<exchange_figures>& passes);

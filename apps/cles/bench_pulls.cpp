@@ -207,6 +207,7 @@ pull_report bench_pulls(const bench_options& options) {
                        .in_flight = options.in_flight,
                        .rounds = options.rounds,
                        .busy_poll_us = options.how.busy_poll.count(),
+                       .wake_within_us = wake_within_us(options),
                        .client_core = cores.client};
     const std::size_t exchanges = 1U + (by_hand ? 1U : 0U) + (by_hand_alike ? 1U : 0U);
     bench_progress progress{options.rounds * exchanges};

@@ -117,6 +117,7 @@ stress_report bench_stress(const bench_options& options) {
                          .rounds = options.rounds,
                          .requests = requests,
                          .busy_poll_us = options.how.busy_poll.count(),
+                         .wake_within_us = wake_within_us(options),
                          .processes = hogs_per_core * all_cores.size(),
                          .client_core = cores.client,
                          .server_core = cores.server,

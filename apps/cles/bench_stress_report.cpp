@@ -26,8 +26,9 @@ std::string table_of(const stress_report& report) {
                  times(over(loaded.max_us, idle.max_us))});
     }
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds over " + report.transport + ", " +
-           report.style + "s" + polling(report.busy_poll_us) + "; load: " + std::to_string(report.processes) +
-           " processes that never sleep; " + cores(report.client_core, report.server_core) + "\n";
+           report.style + "s" + waiting(report.busy_poll_us, report.wake_within_us) +
+           "; load: " + std::to_string(report.processes) + " processes that never sleep; " +
+           cores(report.client_core, report.server_core) + "\n";
 }
 
 } // namespace tool

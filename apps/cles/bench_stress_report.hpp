@@ -21,7 +21,8 @@ struct stress_report {
     std::size_t rounds = 0;
     std::uint64_t requests = 0; ///< in each pass
     std::int64_t busy_poll_us = 0;
-    std::size_t processes = 0; ///< that want the cores too
+    std::optional<std::int64_t> wake_within_us{}; ///< nothing: as the host has it
+    std::size_t processes = 0;                    ///< that want the cores too
     int client_core = 0;
     int server_core = 0;
     latency_figures idle{};
@@ -30,8 +31,8 @@ struct stress_report {
     std::optional<latency_figures> loaded_fifo{};
 };
 BOOST_DESCRIBE_STRUCT(stress_report, (),
-                      (bench, transport, style, rounds, requests, busy_poll_us, processes, client_core, server_core,
-                       idle, idle_fifo, loaded, loaded_fifo))
+                      (bench, transport, style, rounds, requests, busy_poll_us, wake_within_us, processes, client_core,
+                       server_core, idle, idle_fifo, loaded, loaded_fifo))
 
 std::string table_of(const stress_report& report);
 

@@ -18,8 +18,16 @@ std::string cores(int client, std::optional<int> server) {
     return "client on core " + std::to_string(client) + ", server on core " + std::to_string(*server);
 }
 
-std::string polling(std::int64_t busy_poll_us) {
-    return busy_poll_us == 0 ? std::string{} : ", CLES polling up to " + std::to_string(busy_poll_us) + " us";
+std::string waiting(std::int64_t busy_poll_us, std::optional<std::int64_t> wake_within_us) {
+    std::string words;
+    if (busy_poll_us != 0) {
+        words += ", CLES polling up to " + std::to_string(busy_poll_us) + " us";
+    }
+    if (wake_within_us) {
+        words += *wake_within_us == 0 ? ", cores kept awake"
+                                      : ", cores that wake within " + std::to_string(*wake_within_us) + " us";
+    }
+    return words;
 }
 
 } // namespace tool

@@ -39,6 +39,7 @@ class rows {
 };
 
 std::string cores(int client, std::optional<int> server);
-std::string polling(std::int64_t busy_poll_us);
+/// How those who wait for work do so.
+std::string waiting(std::int64_t busy_poll_us, std::optional<std::int64_t> wake_within_us);
 
 } // namespace tool

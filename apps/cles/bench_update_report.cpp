@@ -40,9 +40,9 @@ std::string table_of(const update_report& report) {
     out.add(cells_of("typed (struct)", report.typed));
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds of " + std::to_string(report.updates) +
            " updates over " + report.transport + " to " + std::to_string(report.binders) + " binder" +
-           (report.binders == 1 ? "" : "s") + ", " + report.style + "s" + polling(report.busy_poll_us) + ", " +
-           fixed(report.update_bytes, 1) + " bytes per update, CPU per delivery; " +
-           cores(report.client_core, report.server_core) + "\n";
+           (report.binders == 1 ? "" : "s") + ", " + report.style + "s" +
+           waiting(report.busy_poll_us, report.wake_within_us) + ", " + fixed(report.update_bytes, 1) +
+           " bytes per update, CPU per delivery; " + cores(report.client_core, report.server_core) + "\n";
 }
 
 } // namespace tool

@@ -31,6 +31,7 @@ struct update_report {
     std::size_t rounds = 0;
     std::uint64_t updates = 0; ///< published in each pass
     std::int64_t busy_poll_us = 0;
+    std::optional<std::int64_t> wake_within_us{}; ///< nothing: as the host has it
     int client_core = 0;
     int server_core = 0;
     std::optional<double> update_bytes{};
@@ -38,8 +39,8 @@ struct update_report {
     update_figures typed{};
 };
 BOOST_DESCRIBE_STRUCT(update_report, (),
-                      (bench, transport, style, binders, rounds, updates, busy_poll_us, client_core, server_core,
-                       update_bytes, raw, typed))
+                      (bench, transport, style, binders, rounds, updates, busy_poll_us, wake_within_us, client_core,
+                       server_core, update_bytes, raw, typed))
 
 update_figures median_of(const std::vector<update_figures>& passes);
 

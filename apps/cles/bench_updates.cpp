@@ -97,6 +97,7 @@ update_report bench_updates(const bench_options& options) {
                          .rounds = options.rounds,
                          .updates = load.updates,
                          .busy_poll_us = options.how.busy_poll.count(),
+                         .wake_within_us = wake_within_us(options),
                          .client_core = cores.client,
                          .server_core = cores.server,
                          .update_bytes = count_bytes(url),

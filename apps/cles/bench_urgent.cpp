@@ -73,6 +73,7 @@ urgent_report bench_urgent(const bench_options& options) {
             .rounds = options.rounds,
             .requests = requests,
             .busy_poll_us = options.how.busy_poll.count(),
+            .wake_within_us = wake_within_us(options),
             .large_bytes = perf::bulk_bytes,
             .large_in_flight = large_in_flight,
             .client_core = cores.client,

@@ -20,7 +20,7 @@ std::string table_of(const urgent_report& report) {
     out.add({"urgent / alone", times(over(urgent.p50_us, alone.p50_us)), times(over(urgent.p99_us, alone.p99_us)),
              times(over(urgent.p999_us, alone.p999_us)), times(over(urgent.max_us, alone.max_us))});
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds over " + report.transport + ", " +
-           report.style + "s" + polling(report.busy_poll_us) + "; beside them " +
+           report.style + "s" + waiting(report.busy_poll_us, report.wake_within_us) + "; beside them " +
            std::to_string(report.large_in_flight) + " answers of " + std::to_string(report.large_bytes) +
            " bytes in flight; " + cores(report.client_core, report.server_core) + "\n";
 }

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct urgent_report {
     std::size_t rounds = 0;
     std::uint64_t requests = 0; ///< small ones, in each pass
     std::int64_t busy_poll_us = 0;
+    std::optional<std::int64_t> wake_within_us{}; ///< nothing: as the host has it
     std::size_t large_bytes = 0;
     std::size_t large_in_flight = 0;
     int client_core = 0;
@@ -29,8 +31,8 @@ struct urgent_report {
     latency_figures urgent{};  ///< beside the large ones
 };
 BOOST_DESCRIBE_STRUCT(urgent_report, (),
-                      (bench, transport, style, rounds, requests, busy_poll_us, large_bytes, large_in_flight,
-                       client_core, server_core, idle, in_turn, urgent))
+                      (bench, transport, style, rounds, requests, busy_poll_us, wake_within_us, large_bytes,
+                       large_in_flight, client_core, server_core, idle, in_turn, urgent))
 
 std::string table_of(const urgent_report& report);
 

@@ -20,6 +20,7 @@
 #include <chrono>
 #include <csignal>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,6 +39,7 @@ struct serve_command {
     double rate = 10;
     int busy_poll_us = 0;
     int real_time = 0;
+    std::optional<int> wake_within_us;
 };
 
 cles::service_options options_of(const serve_command& wanted, const cles::log_sink& log) {
@@ -74,9 +76,12 @@ int serve(const serve_command& wanted, int verbosity) {
     for (const auto& endpoint : node.service().endpoints()) {
         write_output(wanted.name + " listening on " + endpoint + "\n");
     }
-    cles::run(io, {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us},
-                   .fifo_priority = wanted.real_time,
-                   .lock_memory = wanted.real_time != 0});
+    cles::run(io,
+              {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us},
+               .fifo_priority = wanted.real_time,
+               .lock_memory = wanted.real_time != 0,
+               .wake_within = wanted.wake_within_us ? std::optional{std::chrono::microseconds{*wanted.wake_within_us}}
+                                                    : std::nullopt});
     return exit_code::success;
 }
 
@@ -105,6 +110,12 @@ void add_serve(CLI::App& app, context& shared) {
                      "Run under SCHED_FIFO with this priority, 1 to 99, and with all memory locked")
         ->type_name("PRIO")
         ->check(CLI::Range(1, 99).description(""));
+    command
+        ->add_option("--wake-within", wanted->wake_within_us,
+                     "Keep this host's cores from sleeping deeper than lets them wake within so many microseconds; "
+                     "0: awake")
+        ->type_name("US")
+        ->check(CLI::Range(0, 1'000'000).description(""));
     command->add_flag("--insecure", wanted->insecure,
                       "Allow listening and multicast beyond this host, where anybody may ask for anything");
     command

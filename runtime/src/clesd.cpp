@@ -96,7 +96,8 @@ int run(config setup, config_sources sources) {
     const auto node = setup.node;
     const run_options how{.busy_poll = setup.busy_poll,
                           .fifo_priority = static_cast<int>(setup.real_time),
-                          .lock_memory = setup.real_time != 0};
+                          .lock_memory = setup.real_time != 0,
+                          .wake_within = setup.wake_within};
     daemon_log log{node, setup.log};
     const notifier tell{take_notify_socket()};
     boost::asio::io_context io{1};

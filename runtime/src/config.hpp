@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,7 @@ struct config {
     cles::limits limits;
     std::chrono::microseconds busy_poll{0};
     std::uint32_t real_time = 0;
+    std::optional<std::chrono::microseconds> wake_within; ///< nothing: as the host has it
 
     std::string file; ///< the configuration file; empty: none was there
     /// Where each value that is no default comes from, by its key's full path: "multicast.port" to "clesd.yaml:4".

@@ -54,6 +54,16 @@ class Pulls(unittest.TestCase):
         self.assertEqual(report["busy_poll_us"], 50)
         self.assertEqual(report["client_core"], report["server_core"])
 
+    def test_cores_that_are_kept_awake(self):
+        code, out, err = cles("bench", *SHORT, "--wake-within", "0")
+        if os.access("/dev/cpu_dma_latency", os.W_OK):
+            self.assertEqual((code, err), (0, ""))
+            self.assertIn(", coroutines, cores kept awake;", out)
+            self.assertEqual(measure("--wake-within", "7")["wake_within_us"], 7)
+        else:
+            self.assertEqual((code, out), (1, ""))
+            self.assertIn("/dev/cpu_dma_latency", err)
+
     def test_the_table_names_the_terms(self):
         code, out, err = cles("bench", *SHORT, "--busy-poll", "20")
         self.assertEqual((code, err), (0, ""))

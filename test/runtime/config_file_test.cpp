@@ -82,6 +82,7 @@ const mistake mistakes[] = {
     {"limits: {line: 1KB}\n", "clesd.yaml:1: limits.line: ", "is no size"},
     {"limits: {stall: 0}\n", "clesd.yaml:1: limits.stall: ", "too short"},
     {"busy_poll: 50\n", "clesd.yaml:1: busy_poll: ", "is no time"},
+    {"wake_within: 7\n", "clesd.yaml:1: wake_within: ", "is no time"},
     {"real_time: 100\n", "clesd.yaml:1: real_time: ", "is not a number from 0 to 99"},
     // what is no such file at all
     {"node: a\nworkers: 1\nnode: b\n", "clesd.yaml:3: node: ", "is there already, in line 1"},
@@ -120,7 +121,8 @@ BOOST_AUTO_TEST_CASE(every_key_of_the_page) {
                         "log: {level: debug, format: json}\n"
                         "limits: {line: 64KiB, links: 16, stall: 10s}\n"
                         "busy_poll: 50us\n"
-                        "real_time: 10\n");
+                        "real_time: 10\n"
+                        "wake_within: 20us\n");
     BOOST_TEST(c.node == "sat1");
     BOOST_TEST(c.listen == (std::vector<std::string>{"tcp://127.0.0.1:25370", "udp://127.0.0.1:25370"}),
                boost::test_tools::per_element());
@@ -150,6 +152,7 @@ BOOST_AUTO_TEST_CASE(every_key_of_the_page) {
     BOOST_TEST((c.limits.stall == 10s));
     BOOST_TEST((c.busy_poll == 50us));
     BOOST_TEST(c.real_time == 10U);
+    BOOST_TEST((c.wake_within == 20us));
     check(c);
 }
 

@@ -17,7 +17,7 @@ config all_set() {
                 "peers: {a: tcp://127.0.0.1:3, b.c: udp://127.0.0.1:3}\nworkers: 3\nqueue: 9\nstuck_after: 1500ms\n"
                 "replacements: 0\ndrain: 2min\nplugin_path: [/a, 'b: c']\n"
                 "plugins: [{path: x.so, config: {a: [1, '2', null], b: \"q\\\"\"}, required: false}, y.so]\n"
-                "log: error,json\nbusy_poll: 50us\nreal_time: 7\nlimits: {depth: 8, lease: 5s}\n",
+                "log: error,json\nbusy_poll: 50us\nreal_time: 7\nwake_within: 0us\nlimits: {depth: 8, lease: 5s}\n",
                 "clesd.yaml", c);
     return c;
 }
@@ -48,6 +48,7 @@ BOOST_AUTO_TEST_CASE(what_is_printed_reads_as_the_same) {
         BOOST_TEST((after.plugins == before.plugins));
         BOOST_TEST((after.peers == before.peers));
         BOOST_TEST((after.limits.lease == before.limits.lease));
+        BOOST_TEST((after.wake_within == before.wake_within));
     }
 }
 
