@@ -91,6 +91,19 @@ BOOST_AUTO_TEST_CASE(what_ends_in_a_bracket_or_colon_inside_a_string_gets_its_co
     BOOST_TEST(out == "[\"[\",\"{\",\":\",\",\"]");
 }
 
+BOOST_AUTO_TEST_CASE(members_whose_text_is_at_hand_are_parted_like_others) {
+    std::string out = "head {";
+    cles::json_writer w{out};
+    w.begin_object();
+    w.next_member(",\"a\":");
+    w.begin_object();
+    w.end_object();
+    w.next_member(",\"b\":");
+    w.value(std::int64_t{1});
+    w.end_object();
+    BOOST_TEST(w.written() == "{\"a\":{},\"b\":1}");
+}
+
 BOOST_AUTO_TEST_CASE(a_writer_begins_anew_whatever_stands_before_it) {
     std::string out = "1";
     cles::json_writer{out}.value(std::int64_t{2});

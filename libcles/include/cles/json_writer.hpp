@@ -25,6 +25,9 @@ class json_writer {
     void key(std::string_view name);
     /// A name that needs no escapes, as that of a C++ member.
     void plain_key(std::string_view name);
+    /// As `plain_key`, where the whole text is at hand: a comma, the name in quotation marks, and a colon.
+    /// \pre an object is open
+    void next_member(std::string_view text);
 
     void null();
     void value(bool b);
