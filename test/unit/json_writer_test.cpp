@@ -91,14 +91,16 @@ BOOST_AUTO_TEST_CASE(what_ends_in_a_bracket_or_colon_inside_a_string_gets_its_co
     BOOST_TEST(out == "[\"[\",\"{\",\":\",\",\"]");
 }
 
-BOOST_AUTO_TEST_CASE(members_whose_text_is_at_hand_are_parted_like_others) {
+BOOST_AUTO_TEST_CASE(keys_that_were_prepared_are_parted_like_others) {
     std::string out = "head {";
     cles::json_writer w{out};
     w.begin_object();
-    w.next_member(",\"a\":");
+    static constexpr cles::prepared_key_text<1> a{"a"};
+    w.plain_key(a);
     w.begin_object();
     w.end_object();
-    w.next_member(",\"b\":");
+    static constexpr cles::prepared_key_text<1> b{"b"};
+    w.plain_key(b);
     w.value(std::int64_t{1});
     w.end_object();
     BOOST_TEST(w.written() == "{\"a\":{},\"b\":1}");

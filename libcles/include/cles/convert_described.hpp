@@ -7,7 +7,6 @@
 #include <boost/mp11/algorithm.hpp>
 #include <boost/mp11/list.hpp>
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <optional>
@@ -48,18 +47,8 @@ constexpr std::array<member<T>, sizeof...(D)> table_of(boost::mp11::mp_list<D...
     return {member_for<T, D>()...};
 }
 
-/// A member's name as it is written behind another: a comma, the name in quotation marks, and a colon.
 template <class D>
-constexpr auto text_before() {
-    constexpr std::string_view name{D::name};
-    std::array<char, name.size() + 4> text{',', '"'};
-    const auto end = std::copy(name.begin(), name.end(), text.begin() + 2);
-    end[0] = '"';
-    end[1] = ':';
-    return text;
-}
-template <class D>
-inline constexpr auto member_text = text_before<D>();
+inline constexpr prepared_key_text<std::string_view{D::name}.size()> key_of{D::name};
 
 template <class Table>
 constexpr std::size_t find_member(const Table& table, std::string_view name) noexcept {
@@ -109,14 +98,13 @@ struct converter<T> {
         w.begin_object();
         boost::mp11::mp_for_each<detail::members_of<T>>([&](auto d) {
             const auto& field = object.*d.pointer;
-            constexpr auto& before = detail::member_text<decltype(d)>;
             if constexpr (detail::is_optional<std::remove_cvref_t<decltype(field)>>) {
                 if (field) {
-                    w.next_member({before.data(), before.size()});
+                    w.plain_key(detail::key_of<decltype(d)>);
                     write_json(w, *field);
                 }
             } else {
-                w.next_member({before.data(), before.size()});
+                w.plain_key(detail::key_of<decltype(d)>);
                 write_json(w, field);
             }
         });

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/prepared_key.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -25,9 +27,8 @@ class json_writer {
     void key(std::string_view name);
     /// A name that needs no escapes, as that of a C++ member.
     void plain_key(std::string_view name);
-    /// As `plain_key`, where the whole text is at hand: a comma, the name in quotation marks, and a colon.
-    /// \pre an object is open
-    void next_member(std::string_view text);
+    /// As `plain_key`, with the text made beforehand. \pre an object is open
+    void plain_key(const prepared_key& name);
 
     void null();
     void value(bool b);

@@ -123,9 +123,9 @@ void json_writer::plain_key(std::string_view name) {
     out_.append("\":", 2);
 }
 
-void json_writer::next_member(std::string_view text) {
-    const bool is_first = out_.back() == '{';
-    out_.append(text.substr(is_first ? 1 : 0));
+void json_writer::plain_key(const prepared_key& name) {
+    const bool is_first = out_.ends_with('{');
+    out_.append(name.text().substr(is_first ? 1 : 0));
 }
 
 void json_writer::null() { raw("null"); }
