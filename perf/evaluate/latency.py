@@ -5,9 +5,10 @@ the same exchange by hand.
 
     latency.py [--programs build/release/apps] [--runs 15] [--rounds 10] [--quick] [-o FILE]
 
-Writes JSON. On loopback it runs `cles bench`, as fast as it goes, and `cles_link_latency`, 50 times a second; the latter
-between two network namespaces too, which take root: on a cable, on a link like a WiFi's, and on one of 64 kbit/s. Exchanges take turns within each round, so that whatever else
-the machine does falls on all of them. Each figure is over all rounds, its interval of 95 % over resampled rounds.
+Writes JSON. On loopback it runs `cles bench`, as fast as it goes, and `cles_link_latency`, 1000 and 50 times a second; the
+latter between two network namespaces too, which take root: on a cable, on a link like a WiFi's, and on one of 64 kbit/s.
+Updates go by TCP and by multicast. Exchanges take turns within each round, so that whatever else the machine does falls on
+all of them. Each figure is over all rounds, its interval of 95 % over resampled rounds.
 """
 
 import argparse
@@ -32,13 +33,15 @@ PAPER_OVERHEAD_US, PAPER_BYTES, PAPER_BYTES_RATIO, PAPER_LINES, PAPER_LINES_RATI
 
 # Name, what it is, the relay's words (none of them: a cable; None: one host), milliseconds from one exchange to the next.
 LINKS = [
+    ("lively", "on loopback, 1000 a second", None, 1),
     ("paced", "on loopback, 50 a second", None, 20),
     ("cable", "between namespaces, by a virtual cable", [], 20),
     ("wifi", "like WiFi: 1.5 ms each way, jitter of 1 ms on average, 1 % lost",
      ["--delay", "1.5", "--jitter", "1", "--loss", "1"], 20),
     ("narrow", "64 kbit/s, 5 ms each way", ["--rate", "64", "--delay", "5"], 100),
 ]
-KINDS = ("icd-pull", "pull", "icd-update", "update")
+KINDS = {"icd-pull": "round trip by hand", "pull": "PULL", "icd-update": "one way by hand",
+         "update": "UPDATE, one way", "update-multicast": "UPDATE by multicast, one way, of those that came"}
 
 
 class Figures:
@@ -79,9 +82,11 @@ def loopback_rounds(programs, runs, requests, updates):
     rounds = []
     for turn in range(runs):
         pulls = bench(programs, "--rounds", "1", "--requests", str(requests))
-        row = bench(programs, "--fan-out", "--binders", "1", "--rounds", "1", "--requests", str(updates))["rows"][0]
+        row, by_group = (bench(programs, "--fan-out", "--transport", carrier, "--binders", "1", "--rounds", "1", "--requests",
+                               str(updates))["rows"][0] for carrier in ("tcp", "multicast"))
         rounds.append({"icd-pull": pulls["icd"], "pull": pulls["cles"], "icd-update": row["icd"]["paced"]["latency"],
-                       "update": row["cles"]["paced"]["latency"]})
+                       "update": row["cles"]["paced"]["latency"],
+                       "update-multicast": by_group["cles"]["paced"]["latency"]})
         progress("loopback", turn + 1, runs)
     return rounds
 
@@ -109,23 +114,21 @@ class Link:
         relay = os.path.join(perf, "link_relay", "cles_link_relay")
         self.hosts = OneHost() if words is None else LinkedHosts(relay if words else None, words)
         self.pace = ["--interval", str(interval_ms)]
-        try:
-            self.urls = {}
-            for server, kinds in (("car", ("pull", "update")), ("icd-pull", ("icd-pull",)),
-                                  ("icd-update", ("icd-update",))):
-                url = self.hosts.start("far", self.timing, "serve", server, f"tcp://{self.hosts.addresses['far']}:0",
-                                       *self.pace)
-                self.urls.update({kind: url for kind in kinds})
-        except BaseException:
-            self.hosts.close()
-            raise
 
     def round(self, count, turn):
         """All kinds in turn, beginning with another one each time: microseconds."""
-        at = turn % len(KINDS)
-        return {kind: run(self.hosts.command("near", self.timing, "time", kind, self.urls[kind], "--count", str(count),
-                                             *self.pace))
-                for kind in KINDS[at:] + KINDS[:at]}
+        kinds, at = list(KINDS), turn % len(KINDS)
+        return {kind: self.timed(kind, count) for kind in kinds[at:] + kinds[:at]}
+
+    def timed(self, kind, count):
+        """The far end runs meanwhile and no longer: what it publishes would wake a core in the others' turns."""
+        words = [kind] if kind.startswith("icd-") else ["car"]
+        if kind == "update-multicast":
+            words += ["--multicast", self.hosts.interfaces["far"]]
+        with self.hosts.running("far", self.timing, "serve", *words, f"tcp://{self.hosts.addresses['far']}:0",
+                                *self.pace) as url:
+            where = self.hosts.interfaces["near"] if kind == "update-multicast" else url
+            return run(self.hosts.command("near", self.timing, "time", kind, where, "--count", str(count), *self.pace))
 
     def __enter__(self):
         return self
@@ -159,8 +162,7 @@ def link_figures(figures, found):
 def add_latencies(figures, rounds, name, meaning, statistics_of):
     """Each exchange, and CLES to by hand."""
     for key, of in statistics_of.items():
-        for kind, what in (("icd-pull", "round trip by hand"), ("pull", "PULL"), ("icd-update", "one way by hand"),
-                           ("update", "UPDATE, one way")):
+        for kind, what in KINDS.items():
             figures.over(rounds, f"{name}_{kind.replace('-', '_')}_{key}", f"{what}, {meaning}, {key}", "us", of(kind))
 
         def ratio(above, below, of=of):
@@ -177,8 +179,10 @@ def add_one_way(figures, rounds, name, meaning, statistics_of):
     """Only where both come at the same pace: cores that sleep longer are slower to wake."""
     for key, of in statistics_of.items():
         wanted = {"at_most": WANTED_ONE_WAY} if key == "p50" else {}
-        figures.over(rounds, f"{name}_update_to_pull_{key}", f"UPDATE one way to PULL's round trip, {meaning}, {key}",
-                     "times", lambda some, of=of: of("update")(some) / of("pull")(some), **wanted)
+        for kind, what in (("update", "UPDATE one way"), ("update-multicast", "UPDATE by multicast one way")):
+            figures.over(rounds, f"{name}_{kind.replace('-', '_')}_to_pull_{key}",
+                         f"{what} to PULL's round trip, {meaning}, {key}", "times",
+                         lambda some, of=of, kind=kind: of(kind)(some) / of("pull")(some), **wanted)
 
 
 # --- Bytes and lines ---------------------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 """Two hosts on one machine with a link between them that may be bad: network namespaces, and a cable or a relay. Or one
 host with its loopback."""
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -28,6 +29,7 @@ class OneHost:
         cores = sorted(os.sched_getaffinity(0))
         self.cores = {"near": cores[0], "far": cores[-1]}
         self.addresses = {"near": "127.0.0.1", "far": "127.0.0.1"}
+        self.interfaces = {"near": "lo", "far": "lo"}
 
     def command(self, end, *words):
         """What runs that at this end."""
@@ -36,6 +38,18 @@ class OneHost:
     def start(self, end, *words):
         """Starts a program there that goes on; gives the line that it says first."""
         return self._start(self.command(end, *words))
+
+    @contextlib.contextmanager
+    def running(self, end, *words):
+        """A program there, for as long as this is entered; gives the line that it says first."""
+        line = self.start(end, *words)
+        process = self.processes[-1]
+        try:
+            yield line
+        finally:
+            self.processes.remove(process)
+            process.kill()
+            process.communicate()
 
     def _start(self, words):
         process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -77,6 +91,7 @@ class LinkedHosts(OneHost):
                 devices = ("v0", "v1")
                 self._ip(near, "link", "add", "v0", "type", "veth", "peer", "name", "v1", "netns", str(far))
             self._address(devices)
+            self.interfaces = dict(zip(("near", "far"), devices))
         except BaseException:
             self.close()
             raise

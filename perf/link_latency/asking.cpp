@@ -60,8 +60,9 @@ asio::awaitable<void> ask_for_pulls(cles::service& client, pace how, std::vector
     }
 }
 
-asio::awaitable<void> take_updates(cles::service& client, pace how, std::vector<double>& ages) {
-    auto feed = co_await client.async_bind<localization>("car1:localization");
+asio::awaitable<void> take_updates(cles::service& client, cles::bind_options binding, pace how,
+                                   std::vector<double>& ages) {
+    auto feed = co_await client.async_bind<localization>("car1:localization", binding);
     for (std::size_t taken = 0; taken < passed_over + how.count;) {
         const auto item = co_await feed.async_next();
         if (item.kind == feed_event::lost) {
@@ -73,13 +74,14 @@ asio::awaitable<void> take_updates(cles::service& client, pace how, std::vector<
     }
 }
 
-std::vector<double> by_cles(const std::string& url, pace how,
-                            asio::awaitable<void> (*work)(cles::service&, pace, std::vector<double>&)) {
+/// Runs what `work` gives, with a client of that setup, until it has ended.
+template <class F>
+void by_cles(cles::service_options setup, F work) {
     asio::io_context io{1};
-    cles::service client{io, {.name = "asker", .peers = {{"car1", url}}}};
-    std::vector<double> times;
+    setup.name = "asker";
+    cles::service client{io, std::move(setup)};
     std::exception_ptr failure;
-    asio::co_spawn(io, work(client, how, times), [&](std::exception_ptr ended_by) {
+    asio::co_spawn(io, work(client), [&](std::exception_ptr ended_by) {
         failure = std::move(ended_by);
         client.stop();
     });
@@ -87,7 +89,6 @@ std::vector<double> by_cles(const std::string& url, pace how,
     if (failure) {
         std::rethrow_exception(failure);
     }
-    return times;
 }
 
 } // namespace
@@ -128,8 +129,23 @@ std::vector<double> time_updates_by_hand(const std::string& url, pace how) {
     return ages;
 }
 
-std::vector<double> time_pulls(const std::string& url, pace how) { return by_cles(url, how, ask_for_pulls); }
+std::vector<double> time_pulls(const std::string& url, pace how) {
+    std::vector<double> times;
+    by_cles({.peers = {{"car1", url}}}, [&](cles::service& client) { return ask_for_pulls(client, how, times); });
+    return times;
+}
 
-std::vector<double> time_updates(const std::string& url, pace how) { return by_cles(url, how, take_updates); }
+std::vector<double> time_updates(const std::string& url, pace how) {
+    std::vector<double> ages;
+    by_cles({.peers = {{"car1", url}}}, [&](cles::service& client) { return take_updates(client, {}, how, ages); });
+    return ages;
+}
+
+std::vector<double> time_updates_by_multicast(const std::string& interface, pace how) {
+    std::vector<double> ages;
+    by_cles({.insecure = true, .multicast = {.interface = interface}},
+            [&](cles::service& client) { return take_updates(client, cles::bind_options{}.multicast(), how, ages); });
+    return ages;
+}
 
 } // namespace cles::perf

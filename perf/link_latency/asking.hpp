@@ -22,5 +22,7 @@ std::vector<double> time_pulls(const std::string& url, pace how);
 /// One way, from the publication to the values.
 std::vector<double> time_updates_by_hand(const std::string& url, pace how);
 std::vector<double> time_updates(const std::string& url, pace how);
+/// Those of the car that is heard by multicast at that interface; what the link loses is passed over.
+std::vector<double> time_updates_by_multicast(const std::string& interface, pace how);
 
 } // namespace cles::perf

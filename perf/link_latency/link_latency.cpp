@@ -22,6 +22,7 @@ namespace {
 struct settings {
     std::string what;
     std::string url;
+    std::string interface {};
     int interval_ms = 20;
     std::size_t count = 100;
 };
@@ -30,7 +31,7 @@ void tell(std::string_view url) { std::cout << url << std::endl; }
 
 void serve(const settings& given, std::chrono::milliseconds interval) {
     if (given.what == "car") {
-        perf::serve_car(given.url, interval, tell);
+        perf::serve_car(given.url, given.interface, interval, tell);
     } else if (given.what == "icd-pull") {
         perf::serve_replies_by_hand(given.url, tell);
     } else {
@@ -38,11 +39,12 @@ void serve(const settings& given, std::chrono::milliseconds interval) {
     }
 }
 
-using timing = std::vector<double> (*)(const std::string& url, perf::pace how);
+using timing = std::vector<double> (*)(const std::string& where, perf::pace how);
 const std::map<std::string, timing> timings{{"icd-pull", perf::time_pulls_by_hand},
                                             {"icd-update", perf::time_updates_by_hand},
                                             {"pull", perf::time_pulls},
-                                            {"update", perf::time_updates}};
+                                            {"update", perf::time_updates},
+                                            {"update-multicast", perf::time_updates_by_multicast}};
 
 } // namespace
 
@@ -55,11 +57,12 @@ int main(int argc, char** argv) {
         ->required()
         ->check(CLI::IsMember({"car", "icd-pull", "icd-update"}));
     serving->add_option("url", given.url, "Where to listen, as tcp://10.0.0.1:0")->required();
+    serving->add_option("--multicast", given.interface, "By which interface the car takes part in multicast");
     auto* asking = program.add_subcommand("time", "The end that wants it; prints microseconds as a JSON array");
-    asking->add_option("what", given.what, "pull, update, icd-pull or icd-update")
+    asking->add_option("what", given.what, "pull, update, update-multicast, icd-pull or icd-update")
         ->required()
-        ->check(CLI::IsMember({"pull", "update", "icd-pull", "icd-update"}));
-    asking->add_option("url", given.url, "What the other end printed")->required();
+        ->check(CLI::IsMember({"pull", "update", "update-multicast", "icd-pull", "icd-update"}));
+    asking->add_option("where", given.url, "What the other end printed; for update-multicast an interface")->required();
     asking->add_option("--count", given.count, "How many")
         ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000}))
         ->capture_default_str();

@@ -52,9 +52,14 @@ void send_updates(int client, std::chrono::milliseconds interval) {
 
 } // namespace
 
-void serve_car(std::string_view url, std::chrono::milliseconds interval, const announcement& announce) {
+void serve_car(std::string_view url, std::string_view interface, std::chrono::milliseconds interval,
+               const announcement& announce) {
     asio::io_context io{1};
-    cles::service car{io, {.name = "car1", .listen = {std::string{url}}, .insecure = true}};
+    cles::service car{io,
+                      {.name = "car1",
+                       .listen = {std::string{url}},
+                       .insecure = true,
+                       .multicast = {.interface = std::string{interface}}}};
     register_localization(car);
     asio::co_spawn(io, publish(car, interval), rethrow);
     announce(car.endpoints().front());

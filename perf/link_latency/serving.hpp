@@ -12,7 +12,9 @@ namespace cles::perf {
 using announcement = std::function<void(std::string_view)>;
 
 /// By the library: a node "car1" that answers PULL of "localization", and publishes it as time passes.
-void serve_car(std::string_view url, std::chrono::milliseconds interval, const announcement& announce);
+/// \param interface by which it takes part in multicast; empty: it does not
+void serve_car(std::string_view url, std::string_view interface, std::chrono::milliseconds interval,
+               const announcement& announce);
 /// By hand: answers each request.
 void serve_replies_by_hand(std::string_view url, const announcement& announce);
 /// By hand: the packet of a reply, sent unasked as time passes, to one client after the other.

@@ -4,7 +4,7 @@
 from .series_pictures import quantiles
 
 EXCHANGES = (("icd-pull", "round trip by hand"), ("pull", "PULL"), ("icd-update", "one way by hand"),
-             ("update", "UPDATE, one way"))
+             ("update", "UPDATE, one way"), ("update-multicast", "UPDATE by multicast, one way"))
 
 
 def kinds(raw, note):
@@ -14,7 +14,8 @@ def kinds(raw, note):
 
 def _drawer(name, series, note):
     def drawn():
-        labelled = {label: [us for a_round in series[name][kind] for us in a_round] for kind, label in EXCHANGES}
+        labelled = {label: [us for a_round in series[name][kind] for us in a_round] for kind, label in EXCHANGES
+                    if kind in series[name]}
         return quantiles(f"link_{name}", labelled, note, "\u00b5s")
 
     return drawn

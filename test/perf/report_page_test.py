@@ -67,7 +67,7 @@ def peers():
 
 
 def across_links():
-    timed = {kind: [[float(i * j % 31) + 5 for i in range(20)] for j in (1, 2, 3)] for kind in ("icd-pull", "pull", "icd-update", "update")}
+    timed = {kind: [[float(i * j % 31) + 5 for i in range(20)] for j in (1, 2, 3)] for kind in ("icd-pull", "pull", "icd-update", "update", "update-multicast")}
     return {**FIGURE_FORM, "skipped": ["what is not allowed here"], "links": {"cable": "by a cable"}, "pictures": [],
             "series": {"loopback": {"pull_p50_us": [1.0, 2.0]}, "cable": timed}}
 
