@@ -2,6 +2,7 @@
 #include "bench.hpp"
 
 #include <cles/convert.hpp>
+#include <cles/wake_bound.hpp>
 
 #include "bench_arguments.hpp"
 #include "bench_run.hpp"
@@ -10,11 +11,10 @@
 #include "output.hpp"
 #include "perf/pinning.hpp"
 
-#include <boost/asio/io_context.hpp>
-
 #include <CLI/CLI.hpp>
 
 #include <memory>
+#include <optional>
 
 namespace tool {
 namespace {
@@ -41,16 +41,13 @@ constexpr const char* examples = "Examples:\n"
                                  "  cles bench --bytes\n"
                                  "  cles bench --parse -o json\n";
 
-// It is the children that keep the cores awake; a refusal is better told before there are any.
-void check_waking(const bench_options& options) {
-    boost::asio::io_context nothing_to_do;
-    cles::run(nothing_to_do, {.wake_within = options.how.wake_within});
-}
-
 void run(const CLI::App& command, bench_arguments& given) {
     settle(command, given);
     const auto& options = given.options;
-    check_waking(options);
+    std::optional<cles::wake_bound> awake;
+    if (options.wake_within) {
+        awake.emplace(*options.wake_within);
+    }
     const bool has_two_ends = given.what != measurement::bytes && given.what != measurement::parse;
     if (has_two_ends && options.against.empty() && options.transport != carrier::inproc && !options.one_core &&
         !cles::perf::place_ends().apart()) {

@@ -174,8 +174,8 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
         ->type_name("US");
     command
         .add_option("--wake-within", given.wake_within_us,
-                    "Keep this host's cores, for all that is measured, from sleeping deeper than lets them wake within "
-                    "so many microseconds; 0: awake")
+                    "Let this host's cores, in all that is measured, sleep no deeper than they wake from in so many "
+                    "microseconds; 0: not at all (it takes /dev/cpu_dma_latency)")
         ->check(CLI::Range(0, most_wait_us).description(""))
         ->type_name("US");
     command.add_flag("--one-core", options.one_core, "Put both ends on one core");
@@ -201,7 +201,7 @@ void settle(const CLI::App& command, bench_arguments& given) {
     given.options.style = styles.at(given.style);
     given.options.how.busy_poll = std::chrono::microseconds{given.busy_poll_us};
     if (given.wake_within_us) {
-        given.options.how.wake_within = std::chrono::microseconds{*given.wake_within_us};
+        given.options.wake_within = std::chrono::microseconds{*given.wake_within_us};
     }
     settle_mode(command, given);
     settle_binders(given);

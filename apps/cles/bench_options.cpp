@@ -14,7 +14,7 @@ cles::perf::placement places_of(const bench_options& options) {
 }
 
 std::optional<std::int64_t> wake_within_us(const bench_options& options) {
-    const auto& within = options.how.wake_within;
+    const auto& within = options.wake_within;
     return within ? std::optional<std::int64_t>{within->count()} : std::nullopt;
 }
 

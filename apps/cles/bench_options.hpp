@@ -26,8 +26,9 @@ struct bench_options {
     std::string against{};                               ///< a node that runs already
 
     std::size_t in_flight = 1;
-    cles::run_options how{}; ///< of both ends
-    bool one_core = false;   ///< for both ends
+    cles::run_options how{};                                ///< of both ends
+    bool one_core = false;                                  ///< for both ends
+    std::optional<std::chrono::microseconds> wake_within{}; ///< asked of the host for all that is measured
 
     std::vector<std::size_t> binders{1}; ///< one number, but for the fan-out
     std::uint32_t keep = 0;
@@ -39,7 +40,7 @@ cles::perf::placement places_of(const bench_options& options);
 /// How long a pass may take.
 std::chrono::nanoseconds limit_of(const bench_options& options);
 
-/// In microseconds, as `how` has it.
+/// In microseconds.
 std::optional<std::int64_t> wake_within_us(const bench_options& options);
 
 /// As in a URL.

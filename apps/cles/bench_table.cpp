@@ -25,7 +25,7 @@ std::string waiting(std::int64_t busy_poll_us, std::optional<std::int64_t> wake_
     }
     if (wake_within_us) {
         words += *wake_within_us == 0 ? ", cores kept awake"
-                                      : ", cores that wake within " + std::to_string(*wake_within_us) + " us";
+                                      : ", cores asked to wake within " + std::to_string(*wake_within_us) + " us";
     }
     return words;
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/run.hpp>
+#include <cles/wake_bound.hpp>
 
 #include "address.hpp"
 #include "commands.hpp"
@@ -63,6 +64,10 @@ cles::service_options options_of(const serve_command& wanted, const cles::log_si
 
 int serve(const serve_command& wanted, int verbosity) {
     const auto log = log_of_server(verbosity);
+    std::optional<cles::wake_bound> awake;
+    if (wanted.wake_within_us) {
+        awake.emplace(std::chrono::microseconds{*wanted.wake_within_us});
+    }
     asio::io_context io{1};
     play_node node{io, options_of(wanted, log), wanted.rate};
 
@@ -76,12 +81,9 @@ int serve(const serve_command& wanted, int verbosity) {
     for (const auto& endpoint : node.service().endpoints()) {
         write_output(wanted.name + " listening on " + endpoint + "\n");
     }
-    cles::run(io,
-              {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us},
-               .fifo_priority = wanted.real_time,
-               .lock_memory = wanted.real_time != 0,
-               .wake_within = wanted.wake_within_us ? std::optional{std::chrono::microseconds{*wanted.wake_within_us}}
-                                                    : std::nullopt});
+    cles::run(io, {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us},
+                   .fifo_priority = wanted.real_time,
+                   .lock_memory = wanted.real_time != 0});
     return exit_code::success;
 }
 
@@ -112,8 +114,8 @@ void add_serve(CLI::App& app, context& shared) {
         ->check(CLI::Range(1, 99).description(""));
     command
         ->add_option("--wake-within", wanted->wake_within_us,
-                     "Keep this host's cores from sleeping deeper than lets them wake within so many microseconds; "
-                     "0: awake")
+                     "Let this host's cores sleep no deeper than they wake from in so many microseconds; 0: not at all "
+                     "(it takes /dev/cpu_dma_latency)")
         ->type_name("US")
         ->check(CLI::Range(0, 1'000'000).description(""));
     command->add_flag("--insecure", wanted->insecure,

@@ -3,7 +3,6 @@
 
 #include "core/spin_budget.hpp"
 #include "shell/real_time.hpp"
-#include "shell/wake_bound.hpp"
 
 #include <boost/asio/io_context.hpp>
 
@@ -48,10 +47,6 @@ std::size_t run(boost::asio::io_context& io, const run_options& options) {
     std::optional<shell::fifo_scheduling> scheduling;
     if (options.fifo_priority != 0) {
         scheduling.emplace(options.fifo_priority);
-    }
-    std::optional<shell::wake_bound> awake;
-    if (options.wake_within) {
-        awake.emplace(*options.wake_within);
     }
     if (options.busy_poll.count() <= 0) {
         return io.run();

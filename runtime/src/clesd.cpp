@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 #include <cles/run.hpp>
+#include <cles/wake_bound.hpp>
 
 #include "config_error.hpp"
 #include "config_sources.hpp"
@@ -21,7 +22,9 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <memory>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <variant>
@@ -92,13 +95,21 @@ std::string take_notify_socket() {
     return taken;
 }
 
+std::unique_ptr<const wake_bound> bound_waking(const config& setup) {
+    try {
+        return setup.wake_within ? std::make_unique<const wake_bound>(*setup.wake_within) : nullptr;
+    } catch (const std::system_error& refused) {
+        throw config_error(setup.place_of("wake_within"), refused.what());
+    }
+}
+
 int run(config setup, config_sources sources) {
     const auto node = setup.node;
     const run_options how{.busy_poll = setup.busy_poll,
                           .fifo_priority = static_cast<int>(setup.real_time),
-                          .lock_memory = setup.real_time != 0,
-                          .wake_within = setup.wake_within};
+                          .lock_memory = setup.real_time != 0};
     daemon_log log{node, setup.log};
+    const auto awake = bound_waking(setup); // before anybody is told that it runs
     const notifier tell{take_notify_socket()};
     boost::asio::io_context io{1};
     daemon running{io, std::move(setup), std::move(sources), log, tell};

@@ -7,7 +7,6 @@
 
 #include <cerrno>
 #include <fstream>
-#include <optional>
 #include <system_error>
 #include <vector>
 
@@ -40,10 +39,6 @@ config_node::reader switch_into(bool& to) {
 
 config_node::reader span_into(std::chrono::microseconds& to) {
     return [&to](const config_node& v) { to = v.as(to_duration); };
-}
-
-std::optional<std::chrono::microseconds> to_wake_within(const std::string& text) {
-    return text == "off" ? std::nullopt : std::optional{to_duration(text)};
 }
 
 multicast_options multicast_of(const config_node& from) {
@@ -129,7 +124,7 @@ void read_all(const config_node& from, config& over) {
               {"limits", [&](const config_node& v) { read_limits(v, over.limits); }},
               {"busy_poll", span_into(over.busy_poll)},
               {"real_time", count_into(over.real_time, 0, 99)},
-              {"wake_within", [&](const config_node& v) { over.wake_within = v.as(to_wake_within); }}});
+              {"wake_within", [&](const config_node& v) { over.wake_within = v.as(to_wake_bound); }}});
 }
 
 YAML::Node parse(const std::string& text, const std::string& name) {

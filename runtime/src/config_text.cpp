@@ -90,7 +90,7 @@ std::string to_yaml(const config& whole) {
                         ", format: " + std::string{to_string(whole.log.format)} + "}");
     out.line("busy_poll", to_string(whole.busy_poll));
     out.line("real_time", std::to_string(whole.real_time));
-    out.line("wake_within", whole.wake_within ? to_string(*whole.wake_within) : "off");
+    out.line("wake_within", wake_bound_text(whole.wake_within));
     out.raw("limits:\n" + limits_text(whole.limits, "  "));
     return out.take();
 }

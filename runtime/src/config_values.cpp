@@ -112,6 +112,23 @@ microseconds to_duration(std::string_view text) {
     return microseconds{std::llround(span)};
 }
 
+std::optional<microseconds> to_wake_bound(std::string_view text) {
+    if (text == "off") {
+        return std::nullopt;
+    }
+    if (text == "0") {
+        refuse(text, "is neither: write off, or 0us for cores that stay awake");
+    }
+    return to_duration(text);
+}
+
+std::string wake_bound_text(std::optional<microseconds> bound) {
+    if (!bound) {
+        return "off";
+    }
+    return *bound == microseconds{0} ? "0us" : to_string(*bound);
+}
+
 std::string to_node_name(std::string_view text) {
     const bool fits = !text.empty() && text.size() <= 64 && std::ranges::all_of(text, [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -28,6 +29,10 @@ std::uint64_t to_count(std::string_view text, std::uint64_t least, std::uint64_t
 std::uint64_t to_size(std::string_view text, std::uint64_t least, std::uint64_t most);
 /// "50us", "250ms", "1.5s", "2min", "1h", and "0"; a day at most
 std::chrono::microseconds to_duration(std::string_view text);
+/// A time, or "off": nothing. A mere 0 is refused, since it reads like off.
+std::optional<std::chrono::microseconds> to_wake_bound(std::string_view text);
+/// As `to_wake_bound` reads it.
+std::string wake_bound_text(std::optional<std::chrono::microseconds> bound);
 
 std::string to_node_name(std::string_view text);
 /// A URL at which a daemon may listen or ask: of a registered scheme, and not inside a process.

@@ -56,10 +56,15 @@ class Pulls(unittest.TestCase):
 
     def test_cores_that_are_kept_awake(self):
         code, out, err = cles("bench", *SHORT, "--wake-within", "0")
-        if os.access("/dev/cpu_dma_latency", os.W_OK):
+        try:
+            os.close(os.open("/dev/cpu_dma_latency", os.O_WRONLY))
+            allowed = True
+        except OSError:
+            allowed = False
+        if allowed:
             self.assertEqual((code, err), (0, ""))
             self.assertIn(", coroutines, cores kept awake;", out)
-            self.assertEqual(measure("--wake-within", "7")["wake_within_us"], 7)
+            self.assertEqual(measure("--wake-within", "7", "--transport", "inproc")["wake_within_us"], 7)
         else:
             self.assertEqual((code, out), (1, ""))
             self.assertIn("/dev/cpu_dma_latency", err)

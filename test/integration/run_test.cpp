@@ -14,15 +14,9 @@
 #include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
-#include <algorithm>
 #include <array>
-#include <bit>
 #include <chrono>
-#include <cstdint>
-#include <filesystem>
-#include <fstream>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -36,25 +30,6 @@ using namespace std::chrono_literals;
 namespace asio = boost::asio;
 
 constexpr std::array<std::chrono::microseconds, 2> bounds{0us, 50us};
-constexpr const char* wake_device = "/dev/cpu_dma_latency";
-
-// In microseconds: the least that any program asks for.
-std::optional<std::int32_t> allowed_to_take_to_wake() {
-    std::ifstream device{wake_device, std::ios::binary};
-    std::array<char, sizeof(std::int32_t)> bytes{};
-    if (!device.read(bytes.data(), bytes.size())) {
-        return std::nullopt;
-    }
-    return std::bit_cast<std::int32_t>(bytes);
-}
-
-bool holds_open(const std::filesystem::path& file) {
-    const std::filesystem::directory_iterator all{"/proc/self/fd"};
-    return std::any_of(begin(all), end(all), [&](const auto& each) {
-        std::error_code gone; // that of the folder itself
-        return std::filesystem::read_symlink(each, gone) == file;
-    });
-}
 
 BOOST_DATA_TEST_CASE(ends_when_the_context_is_out_of_work, bounds, bound) {
     asio::io_context io;
@@ -105,23 +80,6 @@ BOOST_AUTO_TEST_CASE(a_priority_that_does_not_exist_is_refused_before_anything_r
     asio::post(io, [&] { ran = true; });
     BOOST_CHECK_THROW(cles::run(io, {.fifo_priority = 1000}), std::system_error);
     BOOST_TEST(!ran);
-}
-
-BOOST_DATA_TEST_CASE(keeps_cores_awake_as_long_as_it_runs, bounds, bound) {
-    asio::io_context io;
-    std::optional<std::int32_t> during;
-    asio::post(io, [&] { during = allowed_to_take_to_wake(); });
-    try {
-        cles::run(io, {.busy_poll = bound, .wake_within = 7us});
-        BOOST_TEST_REQUIRE(during.has_value());
-        BOOST_TEST(*during <= 7); // another program may want less
-    } catch (const std::system_error& refused) {
-        BOOST_TEST(!during); // nothing ran
-        BOOST_TEST(
-            (refused.code() == std::errc::permission_denied || refused.code() == std::errc::no_such_file_or_directory));
-        BOOST_TEST(std::string{refused.what()}.find(wake_device) != std::string::npos);
-    }
-    BOOST_TEST(!holds_open(wake_device));
 }
 
 BOOST_DATA_TEST_CASE(serves_a_peer, bounds, bound) {

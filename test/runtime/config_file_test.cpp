@@ -83,6 +83,7 @@ const mistake mistakes[] = {
     {"limits: {stall: 0}\n", "clesd.yaml:1: limits.stall: ", "too short"},
     {"busy_poll: 50\n", "clesd.yaml:1: busy_poll: ", "is no time"},
     {"wake_within: 7\n", "clesd.yaml:1: wake_within: ", "is no time"},
+    {"wake_within: 0\n", "clesd.yaml:1: wake_within: ", "write off, or 0us"},
     {"real_time: 100\n", "clesd.yaml:1: real_time: ", "is not a number from 0 to 99"},
     // what is no such file at all
     {"node: a\nworkers: 1\nnode: b\n", "clesd.yaml:3: node: ", "is there already, in line 1"},

@@ -3,7 +3,6 @@
 
 #include <chrono>
 #include <cstddef>
-#include <optional>
 
 namespace boost::asio {
 class io_context;
@@ -23,18 +22,13 @@ struct run_options {
     /// Locks the memory of the whole process, present and future, so that none of it has to be fetched (mlockall(2)).
     /// It stays locked.
     bool lock_memory = false;
-    /// Keeps the cores of the whole host, while the context runs, from sleeping deeper than lets them wake within this;
-    /// zero: they do not sleep at all. What waits then is answered sooner and at a steadier pace, for the power that
-    /// idle cores save otherwise; unlike `busy_poll` it takes nothing from other threads. Nothing: as the host has it.
-    /// It takes the right to write to /dev/cpu_dma_latency (Linux, PM Quality of Service).
-    std::optional<std::chrono::microseconds> wake_within{};
 };
 
 /// Runs the context in this thread until it is stopped or out of work, as its own `run` does. For a context that one
 /// thread runs; a program with a loop of its own polls the context there instead.
 /// \return how many handlers ran
-/// \throws std::system_error where the system refuses the priority, the locked memory or the bound of waking, before
-/// anything runs \throws what a handler throws; the context may be run again afterwards
+/// \throws std::system_error where the system refuses the priority or the locked memory, before anything runs
+/// \throws what a handler throws; the context may be run again afterwards
 std::size_t run(boost::asio::io_context& io, const run_options& options = {});
 
 } // namespace cles

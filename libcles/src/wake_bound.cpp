@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/wake_bound.hpp"
+#include <cles/wake_bound.hpp>
 
 #include <algorithm>
 #include <cerrno>
@@ -11,7 +11,7 @@
 #include <fcntl.h>
 #include <unistd.h>
 
-namespace cles::shell {
+namespace cles {
 namespace {
 
 using microseconds_told = std::int32_t; // in the host's byte order
@@ -41,4 +41,4 @@ wake_bound::wake_bound(std::chrono::microseconds longest) : device_(::open(path,
 
 wake_bound::~wake_bound() { ::close(device_); }
 
-} // namespace cles::shell
+} // namespace cles
