@@ -32,7 +32,8 @@ bool append_decimal(std::string& out, double d) {
     if (!(scaled < most_scaled)) {
         return false;
     }
-    const auto digits = static_cast<std::int64_t>(scaled + 0.5);
+    // Where this rounds wrongly, what it gives does not read back as the same.
+    const auto digits = static_cast<std::int64_t>(scaled + 0.5); // NOLINT(bugprone-incorrect-roundings)
     if (static_cast<double>(digits) / factor != magnitude) {
         return false;
     }
