@@ -61,6 +61,7 @@ void serve_car(std::string_view url, std::string_view interface, std::chrono::mi
                        .insecure = true,
                        .multicast = {.interface = std::string{interface}}}};
     register_localization(car);
+    car.on_bind("localization"); // from the beginning, before anything is published
     asio::co_spawn(io, publish(car, interval), rethrow);
     announce(car.endpoints().front());
     io.run();

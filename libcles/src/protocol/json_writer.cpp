@@ -18,51 +18,48 @@ void append_number(std::string& out, Number n) {
     out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
 }
 
-constexpr std::int64_t power_of_ten(unsigned n) noexcept { return n == 0 ? 1 : 10 * power_of_ten(n - 1); }
-
-constexpr double most_scaled = 1e15; // a double holds each integer below it, and more
-
-// Writes it where so many decimals are enough.
-template <unsigned Decimals>
-bool append_decimal(std::string& out, double d) {
-    constexpr auto scale = power_of_ten(Decimals);
-    constexpr auto factor = static_cast<double>(scale);
-    const auto magnitude = std::fabs(d);
-    const auto scaled = magnitude * factor;
-    if (!(scaled < most_scaled)) {
-        return false;
-    }
-    // Where this rounds wrongly, what it gives does not read back as the same.
-    const auto digits = static_cast<std::int64_t>(scaled + 0.5); // NOLINT(bugprone-incorrect-roundings)
-    if (static_cast<double>(digits) / factor != magnitude) {
-        return false;
-    }
-    std::array<char, 32> text;
-    auto* p = text.data();
-    if (std::signbit(d)) {
-        *p++ = '-';
-    }
-    p = std::to_chars(p, text.data() + text.size(), digits / scale).ptr;
-    if (auto rest = digits % scale; rest != 0) {
-        *p = '.';
-        for (auto n = Decimals; n != 0; --n, rest /= 10) {
-            p[n] = static_cast<char>('0' + rest % 10);
-        }
-        p += Decimals;
-        while (*p == '0') {
-            --p;
-        }
-        ++p;
-    }
-    out.append(text.data(), static_cast<std::size_t>(p - text.data()));
-    return true;
-}
-
 // Most measurements have few decimals, for which there is a way that is several times as quick as the general one. A
 // decimal of at most 15 digits is the only such that reads back as the same double, so that one which does, with its
 // zeros dropped, has the fewest digits there are.
 bool append_short_decimal(std::string& out, double d) {
-    return append_decimal<3>(out, d) || append_decimal<6>(out, d) || append_decimal<9>(out, d);
+    struct scale {
+        double factor;
+        unsigned decimals;
+    };
+    constexpr std::array scales{scale{1e3, 3}, scale{1e6, 6}, scale{1e9, 9}};
+    constexpr double most = 1e15;
+    const auto magnitude = std::fabs(d);
+    for (const auto& s : scales) {
+        const auto scaled = magnitude * s.factor;
+        if (!(scaled < most)) {
+            return false;
+        }
+        const auto rounded = std::nearbyint(scaled);
+        if (rounded / s.factor != magnitude) {
+            continue;
+        }
+        auto digits = static_cast<std::uint64_t>(rounded);
+        auto decimals = s.decimals;
+        while (decimals != 0 && digits % 10 == 0) {
+            digits /= 10;
+            --decimals;
+        }
+        std::array<char, 32> text;
+        auto* const last = text.data() + text.size();
+        auto* p = last;
+        for (unsigned n = 0; digits != 0 || n <= decimals; ++n, digits /= 10) {
+            if (n == decimals && decimals != 0) {
+                *--p = '.';
+            }
+            *--p = static_cast<char>('0' + digits % 10);
+        }
+        if (std::signbit(d)) {
+            *--p = '-';
+        }
+        out.append(p, static_cast<std::size_t>(last - p));
+        return true;
+    }
+    return false;
 }
 
 void append_escape(std::string& out, char c) {
