@@ -30,15 +30,6 @@ function(cles_target_sanitizers target)
     target_link_options(${target} PUBLIC ${flags})
 endfunction()
 
-# cles_target_in_units(target): instrumented, its sources are compiled several at a time. Instrumenting Asio's and the
-# standard library's templates anew for each source is most of the work; the builds without sanitizers compile each alone,
-# and so find what one lacks.
-function(cles_target_in_units target)
-    if(CLES_SANITIZE)
-        set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
-    endif()
-endfunction()
-
 # cles_target_tests_only(target): it drives what is tested. The checks of each pointer, which are half the work of compiling
 # it, are left to the library's own code; whatever reads and writes where it must not is found in both.
 function(cles_target_tests_only target)

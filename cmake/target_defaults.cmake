@@ -20,3 +20,11 @@ function(cles_target_defaults target)
     # The standard library checks its own preconditions in every build that is not for release.
     target_compile_definitions(${target} PRIVATE $<$<CONFIG:Debug>:_GLIBCXX_ASSERTIONS>)
 endfunction()
+
+# cles_target_in_units(target): with CLES_UNITY its sources are compiled several at a time. Compiling Asio's and the standard
+# library's templates anew for each source is most of the work. A build without CLES_UNITY finds what a source fails to include.
+function(cles_target_in_units target)
+    if(CLES_UNITY)
+        set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 12)
+    endif()
+endfunction()
