@@ -13,6 +13,7 @@
 
 #include <sys/eventfd.h>
 
+namespace datagram_batch {
 namespace {
 
 namespace asio = boost::asio;
@@ -45,6 +46,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace datagram_batch
 
 BOOST_FIXTURE_TEST_SUITE(datagram_batch, fixture)
 

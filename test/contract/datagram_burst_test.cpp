@@ -17,6 +17,7 @@
 #include <netinet/udp.h>
 #include <sys/socket.h>
 
+namespace datagram_burst {
 namespace {
 
 namespace asio = boost::asio;
@@ -82,6 +83,7 @@ std::vector<std::string> lines_of(std::size_t count, std::size_t length) {
 }
 
 } // namespace
+} // namespace datagram_burst
 
 BOOST_FIXTURE_TEST_SUITE(datagram_burst, fixture)
 

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+namespace stream_dialler {
 namespace {
 
 using boost::asio::ip::tcp;
@@ -46,6 +47,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace stream_dialler
 
 BOOST_FIXTURE_TEST_SUITE(stream_dialler, fixture)
 

@@ -16,6 +16,7 @@
 #include <netinet/in.h>
 #include <sys/socket.h>
 
+namespace traffic_class {
 namespace {
 
 namespace asio = boost::asio;
@@ -73,6 +74,7 @@ std::vector<int> classes_of(const std::string& scheme, const std::string& listen
 }
 
 } // namespace
+} // namespace traffic_class
 
 BOOST_AUTO_TEST_SUITE(traffic_class)
 

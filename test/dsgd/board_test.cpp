@@ -5,6 +5,7 @@
 
 #include <set>
 
+namespace board {
 namespace {
 
 using cles::errc;
@@ -15,6 +16,7 @@ const cles::error refused{boost::system::errc::make_error_code(boost::system::er
 dsgd::board four(const std::vector<std::string>& targets) { return dsgd::board{std::vector<sgd::order>(4), targets}; }
 
 } // namespace
+} // namespace board
 
 BOOST_AUTO_TEST_SUITE(board)
 

@@ -3,6 +3,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+namespace parallel {
 namespace {
 
 sgd::trained part_of(const char* node, std::uint64_t points, double after_ms, const sgd::classifier& c = {}) {
@@ -10,6 +11,7 @@ sgd::trained part_of(const char* node, std::uint64_t points, double after_ms, co
 }
 
 } // namespace
+} // namespace parallel
 
 BOOST_AUTO_TEST_SUITE(parallel)
 

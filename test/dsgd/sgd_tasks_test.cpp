@@ -13,6 +13,7 @@
 
 #include <string>
 
+namespace sgd_tasks {
 namespace {
 
 struct fixture : cles::test::asked_node {
@@ -20,6 +21,7 @@ struct fixture : cles::test::asked_node {
 };
 
 } // namespace
+} // namespace sgd_tasks
 
 BOOST_FIXTURE_TEST_SUITE(sgd_tasks, fixture)
 

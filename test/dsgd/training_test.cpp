@@ -5,6 +5,7 @@
 
 #include <cstddef>
 
+namespace training {
 namespace {
 
 const sgd::data_set data{sgd::recipe{.per_class = 10'000}};
@@ -17,6 +18,7 @@ sgd::classifier trained(sgd::shard part, const sgd::schedule& how, const sgd::cl
 }
 
 } // namespace
+} // namespace training
 
 BOOST_AUTO_TEST_SUITE(training)
 

@@ -11,6 +11,7 @@ using bad_line = cles::perf::impaired_line;
 using cles::perf::impairment;
 using namespace std::chrono_literals;
 
+namespace impaired_line {
 namespace {
 
 using clock_type = bad_line::clock;
@@ -42,6 +43,7 @@ std::vector<clock_type::time_point> arrivals(bad_line& line, int frames, clock_t
 }
 
 } // namespace
+} // namespace impaired_line
 
 BOOST_AUTO_TEST_SUITE(impaired_line)
 

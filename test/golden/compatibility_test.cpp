@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+namespace compatibility {
 namespace {
 
 // What version 1.0 of a program knows of a place, and what a later one does.
@@ -83,6 +84,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace compatibility
 
 BOOST_FIXTURE_TEST_SUITE(compatibility, fixture)
 

@@ -6,6 +6,7 @@
 
 #include <string>
 
+namespace replay {
 namespace {
 
 /// The problems of a script, one line each.
@@ -18,6 +19,7 @@ std::string problems(std::string_view script) {
 }
 
 } // namespace
+} // namespace replay
 
 BOOST_AUTO_TEST_SUITE(replay)
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 
+namespace transcripts {
 namespace {
 
 /// Whether a line that begins with `head` (a link's letter apart) holds `text`.
@@ -32,6 +33,7 @@ bool spoken(std::string_view head, const std::string& text) {
 }
 
 } // namespace
+} // namespace transcripts
 
 BOOST_AUTO_TEST_SUITE(transcripts)
 

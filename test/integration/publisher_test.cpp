@@ -16,6 +16,7 @@
 #include <thread>
 #include <vector>
 
+namespace publisher {
 namespace {
 
 using namespace cles::test;
@@ -61,6 +62,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace publisher
 
 BOOST_FIXTURE_TEST_SUITE(publisher, fixture)
 

@@ -22,6 +22,7 @@
 #include <utility>
 #include <vector>
 
+namespace responder {
 namespace {
 
 using namespace cles::test;
@@ -87,6 +88,7 @@ struct nodes {
 };
 
 } // namespace
+} // namespace responder
 
 BOOST_FIXTURE_TEST_SUITE(responder, nodes)
 

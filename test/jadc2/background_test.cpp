@@ -3,11 +3,13 @@
 
 #include <boost/test/unit_test.hpp>
 
+namespace background {
 namespace {
 
 constexpr fmv::extent size{.width = 64, .height = 64};
 
 } // namespace
+} // namespace background
 
 BOOST_AUTO_TEST_SUITE(background)
 

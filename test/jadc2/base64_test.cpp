@@ -5,6 +5,7 @@
 
 #include <numeric>
 
+namespace base64 {
 namespace {
 
 std::string encoded(std::string_view text) {
@@ -13,6 +14,7 @@ std::string encoded(std::string_view text) {
 }
 
 } // namespace
+} // namespace base64
 
 BOOST_AUTO_TEST_SUITE(base64)
 

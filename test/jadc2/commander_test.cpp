@@ -6,11 +6,13 @@
 
 using cles::errc;
 
+namespace commander {
 namespace {
 
 jadc2::picture picture_of(std::vector<fmv::track> tracks) { return {.by = "sat1", .tracks = std::move(tracks)}; }
 
 } // namespace
+} // namespace commander
 
 BOOST_AUTO_TEST_SUITE(commander)
 

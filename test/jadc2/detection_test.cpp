@@ -7,6 +7,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+namespace detection {
 namespace {
 
 constexpr std::uint64_t frames = 80;
@@ -31,6 +32,7 @@ void judge(std::uint64_t seed, jadc2::score& total) {
 }
 
 } // namespace
+} // namespace detection
 
 BOOST_AUTO_TEST_SUITE(detection)
 

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+namespace detector {
 namespace {
 
 constexpr fmv::extent size{.width = 160, .height = 120};
@@ -36,6 +37,7 @@ void add_target(fmv::grey& frame, int left, int top, int width, int height, int 
 const std::vector<float> flat(size.pixels(), 100.0F);
 
 } // namespace
+} // namespace detector
 
 BOOST_AUTO_TEST_SUITE(detector)
 

@@ -14,6 +14,7 @@
 
 #include <string>
 
+namespace fmv_tasks {
 namespace {
 
 using jadc2::scene;
@@ -36,6 +37,7 @@ struct fixture : cles::test::asked_node {
 };
 
 } // namespace
+} // namespace fmv_tasks
 
 BOOST_FIXTURE_TEST_SUITE(fmv_tasks, fixture)
 

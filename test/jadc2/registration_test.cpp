@@ -4,6 +4,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+namespace registration {
 namespace {
 
 constexpr fmv::extent size{.width = 96, .height = 80};
@@ -25,6 +26,7 @@ fmv::grey picture_from(int left, int top) {
 }
 
 } // namespace
+} // namespace registration
 
 BOOST_AUTO_TEST_SUITE(registration)
 

@@ -14,6 +14,7 @@
 #include <limits>
 #include <string>
 
+namespace strike_tasks {
 namespace {
 
 double now() { return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(); }
@@ -27,6 +28,7 @@ struct fixture : cles::test::asked_node {
 };
 
 } // namespace
+} // namespace strike_tasks
 
 BOOST_FIXTURE_TEST_SUITE(strike_tasks, fixture)
 

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+namespace tracker {
 namespace {
 
 fmv::detection at(double x, double y) { return {.centre = {x, y}, .area = 20}; }
@@ -19,6 +20,7 @@ void follow(fmv::tracker& all, int looks, double from, double speed) {
 }
 
 } // namespace
+} // namespace tracker
 
 BOOST_AUTO_TEST_SUITE(tracker)
 

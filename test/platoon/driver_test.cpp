@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+namespace driver {
 namespace {
 
 using platoon::role;
@@ -43,6 +44,7 @@ struct road {
 };
 
 } // namespace
+} // namespace driver
 
 BOOST_AUTO_TEST_SUITE(driver)
 

@@ -5,11 +5,13 @@
 
 #include <cmath>
 
+namespace logbook {
 namespace {
 
 platoon::state told(double t, double x, double v) { return {.t = t, .x = x, .v = v}; }
 
 } // namespace
+} // namespace logbook
 
 BOOST_AUTO_TEST_SUITE(logbook)
 

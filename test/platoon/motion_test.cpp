@@ -7,11 +7,13 @@
 #include <algorithm>
 #include <cmath>
 
+namespace motion {
 namespace {
 
 constexpr double lag = 0.3;
 
 } // namespace
+} // namespace motion
 
 BOOST_AUTO_TEST_SUITE(motion)
 

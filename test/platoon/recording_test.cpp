@@ -7,6 +7,7 @@
 
 #include <cmath>
 
+namespace recording {
 namespace {
 
 platoon::recording record_of(const platoon::assessment& judge) {
@@ -16,6 +17,7 @@ platoon::recording record_of(const platoon::assessment& judge) {
 }
 
 } // namespace
+} // namespace recording
 
 BOOST_AUTO_TEST_SUITE(recording)
 

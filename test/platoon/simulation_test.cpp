@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+namespace simulation {
 namespace {
 
 double worst_ratio(platoon::scenario what, unsigned seeds) {
@@ -25,6 +26,7 @@ platoon::scenario with(double hz, double loss) {
 }
 
 } // namespace
+} // namespace simulation
 
 BOOST_AUTO_TEST_SUITE(simulation)
 

@@ -3,6 +3,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+namespace track {
 namespace {
 
 constexpr double lag = 0.3;
@@ -12,6 +13,7 @@ platoon::state told(double t, const platoon::motion& m, double u, double j = 0) 
 }
 
 } // namespace
+} // namespace track
 
 BOOST_AUTO_TEST_SUITE(track)
 

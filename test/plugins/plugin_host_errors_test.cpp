@@ -18,6 +18,7 @@
 
 #include <unistd.h>
 
+namespace plugin_host_errors {
 namespace {
 
 using cles::runtime::plugin_error;
@@ -72,6 +73,7 @@ struct fixture {
 std::string sound_path() { return std::string{MADE_PLUGINS} + "/sound.so"; }
 
 } // namespace
+} // namespace plugin_host_errors
 
 BOOST_FIXTURE_TEST_SUITE(plugin_host_errors, fixture)
 

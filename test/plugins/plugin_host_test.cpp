@@ -19,6 +19,7 @@
 #include <string>
 #include <vector>
 
+namespace plugin_host {
 namespace {
 
 using cles::errc;
@@ -79,6 +80,7 @@ struct rough : fixture {
 };
 
 } // namespace
+} // namespace plugin_host
 
 BOOST_FIXTURE_TEST_SUITE(plugin_host, fixture)
 

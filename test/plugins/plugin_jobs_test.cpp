@@ -11,6 +11,7 @@
 #include <thread>
 #include <vector>
 
+namespace plugin_jobs {
 namespace {
 
 using cles::responder;
@@ -63,6 +64,7 @@ struct counted {
 };
 
 } // namespace
+} // namespace plugin_jobs
 
 BOOST_FIXTURE_TEST_SUITE(plugin_jobs, fixture)
 

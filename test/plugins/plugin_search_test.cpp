@@ -10,6 +10,7 @@
 
 #include <unistd.h>
 
+namespace plugin_search {
 namespace {
 
 using cles::runtime::find_plugin;
@@ -28,6 +29,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace plugin_search
 
 BOOST_FIXTURE_TEST_SUITE(plugin_search, fixture)
 

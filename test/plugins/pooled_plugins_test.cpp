@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+namespace pooled_plugins {
 namespace {
 
 using namespace cles::test;
@@ -41,6 +42,7 @@ struct one_worker : fixture {
 };
 
 } // namespace
+} // namespace pooled_plugins
 
 BOOST_FIXTURE_TEST_SUITE(pooled_plugins, fixture)
 

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <utility>
 
+namespace prime_counter {
 namespace {
 
 std::pair<std::uint64_t, std::uint64_t> counted(std::uint64_t from, std::uint64_t below) {
@@ -16,6 +17,7 @@ std::pair<std::uint64_t, std::uint64_t> counted(std::uint64_t from, std::uint64_
 }
 
 } // namespace
+} // namespace prime_counter
 
 BOOST_AUTO_TEST_SUITE(prime_counter)
 

@@ -12,6 +12,7 @@
 #include <optional>
 #include <string>
 
+namespace primes {
 namespace {
 
 struct fixture : cles::test::asked_node {
@@ -19,6 +20,7 @@ struct fixture : cles::test::asked_node {
 };
 
 } // namespace
+} // namespace primes
 
 BOOST_FIXTURE_TEST_SUITE(primes, fixture)
 

@@ -26,6 +26,7 @@
 
 #include <unistd.h>
 
+namespace system_tasks {
 namespace {
 
 constexpr std::array<const char*, 6> nouns{"utc", "load", "memory", "disk", "network", "processes"};
@@ -41,6 +42,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace system_tasks
 
 BOOST_FIXTURE_TEST_SUITE(system_tasks, fixture)
 

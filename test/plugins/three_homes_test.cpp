@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+namespace three_homes {
 namespace {
 
 constexpr std::array commands{R"(PUSH self:drive {"km":2})", R"(DELEGATE self:there_and_back {"km":3})",
@@ -32,6 +33,7 @@ std::vector<std::string> answers_of(cles::service& node) {
 }
 
 } // namespace
+} // namespace three_homes
 
 BOOST_AUTO_TEST_SUITE(three_homes)
 

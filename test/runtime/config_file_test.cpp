@@ -13,6 +13,7 @@
 using namespace cles::runtime;
 using namespace std::chrono_literals;
 
+namespace config_file {
 namespace {
 
 config read(const std::string& text) {
@@ -96,6 +97,7 @@ const mistake mistakes[] = {
 };
 
 } // namespace
+} // namespace config_file
 
 BOOST_AUTO_TEST_SUITE(config_file)
 

@@ -9,11 +9,13 @@
 using cles::runtime::bad_value;
 using cles::runtime::json_of;
 
+namespace config_json {
 namespace {
 
 std::string json(const std::string& text) { return json_of(YAML::Load(text)); }
 
 } // namespace
+} // namespace config_json
 
 BOOST_AUTO_TEST_SUITE(config_json)
 

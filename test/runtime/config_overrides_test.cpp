@@ -10,6 +10,7 @@
 
 using namespace cles::runtime;
 
+namespace config_overrides {
 namespace {
 
 overrides of(const std::map<std::string, std::string>& variables) {
@@ -30,6 +31,7 @@ std::string refusal(const std::map<std::string, std::string>& variables) {
 }
 
 } // namespace
+} // namespace config_overrides
 
 BOOST_AUTO_TEST_SUITE(config_overrides)
 

@@ -8,6 +8,7 @@
 
 using namespace cles::runtime;
 
+namespace config_text {
 namespace {
 
 config all_set() {
@@ -35,6 +36,7 @@ std::string without_comments(std::string text) {
 }
 
 } // namespace
+} // namespace config_text
 
 BOOST_AUTO_TEST_SUITE(config_text)
 

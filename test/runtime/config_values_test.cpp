@@ -12,6 +12,7 @@ using namespace cles::runtime;
 using namespace std::chrono_literals;
 using std::chrono::microseconds;
 
+namespace config_values {
 namespace {
 
 std::string refusal(const std::function<void()>& read) {
@@ -24,6 +25,7 @@ std::string refusal(const std::function<void()>& read) {
 }
 
 } // namespace
+} // namespace config_values
 
 BOOST_AUTO_TEST_SUITE(config_values)
 

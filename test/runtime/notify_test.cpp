@@ -15,6 +15,7 @@
 using boost::asio::local::datagram_protocol;
 using cles::runtime::notifier;
 
+namespace notify {
 namespace {
 
 // A service manager: the socket, and what came to it.
@@ -39,6 +40,7 @@ std::string fresh_name() {
 }
 
 } // namespace
+} // namespace notify
 
 BOOST_AUTO_TEST_SUITE(notify)
 

@@ -11,6 +11,7 @@
 
 using namespace cles::runtime;
 
+namespace options {
 namespace {
 
 std::variant<cles::runtime::options, std::string> parse(std::vector<const char*> words) {
@@ -19,6 +20,7 @@ std::variant<cles::runtime::options, std::string> parse(std::vector<const char*>
 }
 
 } // namespace
+} // namespace options
 
 BOOST_AUTO_TEST_SUITE(options)
 

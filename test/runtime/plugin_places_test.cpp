@@ -7,6 +7,7 @@
 
 using namespace cles::runtime;
 
+namespace plugin_places {
 namespace {
 
 cles::runtime::config from_file(const std::string& file) {
@@ -20,6 +21,7 @@ std::string file_of(const std::string& file, const std::string& path) {
 }
 
 } // namespace
+} // namespace plugin_places
 
 BOOST_AUTO_TEST_SUITE(plugin_places)
 

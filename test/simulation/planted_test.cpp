@@ -13,6 +13,7 @@
 
 namespace sim = cles::simulation;
 
+namespace planted {
 namespace {
 
 /// The first seed at which this fault breaks that rule alone; 0 where none does.
@@ -37,6 +38,7 @@ void finds(sim::planted fault, sim::rule broken) {
 }
 
 } // namespace
+} // namespace planted
 
 BOOST_AUTO_TEST_SUITE(planted)
 

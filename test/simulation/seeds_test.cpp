@@ -14,6 +14,7 @@
 
 namespace sim = cles::simulation;
 
+namespace seeds {
 namespace {
 
 void check(const sim::report& r, const std::string& name) {
@@ -38,6 +39,7 @@ void check_seeds(std::uint64_t first, std::uint64_t count, unsigned steps) {
 }
 
 } // namespace
+} // namespace seeds
 
 BOOST_AUTO_TEST_SUITE(seeds)
 

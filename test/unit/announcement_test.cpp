@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+namespace announcement {
 namespace {
 
 using namespace std::chrono_literals;
@@ -38,6 +39,7 @@ std::string written(const statement& said, std::uint64_t seq = 17) {
 }
 
 } // namespace
+} // namespace announcement
 
 BOOST_AUTO_TEST_SUITE(announcement)
 

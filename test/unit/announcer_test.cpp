@@ -8,6 +8,7 @@
 #include <set>
 #include <vector>
 
+namespace announcer {
 namespace {
 
 using namespace std::chrono_literals;
@@ -42,6 +43,7 @@ struct fixture : cles::core::announcer::voice {
 };
 
 } // namespace
+} // namespace announcer
 
 BOOST_FIXTURE_TEST_SUITE(announcer, fixture)
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+namespace any_request {
 namespace {
 
 struct fixture : cles::test::routing_fixture {
@@ -25,6 +26,7 @@ struct fixture : cles::test::routing_fixture {
 const std::string_view full = R"({"error":"busy","message":"it is full","retry_ms":40})";
 
 } // namespace
+} // namespace any_request
 
 BOOST_FIXTURE_TEST_SUITE(any_request, fixture)
 

@@ -7,11 +7,13 @@
 #include <cstdint>
 #include <set>
 
+namespace backoff {
 namespace {
 
 using namespace std::chrono_literals;
 
 } // namespace
+} // namespace backoff
 
 BOOST_AUTO_TEST_SUITE(backoff)
 

@@ -8,6 +8,7 @@
 
 #include <string>
 
+namespace bind_decision {
 namespace {
 
 using cles::verb;
@@ -21,6 +22,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace bind_decision
 
 BOOST_FIXTURE_TEST_SUITE(bind_decision, fixture)
 

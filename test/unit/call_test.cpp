@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+namespace call {
 namespace {
 
 using cles::verb;
@@ -27,6 +28,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace call
 
 BOOST_FIXTURE_TEST_SUITE(call, fixture)
 

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <string>
 
+namespace catalogue {
 namespace {
 
 struct fixture : cles::test::routing_fixture {
@@ -26,6 +27,7 @@ struct fixture : cles::test::routing_fixture {
 };
 
 } // namespace
+} // namespace catalogue
 
 BOOST_FIXTURE_TEST_SUITE(catalogue, fixture)
 

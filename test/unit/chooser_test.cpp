@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+namespace chooser {
 namespace {
 
 struct fixture : cles::test::routing_fixture {
@@ -19,6 +20,7 @@ struct fixture : cles::test::routing_fixture {
 };
 
 } // namespace
+} // namespace chooser
 
 BOOST_FIXTURE_TEST_SUITE(chooser, fixture)
 

@@ -61,6 +61,7 @@ struct cles::converter<convert_types::celsius> {
     static bool read(json_reader& r, convert_types::celsius& value) { return r.read(value.degrees); }
 };
 
+namespace convert {
 namespace {
 
 using namespace convert_types;
@@ -80,6 +81,7 @@ T round_trip(const T& value) {
 }
 
 } // namespace
+} // namespace convert
 
 BOOST_AUTO_TEST_SUITE(convert)
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <string>
 
+namespace datagram_output {
 namespace {
 
 using namespace std::chrono_literals;
@@ -32,6 +33,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace datagram_output
 
 BOOST_FIXTURE_TEST_SUITE(datagram_output, fixture)
 

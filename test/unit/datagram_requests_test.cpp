@@ -8,6 +8,7 @@
 #include <chrono>
 #include <string>
 
+namespace datagram_requests {
 namespace {
 
 using cles::verb;
@@ -36,6 +37,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace datagram_requests
 
 BOOST_FIXTURE_TEST_SUITE(datagram_requests, fixture)
 

@@ -10,6 +10,7 @@
 #include <random>
 #include <vector>
 
+namespace deadlines {
 namespace {
 
 using cles::time_point;
@@ -30,6 +31,7 @@ class bell final : public cles::core::deadline {
 };
 
 } // namespace
+} // namespace deadlines
 
 BOOST_AUTO_TEST_SUITE(deadlines)
 

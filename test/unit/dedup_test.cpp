@@ -23,6 +23,7 @@ std::ostream& operator<<(std::ostream& out, dedup::verdict v) {
 
 } // namespace cles::core
 
+namespace dedup {
 namespace {
 
 using namespace std::chrono_literals;
@@ -42,6 +43,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace dedup
 
 BOOST_FIXTURE_TEST_SUITE(dedup, fixture)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+namespace error {
 namespace {
 
 using cles::errc;
@@ -28,6 +29,7 @@ const named in_the_process[] = {
     {errc::conversion, "conversion"},         {errc::stopped, "stopped"}};
 
 } // namespace
+} // namespace error
 
 BOOST_AUTO_TEST_SUITE(error)
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+namespace feed_machine {
 namespace {
 
 using cles::errc;
@@ -100,6 +101,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace feed_machine
 
 BOOST_FIXTURE_TEST_SUITE(feed_machine, fixture)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+namespace feed_mailbox {
 namespace {
 
 using event_ptr = cles::core::feed_mailbox::event_ptr;
@@ -33,6 +34,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace feed_mailbox
 
 BOOST_FIXTURE_TEST_SUITE(feed_mailbox, fixture)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+namespace feed_queue {
 namespace {
 
 using cles::feed_event;
@@ -44,6 +45,7 @@ void push_update(feed_queue& queue, std::uint64_t seq, std::string_view body = "
 }
 
 } // namespace
+} // namespace feed_queue
 
 BOOST_AUTO_TEST_SUITE(feed_queue)
 

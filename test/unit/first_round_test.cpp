@@ -6,6 +6,7 @@
 
 #include <chrono>
 
+namespace first_round {
 namespace {
 
 using namespace std::chrono_literals;
@@ -24,6 +25,7 @@ struct fixture : cles::core::first_round::listener {
 };
 
 } // namespace
+} // namespace first_round
 
 BOOST_FIXTURE_TEST_SUITE(first_round, fixture)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+namespace gathering {
 namespace {
 
 struct fixture : cles::test::routing_fixture {
@@ -19,6 +20,7 @@ struct fixture : cles::test::routing_fixture {
 };
 
 } // namespace
+} // namespace gathering
 
 BOOST_FIXTURE_TEST_SUITE(gathering, fixture)
 

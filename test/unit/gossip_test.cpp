@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+namespace gossip {
 namespace {
 
 using namespace std::chrono_literals;
@@ -105,6 +106,7 @@ struct fixture : cles::core::gossip::caller, cles::core::presence::watcher {
 };
 
 } // namespace
+} // namespace gossip
 
 BOOST_FIXTURE_TEST_SUITE(gossip, fixture)
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+namespace grammar {
 namespace {
 
 using cles::protocol::noun_view;
@@ -48,6 +49,7 @@ std::string repeated(std::string_view text, std::size_t times) {
 }
 
 } // namespace
+} // namespace grammar
 
 BOOST_AUTO_TEST_SUITE(grammar)
 

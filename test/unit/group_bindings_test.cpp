@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+namespace group_bindings {
 namespace {
 
 using namespace std::chrono_literals;
@@ -63,6 +64,7 @@ const std::vector<std::uint64_t> nothing{};
 std::vector<std::uint64_t> just(std::uint64_t seq) { return {seq}; }
 
 } // namespace
+} // namespace group_bindings
 
 BOOST_FIXTURE_TEST_SUITE(group_bindings, fixture)
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+namespace group_feed {
 namespace {
 
 cles::limits few_publishers() {
@@ -66,6 +67,7 @@ struct small : fixture {
 };
 
 } // namespace
+} // namespace group_feed
 
 BOOST_FIXTURE_TEST_SUITE(group_feed, fixture)
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+namespace group_feeds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -68,6 +69,7 @@ struct fixture {
 using lines = std::vector<std::string>;
 
 } // namespace
+} // namespace group_feeds
 
 BOOST_FIXTURE_TEST_SUITE(group_feeds, fixture)
 

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+namespace group_session {
 namespace {
 
 using cles::core::group_source;
@@ -51,6 +52,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace group_session
 
 BOOST_FIXTURE_TEST_SUITE(group_session, fixture)
 

@@ -12,6 +12,7 @@
 #include <string>
 #include <string_view>
 
+namespace group_welcomes {
 namespace {
 
 using cles::verb;
@@ -33,6 +34,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace group_welcomes
 
 BOOST_FIXTURE_TEST_SUITE(group_welcomes, fixture)
 

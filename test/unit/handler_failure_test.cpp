@@ -13,6 +13,7 @@
 #include <string_view>
 #include <system_error>
 
+namespace handler_failure {
 namespace {
 
 using cles::errc;
@@ -23,6 +24,7 @@ cles::protocol::failure describe(const E& thrown) {
 }
 
 } // namespace
+} // namespace handler_failure
 
 BOOST_AUTO_TEST_SUITE(handler_failure)
 

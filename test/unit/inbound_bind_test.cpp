@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+namespace inbound_bind {
 namespace {
 
 using cles::verb;
@@ -28,6 +29,7 @@ std::string update(std::string_view noun, int seq, std::string_view body) {
 }
 
 } // namespace
+} // namespace inbound_bind
 
 BOOST_FIXTURE_TEST_SUITE(inbound_bind, fixture)
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+namespace inbound_body {
 namespace {
 
 using cles::verb;
@@ -26,6 +27,7 @@ struct fixture {
 std::string nested(std::size_t depth) { return std::string(depth, '[') + std::string(depth, ']'); }
 
 } // namespace
+} // namespace inbound_body
 
 BOOST_FIXTURE_TEST_SUITE(inbound_body, fixture)
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+namespace inbound_cancel {
 namespace {
 
 using cles::verb;
@@ -24,6 +25,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_cancel
 
 BOOST_FIXTURE_TEST_SUITE(inbound_cancel, fixture)
 

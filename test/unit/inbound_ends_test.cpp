@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+namespace inbound_ends {
 namespace {
 
 using cles::verb;
@@ -26,6 +27,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_ends
 
 BOOST_FIXTURE_TEST_SUITE(inbound_ends, fixture)
 

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+namespace inbound_limits {
 namespace {
 
 using cles::verb;
@@ -27,6 +28,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_limits
 
 BOOST_FIXTURE_TEST_SUITE(inbound_limits, fixture)
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 
+namespace inbound_malformed {
 namespace {
 
 using cles::verb;
@@ -31,6 +32,7 @@ std::string repeated(std::string_view text, std::size_t times) {
 }
 
 } // namespace
+} // namespace inbound_malformed
 
 BOOST_FIXTURE_TEST_SUITE(inbound_malformed, fixture)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+namespace inbound_order {
 namespace {
 
 using cles::verb;
@@ -30,6 +31,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_order
 
 BOOST_FIXTURE_TEST_SUITE(inbound_order, fixture)
 

@@ -7,6 +7,7 @@
 #include <limits>
 #include <string>
 
+namespace inbound_progress {
 namespace {
 
 using cles::verb;
@@ -23,6 +24,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_progress
 
 BOOST_FIXTURE_TEST_SUITE(inbound_progress, fixture)
 

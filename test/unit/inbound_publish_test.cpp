@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+namespace inbound_publish {
 namespace {
 
 using cles::verb;
@@ -25,6 +26,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_publish
 
 BOOST_FIXTURE_TEST_SUITE(inbound_publish, fixture)
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+namespace inbound_results {
 namespace {
 
 using cles::errc;
@@ -33,6 +34,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_results
 
 BOOST_FIXTURE_TEST_SUITE(inbound_results, fixture)
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+namespace inbound_targets {
 namespace {
 
 using cles::verb;
@@ -36,6 +37,7 @@ const std::string_view one_of_each[] = {"PULL car1:speed",        "PUSH car1:log
                                         "PULL self:cles/metrics", "PUSH self:cles/cancel/1", "BIND car1:pose lease=0"};
 
 } // namespace
+} // namespace inbound_targets
 
 BOOST_FIXTURE_TEST_SUITE(inbound_targets, fixture)
 

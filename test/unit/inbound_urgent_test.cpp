@@ -7,6 +7,7 @@
 
 #include <string>
 
+namespace inbound_urgent {
 namespace {
 
 using cles::verb;
@@ -28,6 +29,7 @@ struct fixture {
 const std::string map = "id=1 {\"large\":1}\n";
 
 } // namespace
+} // namespace inbound_urgent
 
 BOOST_FIXTURE_TEST_SUITE(inbound_urgent, fixture)
 

@@ -16,6 +16,7 @@
 #include <string_view>
 #include <vector>
 
+namespace json_reader {
 namespace {
 
 using kind = cles::json_reader::kind;
@@ -72,6 +73,7 @@ const std::string_view invalid[] = {
 // clang-format on
 
 } // namespace
+} // namespace json_reader
 
 BOOST_AUTO_TEST_SUITE(json_reader)
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+namespace json_scan {
 namespace {
 
 /// The number that stands at the beginning of a text, or what is wrong with it.
@@ -41,6 +42,7 @@ bool unescapes(std::string_view raw) {
 }
 
 } // namespace
+} // namespace json_scan
 
 BOOST_AUTO_TEST_SUITE(json_scan)
 

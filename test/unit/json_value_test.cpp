@@ -16,6 +16,7 @@
 #include <string_view>
 #include <vector>
 
+namespace json_value {
 namespace {
 
 using boost::json::value;
@@ -27,6 +28,7 @@ std::string why(std::string_view text) {
 }
 
 } // namespace
+} // namespace json_value
 
 BOOST_AUTO_TEST_SUITE(json_value)
 

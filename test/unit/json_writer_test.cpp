@@ -15,6 +15,7 @@
 #include <string>
 #include <string_view>
 
+namespace json_writer {
 namespace {
 
 template <class T>
@@ -52,6 +53,7 @@ std::string shortest(double d) {
 }
 
 } // namespace
+} // namespace json_writer
 
 BOOST_AUTO_TEST_SUITE(json_writer)
 

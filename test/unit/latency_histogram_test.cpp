@@ -11,6 +11,7 @@
 #include <random>
 #include <vector>
 
+namespace latency_histogram {
 namespace {
 
 using namespace std::chrono_literals;
@@ -22,6 +23,7 @@ bool is_about(nanoseconds measured, nanoseconds actual) {
 }
 
 } // namespace
+} // namespace latency_histogram
 
 BOOST_AUTO_TEST_SUITE(latency_histogram)
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <string>
 
+namespace leases {
 namespace {
 
 using cles::verb;
@@ -31,6 +32,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace leases
 
 BOOST_FIXTURE_TEST_SUITE(leases, fixture)
 

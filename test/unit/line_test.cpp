@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+namespace line {
 namespace {
 
 using cles::protocol::line_buffer;
@@ -53,6 +54,7 @@ std::vector<std::string> feed(line_buffer& buffer, std::string_view bytes, std::
 constexpr std::size_t mebibyte = 1U << 20U;
 
 } // namespace
+} // namespace line
 
 BOOST_AUTO_TEST_SUITE(line)
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+namespace log_entry {
 namespace {
 
 struct heard {
@@ -29,6 +30,7 @@ struct heard {
 };
 
 } // namespace
+} // namespace log_entry
 
 BOOST_AUTO_TEST_SUITE(log_entry)
 

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 
+namespace lost_nodes {
 namespace {
 
 using namespace std::chrono_literals;
@@ -28,6 +29,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace lost_nodes
 
 BOOST_FIXTURE_TEST_SUITE(lost_nodes, fixture)
 

@@ -15,6 +15,7 @@
 #include <string>
 #include <string_view>
 
+namespace node {
 namespace {
 
 using cles::verb;
@@ -29,6 +30,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace node
 
 BOOST_FIXTURE_TEST_SUITE(node, fixture)
 

@@ -14,6 +14,7 @@
 #include <string>
 #include <vector>
 
+namespace outbound_datagram {
 namespace {
 
 using cles::errc;
@@ -43,6 +44,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace outbound_datagram
 
 BOOST_FIXTURE_TEST_SUITE(outbound_datagram, fixture)
 

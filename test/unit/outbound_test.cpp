@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+namespace outbound {
 namespace {
 
 using cles::errc;
@@ -36,6 +37,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace outbound
 
 BOOST_FIXTURE_TEST_SUITE(outbound, fixture)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+namespace peer_table {
 namespace {
 
 using namespace std::chrono_literals;
@@ -55,6 +56,7 @@ struct fixture : cles::core::table_reader {
 };
 
 } // namespace
+} // namespace peer_table
 
 BOOST_FIXTURE_TEST_SUITE(peer_table, fixture)
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <string>
 
+namespace plain_table {
 namespace {
 
 using namespace std::chrono_literals;
@@ -21,6 +22,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace plain_table
 
 BOOST_FIXTURE_TEST_SUITE(plain_table, fixture)
 

@@ -6,12 +6,14 @@
 #include <cstddef>
 #include <string>
 
+namespace plain_text {
 namespace {
 
 using cles::protocol::is_plain;
 using cles::protocol::plain_end;
 
 } // namespace
+} // namespace plain_text
 
 BOOST_AUTO_TEST_SUITE(plain_text)
 

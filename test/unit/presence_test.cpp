@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+namespace presence {
 namespace {
 
 using namespace std::chrono_literals;
@@ -31,6 +32,7 @@ struct fixture : cles::test::watched_presence {
 };
 
 } // namespace
+} // namespace presence
 
 BOOST_FIXTURE_TEST_SUITE(presence, fixture)
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+namespace presence_told {
 namespace {
 
 using namespace std::chrono_literals;
@@ -52,6 +53,7 @@ struct fixture : cles::test::watched_presence {
 };
 
 } // namespace
+} // namespace presence_told
 
 BOOST_FIXTURE_TEST_SUITE(presence_told, fixture)
 

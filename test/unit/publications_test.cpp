@@ -16,6 +16,7 @@
 #include <utility>
 #include <vector>
 
+namespace publications {
 namespace {
 
 using cles::errc;
@@ -59,6 +60,7 @@ bool is_too_large(const cles::error& e) { return e.code() == errc::too_large; }
 bool is_failed(const cles::error& e) { return e.code() == errc::failed; }
 
 } // namespace
+} // namespace publications
 
 BOOST_FIXTURE_TEST_SUITE(publications, fixture)
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+namespace reachable {
 namespace {
 
 using strings = std::vector<std::string>;
@@ -27,6 +28,7 @@ void check(const strings& found, const strings& expected) {
 }
 
 } // namespace
+} // namespace reachable
 
 BOOST_AUTO_TEST_SUITE(reachable)
 

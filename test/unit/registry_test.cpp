@@ -8,12 +8,14 @@
 #include <string>
 #include <vector>
 
+namespace registry {
 namespace {
 
 using cles::errc;
 using cles::verb;
 
 } // namespace
+} // namespace registry
 
 BOOST_AUTO_TEST_SUITE(registry)
 

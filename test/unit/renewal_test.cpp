@@ -7,6 +7,7 @@
 #include <chrono>
 #include <set>
 
+namespace renewal {
 namespace {
 
 using namespace std::chrono_literals;
@@ -29,6 +30,7 @@ struct fixture : cles::core::renewal::keeper {
 };
 
 } // namespace
+} // namespace renewal
 
 BOOST_FIXTURE_TEST_SUITE(renewal, fixture)
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+namespace reply_line {
 namespace {
 
 using cles::errc;
@@ -30,6 +31,7 @@ std::string written(const cles::protocol::failure& why) {
 }
 
 } // namespace
+} // namespace reply_line
 
 BOOST_AUTO_TEST_SUITE(reply_line)
 

@@ -20,6 +20,7 @@ BOOST_DESCRIBE_STRUCT(pose, (), (x))
 
 } // namespace reply_types
 
+namespace reply_operation {
 namespace {
 
 using cles::detail::pending;
@@ -46,6 +47,7 @@ std::string read(std::string_view json) {
 }
 
 } // namespace
+} // namespace reply_operation
 
 BOOST_AUTO_TEST_SUITE(reply_operation)
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+namespace request_checks {
 namespace {
 
 cles::protocol::noun_view parse(std::string_view text) {
@@ -22,6 +23,7 @@ cles::protocol::noun_view parse(std::string_view text) {
 std::optional<std::uint64_t> cancelled(std::string_view noun) { return cles::core::cancelled_id(parse(noun)); }
 
 } // namespace
+} // namespace request_checks
 
 BOOST_AUTO_TEST_SUITE(request_checks)
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+namespace request_line {
 namespace {
 
 using cles::verb;
@@ -50,6 +51,7 @@ std::string written(const cles::protocol::request_text& request) {
 }
 
 } // namespace
+} // namespace request_line
 
 BOOST_AUTO_TEST_SUITE(request_line)
 

@@ -22,6 +22,7 @@ BOOST_DESCRIBE_STRUCT(pose, (), (x, path))
 
 } // namespace request_types
 
+namespace request {
 namespace {
 
 /// What a request borrows, for as long as a test keeps it.
@@ -47,6 +48,7 @@ bool says(const cles::error& e, std::string_view words) {
 }
 
 } // namespace
+} // namespace request
 
 BOOST_FIXTURE_TEST_SUITE(request, source)
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <string>
 
+namespace seeds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -25,6 +26,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace seeds
 
 BOOST_FIXTURE_TEST_SUITE(seeds, fixture)
 

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+namespace session {
 namespace {
 
 using cles::feed_event;
@@ -46,6 +47,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace session
 
 BOOST_FIXTURE_TEST_SUITE(session, fixture)
 

@@ -6,6 +6,7 @@
 
 #include <chrono>
 
+namespace source_life {
 namespace {
 
 using namespace std::chrono_literals;
@@ -26,6 +27,7 @@ struct fixture : cles::core::source_life::keeper {
 };
 
 } // namespace
+} // namespace source_life
 
 BOOST_FIXTURE_TEST_SUITE(source_life, fixture)
 

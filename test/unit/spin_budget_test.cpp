@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <chrono>
 
+namespace spin_budget {
 namespace {
 
 using namespace std::chrono_literals;
@@ -23,6 +24,7 @@ int tries_in(cles::core::spin_budget& budget, int waits) {
 }
 
 } // namespace
+} // namespace spin_budget
 
 BOOST_AUTO_TEST_SUITE(spin_budget)
 

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+namespace subscription {
 namespace {
 
 using cles::feed_event;
@@ -40,6 +41,7 @@ bool take(recorder& s, std::string_view line) {
 }
 
 } // namespace
+} // namespace subscription
 
 BOOST_AUTO_TEST_SUITE(subscription)
 

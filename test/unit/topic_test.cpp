@@ -14,6 +14,7 @@
 #include <string_view>
 #include <vector>
 
+namespace topic {
 namespace {
 
 using namespace std::chrono_literals;
@@ -61,6 +62,7 @@ std::string numbers(std::string text) {
 }
 
 } // namespace
+} // namespace topic
 
 BOOST_FIXTURE_TEST_SUITE(topic, fixture)
 

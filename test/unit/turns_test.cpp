@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+namespace turns {
 namespace {
 
 using namespace cles::test;
@@ -84,6 +85,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace turns
 
 BOOST_FIXTURE_TEST_SUITE(turns, fixture)
 

@@ -3,12 +3,14 @@
 
 #include <boost/test/unit_test.hpp>
 
+namespace update_gathering {
 namespace {
 
 constexpr cles::time_point start{std::chrono::seconds{1}};
 constexpr auto longest = cles::core::update_gathering::longest;
 
 } // namespace
+} // namespace update_gathering
 
 BOOST_AUTO_TEST_SUITE(update_gathering)
 

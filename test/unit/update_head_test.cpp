@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+namespace update_head {
 namespace {
 
 using cles::protocol::malformed_request;
@@ -25,6 +26,7 @@ remembered remembering(std::string_view line) {
 }
 
 } // namespace
+} // namespace update_head
 
 BOOST_AUTO_TEST_SUITE(update_head)
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+namespace update_log {
 namespace {
 
 void append(cles::core::update_log& log, std::string_view line) {
@@ -17,6 +18,7 @@ void append(cles::core::update_log& log, std::string_view line) {
 }
 
 } // namespace
+} // namespace update_log
 
 BOOST_AUTO_TEST_SUITE(update_log)
 

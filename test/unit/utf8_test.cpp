@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+namespace utf8 {
 namespace {
 
 // The encoding of a code point by the book, whether or not the code point may be encoded.
@@ -27,6 +28,7 @@ std::string encode(std::uint32_t c) {
 }
 
 } // namespace
+} // namespace utf8
 
 BOOST_AUTO_TEST_SUITE(utf8)
 

@@ -7,12 +7,14 @@
 #include <string>
 #include <string_view>
 
+namespace verb {
 namespace {
 
 using cles::to_string;
 using word = cles::verb;
 
 } // namespace
+} // namespace verb
 
 BOOST_AUTO_TEST_SUITE(verb)
 

@@ -6,12 +6,14 @@
 #include <chrono>
 #include <cstddef>
 
+namespace waiting_requests {
 namespace {
 
 using namespace std::chrono_literals;
 constexpr cles::time_point start{1h};
 
 } // namespace
+} // namespace waiting_requests
 
 BOOST_AUTO_TEST_SUITE(waiting_requests)
 
