@@ -20,14 +20,21 @@ std::string names_of(const std::vector<net_interface>& all) {
 }
 
 // Another one, by which the network could be reached.
-std::string better_than_loopback(const std::vector<net_interface>& all) {
+const net_interface* better_than_loopback(const std::vector<net_interface>& all) {
     const auto at = std::find_if(all.begin(), all.end(), [](const net_interface& i) {
         return i.up && i.multicast && !i.loopback && !i.address.empty();
     });
-    return at == all.end() ? "" : at->name;
+    return at == all.end() ? nullptr : &*at;
 }
 
-void check_chosen(const std::string& name, const std::vector<net_interface>& all, findings& found) {
+// What two machines take, by this interface of this one.
+std::string for_other_hosts(const net_interface& by, const cles::multicast_options& where) {
+    return "to reach other hosts: CLES_MULTICAST=" + by.name + " (there their own interface), nodes with --listen tcp://" +
+           by.address + " --insecure, and UDP port " + std::to_string(where.port) + " open";
+}
+
+void check_chosen(const cles::multicast_options& where, const std::vector<net_interface>& all, findings& found) {
+    const auto& name = where.interface;
     const auto at = std::find_if(all.begin(), all.end(), [&](const net_interface& i) { return i.name == name; });
     if (at == all.end()) {
         found.push_back({"interfaces", verdict::failure, "multicast is to go by " + name + ", and there is none",
@@ -43,12 +50,12 @@ void check_chosen(const std::string& name, const std::vector<net_interface>& all
         found.push_back({"interfaces", verdict::warning, name + " says that it carries no multicast",
                          "ip link set " + name + " multicast on, or find nodes by seeds and --at"});
     } else if (at->loopback) {
-        const auto other = better_than_loopback(all);
+        const auto* other = better_than_loopback(all);
         found.push_back({"interfaces", verdict::ok,
-                         "multicast goes by " + name + ": nodes of this host alone are heard",
-                         other.empty() ? "" : "CLES_MULTICAST=" + other + " for those of the network"});
+                         "multicast goes by " + name + ": only nodes on this host find each other",
+                         other == nullptr ? "" : for_other_hosts(*other, where)});
     } else {
-        found.push_back({"interfaces", verdict::ok, "multicast goes by " + name});
+        found.push_back({"interfaces", verdict::ok, "multicast goes by " + name, for_other_hosts(*at, where)});
     }
 }
 
@@ -58,7 +65,7 @@ void check_interfaces(const cles::multicast_options& where, findings& found) {
     const auto all = interfaces_of_host();
     found.push_back({"interfaces", verdict::ok, names_of(all)});
     if (where.is_on()) {
-        check_chosen(where.interface, all, found);
+        check_chosen(where, all, found);
     }
 }
 

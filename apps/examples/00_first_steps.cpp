@@ -2,15 +2,21 @@
 // Two cars exchange localization data: asked for once, then as a feed.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 
+#include <exception>
 #include <iostream>
 
 namespace asio = boost::asio;
+
+// So that what a coroutine throws comes out of `io.run()`, instead of going unseen.
+void rethrow(const std::exception_ptr& failure) {
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+}
 
 struct localization {
     double utc = 0, lat = 0, lon = 0, velocity = 0, acceleration = 0;
@@ -37,7 +43,7 @@ int main() {
     car1.update("localization", here()); // to all that are bound
 
     cles::service car2{io, {.name = "car2", .peers = {{"car1", car1.endpoints().front()}}}};
-    asio::co_spawn(io, follow(car1, car2), examples::rethrow);
+    asio::co_spawn(io, follow(car1, car2), rethrow);
     io.run();
 }
 

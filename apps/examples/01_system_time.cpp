@@ -2,16 +2,22 @@
 // The paper's own example (section 3.3): device1 offers its time, and device2 asks for it in a time zone.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 
 #include <ctime>
+#include <exception>
 #include <iostream>
 
 namespace asio = boost::asio;
+
+// So that what a coroutine throws comes out of `io.run()`, instead of going unseen.
+void rethrow(const std::exception_ptr& failure) {
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+}
 
 struct system_time {
     std::string zone;
@@ -48,7 +54,7 @@ int main() {
     device1.on_pull("systemTime", get_system_time);
 
     cles::service device2{io, {.name = "device2", .peers = {{"device1", device1.endpoints().front()}}}};
-    asio::co_spawn(io, compare(device1, device2), examples::rethrow);
+    asio::co_spawn(io, compare(device1, device2), rethrow);
     io.run();
 }
 

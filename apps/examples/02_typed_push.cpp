@@ -2,15 +2,21 @@
 // Structs travel as JSON and arrive as structs. What does not fit is refused by naming the path to it.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 
+#include <exception>
 #include <iostream>
 
 namespace asio = boost::asio;
+
+// So that what a coroutine throws comes out of `io.run()`, instead of going unseen.
+void rethrow(const std::exception_ptr& failure) {
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+}
 
 struct point {
     double lat = 0, lon = 0;
@@ -47,7 +53,7 @@ int main() {
     });
 
     cles::service planner{io, {.name = "planner", .peers = {{"car", car.endpoints().front()}}}};
-    asio::co_spawn(io, drive(car, planner), examples::rethrow);
+    asio::co_spawn(io, drive(car, planner), rethrow);
     io.run();
 }
 

@@ -2,8 +2,6 @@
 // A handler that waits is a coroutine. It is cancelled when the requester withdraws or its time runs out.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>

@@ -2,17 +2,23 @@
 // A long task reports how far it is. It takes a responder, the right to answer later.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include <exception>
 #include <iostream>
 
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
+
+// So that what a coroutine throws comes out of `io.run()`, instead of going unseen.
+void rethrow(const std::exception_ptr& failure) {
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+}
 
 struct scan {
     int frames = 0;
@@ -45,11 +51,11 @@ int main() {
     cles::service camera{io, {.name = "camera", .listen = {"tcp://127.0.0.1:0"}}};
     camera.on_delegate("scan", [](const cles::request& asked, cles::responder answer) {
         const auto executor = answer.get_executor();
-        asio::co_spawn(executor, take_frames(asked.as<scan>(), std::move(answer)), examples::rethrow);
+        asio::co_spawn(executor, take_frames(asked.as<scan>(), std::move(answer)), rethrow);
     });
 
     cles::service me{io, {.name = "me", .peers = {{"camera", camera.endpoints().front()}}}};
-    asio::co_spawn(io, watch(camera, me), examples::rethrow);
+    asio::co_spawn(io, watch(camera, me), rethrow);
     io.run();
 }
 

@@ -2,17 +2,23 @@
 // A feed: it begins with the last value, tells of gaps, and survives its publisher.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 
 #include <cstdint>
+#include <exception>
 #include <iostream>
 #include <memory>
 
 namespace asio = boost::asio;
+
+// So that what a coroutine throws comes out of `io.run()`, instead of going unseen.
+void rethrow(const std::exception_ptr& failure) {
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+}
 
 std::unique_ptr<cles::service> start_car(const asio::any_io_executor& executor) {
     return std::make_unique<cles::service>(executor, cles::service_options{.name = "car", .listen = {"inproc://car"}});
@@ -59,7 +65,7 @@ asio::awaitable<void> follow(std::unique_ptr<cles::service> car, cles::service& 
 int main() {
     asio::io_context io;
     cles::service me{io, {.name = "me", .peers = {{"car", "inproc://car"}}}};
-    asio::co_spawn(io, follow(start_car(me.get_executor()), me), examples::rethrow);
+    asio::co_spawn(io, follow(start_car(me.get_executor()), me), rethrow);
     io.run();
 }
 

@@ -2,18 +2,24 @@
 // The last argument of an operation says how its result is wanted: as a callback, a future, or without exceptions.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/use_future.hpp>
 
+#include <exception>
 #include <iostream>
 
 namespace asio = boost::asio;
 using namespace std::chrono_literals;
+
+// So that what a coroutine throws comes out of `io.run()`, instead of going unseen.
+void rethrow(const std::exception_ptr& failure) {
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+}
 
 asio::awaitable<void> without_exceptions(cles::service& me) {
     std::string words;
@@ -41,7 +47,7 @@ int main() {
     asio::co_spawn(io, without_exceptions(me), [&](const std::exception_ptr& failure) {
         car.stop();
         me.stop();
-        examples::rethrow(failure);
+        rethrow(failure);
     });
     io.run();
 }

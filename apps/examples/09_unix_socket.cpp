@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// On one host a Unix socket takes about half the time of TCP, and the kernel tells who is at the other end.
+// On one host a Unix socket takes less time than TCP, and the kernel identifies the user at the other end.
 #include <cles/service.hpp>
 
 #include <boost/asio/io_context.hpp>

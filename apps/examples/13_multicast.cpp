@@ -2,19 +2,25 @@
 // Multicast: whoever publishes a task is heard, without an address, and one datagram serves all who listen.
 #include <cles/service.hpp>
 
-#include "rethrow.hpp"
-
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/udp.hpp>
 
 #include <cstdint>
+#include <exception>
 #include <iostream>
 #include <map>
 #include <string>
 
 namespace asio = boost::asio;
+
+// So that what a coroutine throws comes out of `io.run()`, instead of going unseen.
+void rethrow(const std::exception_ptr& failure) {
+    if (failure) {
+        std::rethrow_exception(failure);
+    }
+}
 
 // The port of the group. It is 25370 unless something else is said; this example takes one that is free, so that it is
 // alone there.
@@ -57,7 +63,7 @@ int main() {
     cles::service tower{io, in_group("tower", port)};
     car1.update("speed", 10.5);
     car2.update("speed", 20.5);
-    asio::co_spawn(io, listen_to(tower, car1, car2), examples::rethrow);
+    asio::co_spawn(io, listen_to(tower, car1, car2), rethrow);
     io.run();
 }
 

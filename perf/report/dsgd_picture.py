@@ -7,7 +7,8 @@ from .gnuplot import block, draw
 
 def kinds(raw, note):
     shown = [("dsgd", "Distributed stochastic gradient descent, elapsed time of each row of Table 2: medians with their 95 % "
-             "intervals, and what the paper's machines took. The paper does not say how many steps it counts: compare rows.", lambda: elapsed(raw, note))]
+             "intervals, and what the paper's machines took for another amount of work: the paper does not say how many steps. "
+             "Compare the rows of one colour with each other, not the two colours.", lambda: elapsed(raw, note))]
     if "pictured" in raw:
         data = raw["pictured"]
         shown += [
@@ -57,7 +58,7 @@ set key outside top right horizontal
 set boxwidth 0.36
 bar(y) = 0.17
 plot $ours using (0):1:(0):2:($1-bar(0)):($1+bar(0)) with boxxyerror linecolor '#0072b2' title 'here', \\
-     $paper using (0):1:(0):2:($1-bar(0)):($1+bar(0)) with boxxyerror linecolor '#bbbbbb' title 'the paper', \\
+     $paper using (0):1:(0):2:($1-bar(0)):($1+bar(0)) with boxxyerror linecolor '#bbbbbb' title 'the paper, another amount of work', \\
      $ours using 2:1:3:4 with xerrorbars linecolor '#222222' pointtype 0 linewidth 1.5 notitle, \\
      $ours using 4:1:5 with labels left offset 0.7,0 font 'sans-serif,11' notitle, \\
      $paper using 2:1:3 with labels left offset 0.7,0 font 'sans-serif,11' textcolor '#555555' notitle

@@ -198,6 +198,14 @@ class Doctor(unittest.TestCase):
         self.failure(found, "interfaces", "by v0, which is down")
         self.failure(found, "multicast", "v0")
 
+    def test_what_two_machines_take(self):
+        takes = ("to reach other hosts: CLES_MULTICAST=v0 (there their own interface), nodes with --listen "
+                 "tcp://10.77.0.1 --insecure, and UDP port 25370 open")
+        on_loopback = self.examine()[1]["interfaces"][1]
+        self.assertEqual(on_loopback["text"], "multicast goes by lo: only nodes on this host find each other")
+        self.assertEqual(on_loopback["advice"], takes)
+        self.assertEqual(self.examine("-m", "v0")[1]["interfaces"][1]["advice"], takes)
+
     def test_another_interface(self):
         code, found = self.examine("-m", "v0")
         self.assertEqual(code, 0, found)

@@ -16,20 +16,20 @@ def cannot_be_made(why):
 
 
 class Hosts:
-    """`near` has 10.77.0.1 at v0, `far` has 10.77.0.2 at v1; both have loopback."""
+    """`near` has 10.77.0.1 at v0, `far` has 10.77.0.2 at v1, unless others are given; both have loopback."""
 
     # Of a user who is not root the namespace is one in which he is: a container or a change of root has none to give.
     IS_ROOT = os.geteuid() == 0
 
-    def __init__(self):
+    def __init__(self, near=("v0", "10.77.0.1/24"), far=("v1", "10.77.0.2/24")):
         if not all(shutil.which(tool) for tool in ("unshare", "nsenter", "ip")):
             cannot_be_made("it takes unshare, nsenter and ip")
         self.keepers = []
         try:
             self.near = self._keep(["unshare", *([] if self.IS_ROOT else ["--user", "--map-root-user"]), "--net"])
             self.far = self._keep([*self.inside(self.near), "unshare", "--net"])
-            self._ip(self.near, "link", "add", "v0", "type", "veth", "peer", "name", "v1", "netns", str(self.far))
-            for host, name, address in ((self.near, "v0", "10.77.0.1/24"), (self.far, "v1", "10.77.0.2/24")):
+            self._ip(self.near, "link", "add", near[0], "type", "veth", "peer", "name", far[0], "netns", str(self.far))
+            for host, (name, address) in ((self.near, near), (self.far, far)):
                 self._ip(host, "address", "add", address, "dev", name)
                 self._ip(host, "link", "set", name, "up")
                 self._ip(host, "link", "set", "lo", "up")

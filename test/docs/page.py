@@ -20,6 +20,16 @@ class Block:
         return self.note.startswith("no-test")
 
     @property
+    def host(self) -> str:
+        """"1" or "2" of "console host-2 any-numbers"; empty where nothing is said."""
+        found = re.search(r"(?:^| )host-([12])(?: |$)", self.note)
+        return found[1] if found else ""
+
+    @property
+    def any_numbers(self) -> bool:
+        return "any-numbers" in self.note.split()
+
+    @property
     def reason(self) -> str:
         return self.note.removeprefix("no-test").removeprefix(":").strip()
 
