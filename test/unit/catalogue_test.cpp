@@ -11,6 +11,8 @@
 namespace catalogue {
 namespace {
 
+using namespace std::chrono_literals;
+
 struct fixture : cles::test::routing_fixture {
     std::string offered_by(cles::verb v, std::string_view what) {
         std::vector<std::string> names;
@@ -24,6 +26,15 @@ struct fixture : cles::test::routing_fixture {
         }
         return all;
     }
+    void hear_at(const std::string& name, const std::string& url, const std::string& digest) {
+        node.host->others.hear({.node = name, .endpoints = {url}, .interval = 60s, .tasks = digest}, run_of(name),
+                               ++seq[name], from(name), node.clock.now());
+    }
+    void fail_all() {
+        while (ways.count_open() != 0) {
+            ways.open().fails(boost::system::errc::make_error_code(boost::system::errc::connection_refused), "refused");
+        }
+    }
 };
 
 } // namespace
@@ -31,7 +42,6 @@ struct fixture : cles::test::routing_fixture {
 
 BOOST_FIXTURE_TEST_SUITE(catalogue, fixture)
 
-using namespace std::chrono_literals;
 using cles::errc;
 using cles::verb;
 
@@ -134,6 +144,55 @@ BOOST_AUTO_TEST_CASE(no_more_than_sixteen_are_asked_at_once) {
     const auto name = ways.open().node;
     ways.open().answers(description(name, task("PULL", "speed")));
     BOOST_TEST(ways.count_open() == 16U);
+}
+
+BOOST_AUTO_TEST_CASE(names_without_end_at_a_closed_port_are_hardly_asked_at_all) {
+    for (int i = 0; i < 1024; ++i) {
+        hear_at("fake" + std::to_string(i), "tcp://127.0.0.1:9", "digest " + std::to_string(i));
+        fail_all();
+    }
+    BOOST_TEST(ways.count() <= 2U);
+    for (int i = 0; i < 600; ++i) {
+        node.pass(100ms);
+        fail_all();
+    }
+    BOOST_TEST(ways.count() <= 10U); // of one at a time, after pauses that grow
+    leave("fake0");                  // there is room again
+    offer("car2", task("PULL", "speed"));
+    BOOST_TEST(offered_by(verb::pull, "speed") == "car2");
+}
+
+BOOST_AUTO_TEST_CASE(who_is_suspect_is_not_asked_until_it_is_heard_again) {
+    hear("car2");
+    ways.to("car2").fails(errc::unavailable, "the link was lost");
+    const auto before = ways.count();
+    for (int i = 0; i < 100; ++i) {
+        node.pass(100ms); // it is suspect after 3.5 s
+        if (ways.count_open() != 0) {
+            ways.open().fails(errc::unavailable, "the link was lost");
+        }
+    }
+    BOOST_TEST(ways.count() == before + 1); // after 2 s
+    hear("car2");
+    BOOST_TEST(ways.count_open() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(who_does_not_say_within_a_second_is_not_waited_for) {
+    for (int i = 0; i < 40; ++i) { // of which no more than some are asked
+        hear("n" + std::to_string(i), "digest " + std::to_string(i));
+    }
+    node.pass(999ms);
+    BOOST_TEST(routing->expects_more());
+    node.pass(1ms);
+    BOOST_TEST(!routing->expects_more());
+}
+
+BOOST_AUTO_TEST_CASE(one_that_moves_is_asked_where_it_is_now) {
+    hear("car2");
+    ways.to("car2").fails(boost::system::errc::make_error_code(boost::system::errc::connection_refused), "refused");
+    BOOST_TEST(ways.count_open() == 0U);
+    hear_at("car2", "tcp://127.0.0.1:2", "d");
+    BOOST_TEST(ways.count_open() == 1U);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

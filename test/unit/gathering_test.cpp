@@ -145,4 +145,26 @@ BOOST_AUTO_TEST_CASE(a_push_without_reply_still_reaches_all) {
     BOOST_TEST(link.take().empty());
 }
 
+BOOST_AUTO_TEST_CASE(who_never_says_what_it_offers_is_waited_for_half_of_the_time_or_a_second) {
+    int names = 0;
+    for (const auto& [deadline, wait] : {std::pair{400ms, 200ms}, std::pair{5000ms, 1000ms}}) {
+        const auto asked = [&] {
+            return ways.to("car2").text.starts_with("PULL car2:speed") && ways.to("car2").open();
+        };
+        hear("new" + std::to_string(++names), "digest");
+        link.ask("PULL all:speed id=8 deadline=" + std::to_string(deadline.count()));
+        for (int i = 1; i < 10; ++i) { // there is always another
+            node.pass(wait / 10);
+            hear("new" + std::to_string(++names), "digest");
+        }
+        BOOST_TEST(!asked());
+        node.pass(wait / 10);
+        BOOST_TEST(asked());
+        ways.to("car2").answers("{}");
+        ways.to("car3").answers("{}");
+        BOOST_TEST(link.take() == "id=8 {\"results\":{\"car2\":{},\"car3\":{}},\"errors\":{}}\n");
+        node.pass(1000ms); // none is expected any more
+    }
+}
+
 BOOST_AUTO_TEST_SUITE_END()

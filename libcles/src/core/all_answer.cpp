@@ -25,6 +25,11 @@ time_point answer_by(time_point due, time_point now) {
     return due - std::min<time_point::duration>((due - now) / 8, most);
 }
 
+time_point stop_waiting_at(time_point due, time_point now) {
+    constexpr std::chrono::seconds most{1};
+    return now + std::min<time_point::duration>((due - now) / 2, most);
+}
+
 protocol::failure late(std::string_view node) {
     return {.code = errc::deadline, .message = std::string{node} + " did not answer in time"};
 }

@@ -26,6 +26,8 @@ class all_answer {
 
 /// When it is to leave, so that it comes before the time runs out.
 time_point answer_by(time_point due, time_point now);
+/// Until when it waits for nodes that have not said yet what they offer: a second, and no longer than half of its time.
+time_point stop_waiting_at(time_point due, time_point now);
 /// What is said for a node that has not answered by then.
 protocol::failure late(std::string_view node);
 

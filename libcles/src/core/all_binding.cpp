@@ -17,13 +17,24 @@ all_binding::all_binding(std::shared_ptr<routing> by, const protocol::request_li
       call_(std::move(answers)), due_(due) {}
 
 bool all_binding::begin(time_point now) {
+    if (begun_) {
+        return true;
+    }
     if (routing_->expects_more()) {
+        if (!armed()) {
+            routing_->host().deadlines.arm(*this, stop_waiting_at(due_, now));
+        }
         return false;
     }
+    bind_whom_is_known(now);
+    return true;
+}
+
+void all_binding::bind_whom_is_known(time_point now) {
     begun_ = true;
     if (call_->ended()) { // withdrawn while it waited
         place_.unbind("all", path_);
-        return true;
+        return;
     }
     call_->on_stop([weak = weak_from_this()] {
         if (const auto self = weak.lock(); self && !self->closed_) {
@@ -32,7 +43,6 @@ bool all_binding::begin(time_point now) {
     });
     routing_->host().deadlines.arm(*this, answer_by(due_, now));
     follow();
-    return true;
 }
 
 bool all_binding::passed(std::string_view node) const { return passes(via_, node); }
@@ -103,7 +113,14 @@ void all_binding::answer_when_whole() {
     }
 }
 
-void all_binding::on_deadline(time_point) { answer(); }
+void all_binding::on_deadline(time_point now) {
+    if (!begun_) {
+        const auto self = shared_from_this();
+        bind_whom_is_known(now);
+    } else {
+        answer();
+    }
+}
 
 void all_binding::answer() {
     const auto c = std::exchange(call_, nullptr);

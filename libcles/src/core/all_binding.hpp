@@ -38,6 +38,7 @@ class all_binding final : public routing::errand, private deadline, public std::
         bool asked = true; // until it has answered
     };
 
+    void bind_whom_is_known(time_point now);
     void join(const std::string& node);
     void on_told(const std::string& node, topic* t, std::string_view last, const protocol::failure& why);
     void on_deadline(time_point now) override;

@@ -15,9 +15,22 @@ gathering::gathering(std::shared_ptr<routing> by, const protocol::request_line& 
     : routing_(std::move(by)), request_(r), peer_(peer), call_(std::move(answers)), due_(due) {}
 
 bool gathering::begin(time_point now) {
+    if (begun_ || over()) {
+        return true;
+    }
     if (routing_->expects_more()) {
+        if (!armed()) {
+            routing_->host().deadlines.arm(*this, stop_waiting_at(due_, now));
+        }
         return false;
     }
+    ask_whom_is_known(now);
+    return true;
+}
+
+void gathering::ask_whom_is_known(time_point now) {
+    begun_ = true;
+    routing_->host().deadlines.disarm(*this);
     const auto& r = *request_;
     if (offers(routing_->host(), r.verb, r.noun.task)) {
         parts_.push_back({.node = routing_->host().name});
@@ -31,11 +44,10 @@ bool gathering::begin(time_point now) {
     }
     if (parts_.empty()) {
         call_->fail(routing_->nobody_offers(r));
-        return true;
+        return;
     }
     std::sort(parts_.begin(), parts_.end(), [](const part& a, const part& b) { return a.node < b.node; });
     ask_all(now);
-    return true;
 }
 
 void gathering::ask_all(time_point now) {
@@ -87,8 +99,14 @@ void gathering::on_failure(std::size_t leg, leg_failure why) {
 // How far all of them are cannot be told from one.
 void gathering::on_progress(std::size_t, double, std::string_view) {}
 
-void gathering::on_deadline(time_point) {
+void gathering::on_deadline(time_point now) {
     const auto self = shared_from_this();
+    if (!begun_) { // there are always some who have not said what they offer yet
+        if (!over()) {
+            ask_whom_is_known(now);
+        }
+        return;
+    }
     for (auto& p : parts_) {
         if (p.is_open()) {
             p.failure = late(p.node);

@@ -49,6 +49,7 @@ class gathering final : public routing::errand,
     void on_progress(std::size_t leg, double fraction, std::string_view json) override;
     void on_deadline(time_point now) override;
 
+    void ask_whom_is_known(time_point now);
     void ask_all(time_point now);
     void follow();
     void finish();
@@ -63,6 +64,7 @@ class gathering final : public routing::errand,
     std::vector<part> parts_; // by name
     std::size_t open_ = 0;
     std::size_t bytes_ = 0; // of results
+    bool begun_ = false;
     bool asking_ = false;
     bool ended_ = false;
 };

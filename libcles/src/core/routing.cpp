@@ -97,6 +97,9 @@ bool routing::runs_in_line(const protocol::request_line& r) const {
 }
 
 void routing::begin(std::shared_ptr<errand> e, time_point now) {
+    while (!waiting_.empty() && waiting_.front()->over()) {
+        waiting_.pop_front();
+    }
     if (!e->begin(now)) {
         waiting_.push_back(std::move(e));
     }
