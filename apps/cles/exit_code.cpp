@@ -22,7 +22,8 @@ int of(const cles::error& failure) {
     case cles::errc::invalid_url:
     case cles::errc::unknown_scheme:
     case cles::errc::insecure_listen:
-    case cles::errc::invalid_name: return usage;
+    case cles::errc::invalid_name:
+    case cles::errc::invalid_option: return usage;
     case cles::errc::would_deadlock:
     case cles::errc::already_registered:
     case cles::errc::stopped: return local_failure;

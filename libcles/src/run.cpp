@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
 #include <cles/run.hpp>
 
 #include "core/spin_budget.hpp"
@@ -6,7 +7,10 @@
 
 #include <boost/asio/io_context.hpp>
 
+#include <algorithm>
+#include <chrono>
 #include <optional>
+#include <string>
 
 #include <sys/resource.h>
 
@@ -38,9 +42,22 @@ std::size_t spin(boost::asio::io_context& io, std::chrono::nanoseconds limit, co
     return 0;
 }
 
+void check(const run_options& options) {
+    constexpr int most_urgent = 99; // of SCHED_FIFO, on Linux
+    if (options.busy_poll.count() < 0) {
+        throw error(errc::invalid_option,
+                    "run_options::busy_poll is " + std::to_string(options.busy_poll.count()) + " us: a time from 0");
+    }
+    if (options.fifo_priority < 0 || options.fifo_priority > most_urgent) {
+        throw error(errc::invalid_option, "run_options::fifo_priority is " + std::to_string(options.fifo_priority) +
+                                              ": 1 to 99, or 0 for none");
+    }
+}
+
 } // namespace
 
 std::size_t run(boost::asio::io_context& io, const run_options& options) {
+    check(options);
     if (options.lock_memory) {
         shell::lock_memory();
     }
@@ -48,10 +65,11 @@ std::size_t run(boost::asio::io_context& io, const run_options& options) {
     if (options.fifo_priority != 0) {
         scheduling.emplace(options.fifo_priority);
     }
-    if (options.busy_poll.count() <= 0) {
+    if (options.busy_poll.count() == 0) {
         return io.run();
     }
-    core::spin_budget budget{options.busy_poll};
+    constexpr std::chrono::microseconds longest = std::chrono::hours{24};
+    core::spin_budget budget{std::min(options.busy_poll, longest)};
     std::size_t total = 0;
     while (!io.stopped()) {
         const auto limit = budget.next();

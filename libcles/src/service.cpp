@@ -7,6 +7,7 @@
 #include "shell/engine.hpp"
 #include "shell/feed_handle.hpp"
 #include "shell/group_feed_handle.hpp"
+#include "shell/option_checks.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -94,6 +95,9 @@ std::shared_ptr<detail::feed_control> service::make_feed(std::string_view noun, 
     std::string why;
     if (!protocol::parse_noun(noun, parts, why)) {
         return shell::make_refused_feed(engine_, errc::bad_request, why);
+    }
+    if (auto wrong = shell::objection_to(options); !wrong.empty()) {
+        return shell::make_refused_feed(engine_, errc::invalid_option, std::move(wrong));
     }
     if (engine_->stopped()) {
         return shell::make_refused_feed(engine_, errc::stopped, "the service has been stopped");

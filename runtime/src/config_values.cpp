@@ -91,7 +91,7 @@ std::uint64_t to_size(std::string_view text, std::uint64_t least, std::uint64_t 
     if (!is_number || unit == sizes.end()) {
         refuse(text, "is no size: write bytes, or 64KiB, 1MiB, 1GiB");
     }
-    return within(text, number > most ? number : number * unit->second, least, most);
+    return within(text, number > most / unit->second ? most + 1 : number * unit->second, least, most);
 }
 
 microseconds to_duration(std::string_view text) {

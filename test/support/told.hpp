@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/feed_event.hpp>
+#include <cles/limits.hpp>
 #include <cles/pending.hpp>
 
 #include "core/subscription.hpp"
@@ -54,7 +55,7 @@ class told_reply final : public detail::pending {
 class told_feed final : public core::subscription {
   public:
     told_feed(std::string target, std::string path, bool thinned, teller tell)
-        : subscription(std::move(target), std::move(path), thinned), tell_(std::move(tell)) {}
+        : subscription(std::move(target), std::move(path), thinned, limits{}.publishers), tell_(std::move(tell)) {}
 
   private:
     bool on_event(const detail::raw_event& event) override {

@@ -301,6 +301,25 @@ BOOST_AUTO_TEST_CASE(a_caller_who_does_not_fetch_keeps_the_newest_and_learns_of_
     BOOST_TEST(small.next() == "update 5 {}");
 }
 
+BOOST_AUTO_TEST_CASE(a_feed_of_all_on_a_link_tells_as_many_publishers_apart_as_it_may) {
+    for (const std::size_t publishers : {1U, 2U}) {
+        cles::core::feed_machine of_all{host, deadlines, {.publishers = publishers}, "all", "speed", false, 7};
+        auto [operation, result] = cles::test::record();
+        of_all.start(std::move(operation));
+        of_all.on_bound("{}");
+        const auto take = [&](const std::string& node) {
+            const auto line = "UPDATE " + node + ":speed seq=5 epoch=0000000a {}";
+            cles::protocol::request_line update;
+            cles::protocol::malformed_request error;
+            BOOST_REQUIRE(cles::protocol::parse_request(line, update, error));
+            return of_all.take(update);
+        };
+        BOOST_TEST(take("car1"));
+        BOOST_TEST(take("car2"));
+        BOOST_TEST(take("car1") == (publishers == 1)); // forgotten meanwhile, so that it is no repeat
+    }
+}
+
 // -- leases ----------------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(a_binding_by_datagram_is_renewed_at_a_third_of_its_lease) {

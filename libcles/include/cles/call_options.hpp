@@ -11,12 +11,13 @@
 namespace cles {
 
 /// What a caller may say of one request. Set by chaining: `cles::call_options{}.deadline(200ms).at("tcp://10.0.0.2")`.
+/// Where a value is not what it may be, the operation fails with `invalid_option`, and its message names the option.
 class call_options {
   public:
     call_options() = default;
 
-    /// How long to wait for the answer; the peer is told. 0: the protocol's default (5 s, DELEGATE 30 s). At most a
-    /// day.
+    /// How long to wait for the answer; the peer is told. 0: the protocol's default (5 s, DELEGATE 30 s). More than a
+    /// day counts as a day; less than 0 is refused.
     call_options& deadline(std::chrono::milliseconds limit) {
         deadline_ = limit;
         return *this;
@@ -56,12 +57,14 @@ class bind_options : public call_options {
   public:
     bind_options() = default;
 
-    /// At most one update in so long, always the newest. 0: every one.
+    /// At most one update in so long, always the newest. 0: every one. More than a day counts as a day; less than 0 is
+    /// refused.
     bind_options& every(std::chrono::milliseconds interval) {
         every_ = interval;
         return *this;
     }
-    /// How many updates the publisher queues while this binder is slow (1 to 65536, 64 where nothing is said).
+    /// How many updates the publisher queues while this binder is slow: 1 to 65536; 0: the protocol's default, 64. More
+    /// is refused.
     bind_options& keep(std::uint32_t updates) {
         keep_ = updates;
         return *this;

@@ -17,7 +17,7 @@ struct gossip_options {
     /// its reach. Addresses are better than host names, whose lookup waits. A node that is the seed of others needs
     /// none.
     std::vector<std::string> seeds{};
-    /// What `cles::gossip` sets.
+    /// What `cles::gossip` sets. Seeds without it are refused with `invalid_option`.
     const detail::gossip_part* part = nullptr;
 };
 

@@ -101,7 +101,7 @@ class service : public registrar {
   public:
     /// Starts listening at once; accepting begins when the executor runs.
     /// \throws cles::error: `invalid_name`, `invalid_url` (of a network or multicast group too), `unknown_scheme`,
-    /// `insecure_listen`, or the system's code where an address or interface cannot be had (the message names it)
+    /// `insecure_listen`, `invalid_option` (a limit, gossip), or the system's code where an address or interface cannot be had (the message names it)
     service(boost::asio::any_io_executor executor, service_options options);
     template <std::derived_from<boost::asio::execution_context> Context>
     service(Context& context, service_options options)
@@ -118,7 +118,7 @@ class service : public registrar {
     /// Says where a node is. An empty URL forgets it.
     void set_peer(std::string_view name, std::string_view url);
     /// Takes part in gossip from now on, with these seeds instead of those that were given before.
-    /// \throws cles::error: `invalid_url`, `unknown_scheme`
+    /// \throws cles::error: `invalid_url`, `unknown_scheme`, `invalid_option`
     void set_gossip(const gossip_options& how);
     /// The other nodes that announce themselves to the multicast group, or of which others tell, by name. Requests to
     /// them need no URL; what `service_options::peers` and `set_peer` say goes first.

@@ -16,6 +16,7 @@ namespace cles {
 /// Any thread may make and end it. See the Linux kernel's documentation of PM Quality of Service.
 class wake_bound {
   public:
+    /// Less than zero counts as zero, more than the kernel takes (some 35 minutes) as that.
     /// \throws std::system_error where the system refuses: it takes the right to write to /dev/cpu_dma_latency
     explicit wake_bound(std::chrono::microseconds longest);
     wake_bound(const wake_bound&) = delete;

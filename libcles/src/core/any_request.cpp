@@ -2,6 +2,7 @@
 #include "core/any_request.hpp"
 
 #include "core/forwarding.hpp"
+#include "core/later.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -80,7 +81,7 @@ void any_request::note_end(const leg_failure* why, time_point now) {
     const bool refused = why != nullptr && (why->unreachable || why->told.code == errc::busy);
     if (!known_) {
         if (refused) {
-            routing_->avoid_here(now + pause_after(*why));
+            routing_->avoid_here(later(now, pause_after(*why)));
         }
         return;
     }
@@ -88,7 +89,7 @@ void any_request::note_end(const leg_failure* why, time_point now) {
         other->given -= other->given != 0 ? 1 : 0;
         other->told_of = std::min(other->told_of, other->given);
         if (refused) {
-            other->avoid_until = now + pause_after(*why);
+            other->avoid_until = later(now, pause_after(*why));
         }
     }
 }

@@ -3,6 +3,7 @@
 
 #include "core/bind_decision.hpp"
 #include "core/handler_failure.hpp"
+#include "core/later.hpp"
 #include "core/request_checks.hpp"
 
 #include <chrono>
@@ -86,7 +87,7 @@ void bind_requests::serve_elsewhere(const protocol::request_line& r, time_point 
 
 void bind_requests::hold(std::string_view path, std::chrono::milliseconds lease, time_point now) {
     if (leases_) {
-        leases_->set(std::string{path}, now + lease);
+        leases_->set(std::string{path}, later(now, lease));
     }
 }
 

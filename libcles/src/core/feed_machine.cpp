@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/feed_machine.hpp"
 
+#include "core/later.hpp"
+
 #include <utility>
 
 namespace cles::core {
 
 feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
                            std::string path, bool thinned, std::uint32_t seed)
-    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines), mail_(bounds),
+    : subscription(std::move(target), std::move(path), thinned, bounds.publishers), host_(host), deadlines_(deadlines), mail_(bounds),
       backoff_(seed), renewal_(*this, deadlines, ~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
@@ -88,7 +90,7 @@ void feed_machine::on_lost(std::string_view why, time_point now) {
 void feed_machine::pause(time_point now) {
     state_ = state::pausing;
     renewal_.stop();
-    deadlines_.arm(*this, now + backoff_.next());
+    deadlines_.arm(*this, later(now, backoff_.next()));
 }
 
 void feed_machine::on_deadline(time_point) {

@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include "core/later.hpp"
 #include "protocol/datagram.hpp"
 
 #include <algorithm>
@@ -68,7 +69,7 @@ bool group_bindings::bind(const group_source& from, const protocol::request_line
     }
     auto& n = *found->second;
     node_.deadlines.arm(n.leases.at(from),
-                        now + std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)});
+                        later(now, std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)}));
     if (!known) {
         repeat_soon(n, r.noun.target == "all", now);
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/group_feeds.hpp"
 
+#include "core/later.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -34,7 +36,7 @@ void group_feeds::send_bind(bound& b, time_point now) {
         line, {.verb = verb::bind, .noun = b.noun, .lease_ms = static_cast<std::uint32_t>(lease.count())});
     out_.send(line);
     const auto third = lease / 3;
-    node_.deadlines.arm(b, now + std::max(third - jitter_.quarter_of(third), std::chrono::milliseconds{1}));
+    node_.deadlines.arm(b, later(now, std::max(third - jitter_.quarter_of(third), std::chrono::milliseconds{1})));
 }
 
 void group_feeds::send_unbind(const std::string& noun) {

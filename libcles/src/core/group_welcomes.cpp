@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/group_welcomes.hpp"
 
+#include "core/later.hpp"
+
 #include <algorithm>
 #include <chrono>
 #include <string>
@@ -33,7 +35,7 @@ bool group_welcomes::ask(const group_source& from, const identity& peer, const p
         }
     });
     place->decision = decision;
-    decision->ask(*place->bind, place->peer, now + std::chrono::milliseconds{bind.deadline_ms}, now);
+    decision->ask(*place->bind, place->peer, later(now, std::chrono::milliseconds{bind.deadline_ms}), now);
     return true;
 }
 

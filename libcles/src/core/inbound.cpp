@@ -4,6 +4,7 @@
 #include <cles/json_reader.hpp>
 
 #include "core/handler_failure.hpp"
+#include "core/later.hpp"
 #include "core/progress_line.hpp"
 #include "core/raised.hpp"
 #include "core/refusals.hpp"
@@ -207,7 +208,7 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
         serve_here(r, arrived, now);
         return;
     }
-    const auto due = arrived + std::chrono::milliseconds{r.deadline_ms};
+    const auto due = later(arrived, std::chrono::milliseconds{r.deadline_ms});
     if (r.verb == verb::bind) {
         bound_.serve_elsewhere(r, due, now, *this);
         finish_if_done();
@@ -220,7 +221,7 @@ void inbound::serve_here(const protocol::request_line& r, time_point arrived, ti
     if (r.noun.task == "cles") {
         serve_reserved(*node_, replies_, r, peer_);
     } else if (r.verb == verb::bind) {
-        bound_.serve(r, arrived + std::chrono::milliseconds{r.deadline_ms}, now, *this);
+        bound_.serve(r, later(arrived, std::chrono::milliseconds{r.deadline_ms}), now, *this);
         finish_if_done();
     } else {
         serve_task(r, arrived, now);
@@ -260,7 +261,7 @@ void inbound::serve_task(const protocol::request_line& r, time_point arrived, ti
                                           .parameters = {parameters.data(), parameters.size()},
                                           .body = r.body.empty() ? std::string_view{"{}"} : r.body,
                                           .peer = &peer_,
-                                          .deadline = arrived + std::chrono::milliseconds{r.deadline_ms}};
+                                          .deadline = later(arrived, std::chrono::milliseconds{r.deadline_ms})};
     if (h->plain) {
         run_plain(r, *h, cles::request{data}, now);
     } else {

@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/renewal.hpp"
 
+#include "core/later.hpp"
+
 #include <algorithm>
 
 namespace cles::core {
 
 void renewal::begin(time_point asked, std::chrono::milliseconds lease) {
     lease_ = lease;
-    until_ = asked + lease;
-    const auto third = lease / 3;
-    deadlines_.arm(*this, asked + third - jitter_.quarter_of(third));
+    until_ = later(asked, lease);
+    // At once, again and again, would be all the node does: a lease of next to nothing runs out in between instead.
+    const auto third = std::max(lease / 3, std::chrono::milliseconds{1});
+    deadlines_.arm(*this, later(asked, third - jitter_.quarter_of(third)));
 }
 
 void renewal::renewed(time_point asked) { begin(asked, lease_); }
@@ -21,7 +24,7 @@ bool renewal::put_off(time_point now) {
         return false;
     }
     const auto third = std::max(left / 3, shortest);
-    deadlines_.arm(*this, now + third - jitter_.quarter_of(third));
+    deadlines_.arm(*this, later(now, third - jitter_.quarter_of(third)));
     return true;
 }
 

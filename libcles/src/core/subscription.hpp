@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cles/feed_event.hpp>
-#include <cles/limits.hpp>
 
 #include "core/publisher_orders.hpp"
 #include "core/text_map.hpp"
@@ -10,6 +9,7 @@
 #include "protocol/message.hpp"
 #include "protocol/update_head.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -22,10 +22,11 @@ namespace cles::core {
 /// What a node is bound to on one link, from the binder's side. Takes updates in, drops what is not wanted or not new.
 class subscription {
   public:
-    /// `thinned`: with `every`, so that what is missing is no gap.
-    subscription(std::string target, std::string path, bool thinned)
+    /// `thinned`: with `every`, so that what is missing is no gap. `publishers`: so many are told apart, where it is
+    /// all.
+    subscription(std::string target, std::string path, bool thinned, std::size_t publishers)
         : target_(std::move(target)), path_(std::move(path)), thinned_(thinned),
-          each_(target_ == "all" ? std::make_unique<publisher_orders>(limits{}.publishers) : nullptr) {}
+          each_(target_ == "all" ? std::make_unique<publisher_orders>(publishers) : nullptr) {}
     subscription(const subscription&) = delete;
     subscription& operator=(const subscription&) = delete;
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/topic.hpp"
 
+#include "core/later.hpp"
+
 #include <algorithm>
 #include <limits>
 
@@ -34,7 +36,7 @@ void binding::drain_newest(time_point now) {
         target_.put_updates(source_.log_.lines(newest, newest));
         ++source_.shared_.counts.updates_delivered;
         seen_ = newest;
-        next_due_ = now + terms_.every;
+        next_due_ = later(now, terms_.every);
     }
 }
 

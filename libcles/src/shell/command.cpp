@@ -50,10 +50,10 @@ std::uint64_t send_command(detail::engine& by, std::string_view command, const c
         return 0;
     }
     auto chosen = options;
-    if (chosen.deadline_.count() <= 0 && parsed.deadline_ms != protocol::default_deadline(parsed.verb)) {
+    if (chosen.deadline_.count() == 0 && parsed.deadline_ms != protocol::default_deadline(parsed.verb)) {
         chosen.deadline(std::chrono::milliseconds{parsed.deadline_ms});
     }
-    if (left) {
+    if (left && chosen.deadline_.count() >= 0) {
         chosen.deadline(chosen.deadline_.count() > 0 ? std::min(chosen.deadline_, *left) : *left);
     }
     chosen.urgent(chosen.urgent_ || parsed.urgent);

@@ -2,6 +2,7 @@
 #include "shell/connection.hpp"
 
 #include "core/feed_machine.hpp"
+#include "core/later.hpp"
 #include "shell/engine.hpp"
 
 #include <utility>
@@ -196,7 +197,7 @@ void connection::follow_backlog() {
     }
     if (unsent != 0 && !stall_.armed()) {
         stall_.sent = link_->sent();
-        engine_->deadlines().arm(stall_, engine_->now() + bounds.stall);
+        engine_->deadlines().arm(stall_, core::later(engine_->now(), bounds.stall));
     }
 }
 
@@ -206,7 +207,7 @@ void connection::on_stall(time_point now) {
     }
     if (link_->sent() != stall_.sent) {
         stall_.sent = link_->sent();
-        engine_->deadlines().arm(stall_, now + engine_->bounds().stall);
+        engine_->deadlines().arm(stall_, core::later(now, engine_->bounds().stall));
         return;
     }
     engine_->say(log_level::warning,

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/engine.hpp"
 
+#include <cles/limit_ranges.hpp>
+
 #include "core/call.hpp"
+#include "core/later.hpp"
 #include "protocol/message.hpp"
+#include "shell/option_checks.hpp"
 #include "shell/service_call.hpp"
 
 #include <boost/asio/post.hpp>
@@ -49,6 +53,7 @@ engine::engine(asio::any_io_executor executor, service_options options)
     : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks),
       multicast_(options.multicast), gossip_(options.gossip), routing_wanted_(options.routing) {
     check_node_name(options.name);
+    check(options.limits);
     for (const auto& [name, where] : options.peers) {
         routes_.set_peer(name, where);
     }
@@ -73,7 +78,7 @@ void engine::start(const std::vector<std::string>& listen_at) {
     if (multicast_.is_on()) {
         join_group();
     }
-    if (gossip_.part != nullptr) {
+    if (gossip_.part != nullptr || !gossip_.seeds.empty()) {
         neighbours_->gossip(gossip_);
     } else {
         neighbours_->start();
@@ -159,6 +164,10 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
         fail_later(std::move(operation), errc::stopped, "the service has been stopped");
         return 0;
     }
+    if (auto wrong = shell::objection_to(options); !wrong.empty()) {
+        fail_later(std::move(operation), errc::invalid_option, std::move(wrong));
+        return 0;
+    }
     protocol::noun_view noun;
     std::string why;
     boost::system::error_code code = errc::bad_request;
@@ -171,11 +180,6 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
         fail_later(std::move(operation), code, std::move(why));
         return 0;
     }
-    auto limit = options.deadline_;
-    if (limit.count() <= 0) {
-        limit = std::chrono::milliseconds{protocol::default_deadline(request.verb)};
-    }
-    limit = std::min(limit, std::chrono::milliseconds{protocol::max_deadline_ms});
     const auto id = draw_id();
     const auto begun = now();
     turns_.let([&] {
@@ -185,7 +189,7 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
                  .id = id,
                  .urgent = options.urgent_,
                  .begun = begun,
-                 .deadline = begun + limit},
+                 .deadline = core::later(begun, shell::time_limit(options.deadline_, request.verb))},
                 std::move(operation), options.on_progress_);
     });
     settle();

@@ -2,8 +2,10 @@
 #include "shell/feed_links.hpp"
 
 #include "core/ignored_reply.hpp"
+#include "core/later.hpp"
 #include "protocol/message.hpp"
 #include "shell/engine.hpp"
+#include "shell/option_checks.hpp"
 #include "shell/route.hpp"
 
 #include <boost/asio/post.hpp>
@@ -155,13 +157,9 @@ void feed_links::bind(core::feed_machine& feed) {
 void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feeds_.at(&feed);
     e.on = c;
-    auto limit = e.terms.deadline;
-    if (limit.count() <= 0) {
-        limit = std::chrono::milliseconds{protocol::default_deadline_ms};
-    }
     const auto now = engine_.now();
     const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
-    c->bind(feed, bind_text(e, *c), now + limit,
+    c->bind(feed, bind_text(e, *c), core::later(now, time_limit(e.terms.deadline, verb::bind)),
             detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked)});
 }
 
@@ -219,8 +217,7 @@ void feed_links::unbind(core::feed_machine& feed) {
     if (c && c->usable() && !engine_.stopped()) {
         c->session().asking().send(
             {.verb = verb::bind, .noun = found->second.terms.noun, .id = engine_.draw_id(), .lease_ms = 0},
-            now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
-            detail::pending_ptr{new core::ignored_reply});
+            core::later(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new core::ignored_reply});
     }
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/neighbours.hpp"
 
+#include <cles/error.hpp>
+
 #include "shell/engine.hpp"
 #include "shell/group.hpp"
 
@@ -32,6 +34,8 @@ void neighbours::gossip(const gossip_options& how) {
         made->set_seeds(how.seeds);
         gossiper_ = std::move(made);
         start();
+    } else if (!how.seeds.empty()) {
+        throw error(errc::invalid_option, "gossip_options has seeds but no part: make it by cles::gossip({seeds})");
     }
 }
 

@@ -20,7 +20,8 @@ service_call::~service_call() {
 }
 
 void service_call::refuse(std::string_view message, std::chrono::milliseconds retry) {
-    const auto ms = std::max<std::chrono::milliseconds::rep>(retry.count(), 0);
+    constexpr std::chrono::milliseconds::rep most = 86'400'000; // a day, as for plugins
+    const auto ms = std::clamp<std::chrono::milliseconds::rep>(retry.count(), 0, most);
     call_->fail({.code = errc::busy, .message = std::string{message}, .retry_ms = static_cast<std::uint64_t>(ms)});
 }
 
