@@ -26,6 +26,7 @@ struct counters {
     std::uint64_t announcements_sent = 0;
     std::uint64_t announcements_received = 0; ///< of others, and taken
     std::uint64_t announcements_dropped = 0;  ///< malformed or old
+    std::uint64_t announcements_foreign = 0;  ///< of nodes of other pools
     std::uint64_t peers_refused = 0;          ///< announcements of nodes past the limit
     std::uint64_t tables_asked = 0;           ///< of others, by gossip
     std::uint64_t tables_failed = 0;          ///< of these: refused, late, or no tables

@@ -99,6 +99,8 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
     if (head.node == self_.name && head.epoch == self_.epoch) {
         seeds_.on_self(c->url);
         end(*c, true, now);
+    } else if (head.pool != others_.pool() && !head.node.empty()) {
+        end(*c, true, now);
     } else if (head.next.empty()) {
         c->since = "0";
         c->table_bytes = json.size();
