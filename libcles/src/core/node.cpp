@@ -122,6 +122,8 @@ void write_metrics(json_writer& w, const node& n) {
     w.end_object();
     number("errors", c.errors);
     number("errors_unsent", c.errors_unsent);
+    number("housekeeping", c.housekeeping);
+    number("housekeeping_errors", c.housekeeping_errors);
     number("handlers_running", c.handlers_running);
     number("routed", c.routed);
     number("requests_repeated", c.requests_repeated);
