@@ -16,10 +16,10 @@ RETURNS_WITHIN = 1.5  # seconds, on a machine that is not busy with anything els
 PATIENT = 1 + float(os.environ.get("CLES_TEST_PATIENCE", "30")) / 60
 
 
-def start_daemon(test):
+def start_daemon(test, name="sat1"):
     """The URL of a clesd in the test's group."""
-    process = subprocess.Popen([os.environ["CLESD"], "--node", "sat1", "--listen", "tcp://127.0.0.1:0", "-m", test.group],
-                               stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+    command = [os.environ["CLESD"], "--node", name, "--listen", "tcp://127.0.0.1:0", "-m", test.group]
+    process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
                                cwd="/", env=environment(XDG_CONFIG_HOME="/nowhere"))
     test.addCleanup(process.communicate)
     test.addCleanup(process.kill)
@@ -114,6 +114,28 @@ class Names(unittest.TestCase):
         self.assertIn(f"there are two nodes that call themselves 'car1', at {first.url} and at {second.url}", asked()[2])
         second.stop()
         wait_until(lambda: asked()[0] == 0, "there is one alone again")
+
+    @unittest.skipUnless(os.environ.get("CLESD"), "this build has no clesd")
+    def test_a_plain_node_beside_daemons_costs_little_and_counts_no_errors(self):
+        plain = self.node("--name", "car1", "--rate", "0")
+        for i in range(3):
+            start_daemon(self, f"sat{i}")
+        wait_until(lambda: plain.ask("PULL self:cles/peers").count('"node"') == 3, "all are known")
+        time.sleep(3)  # until they have found out that it takes no part in gossip
+
+        def counted():
+            return json.loads(plain.ask("PULL self:cles/metrics"))
+
+        before = counted()
+        time.sleep(5)
+        after = counted()
+        asked = after["housekeeping"] - before["housekeeping"]
+        longest = max(len(plain.ask(f"PULL self:{noun}")) for noun in ("cles", "cles/peers"))
+        rate = asked * (longest + 200) / 5  # with what the questions take
+        print(f"a plain node beside three daemons: {asked} questions in 5 s, at most {rate:.0f} bytes a second")
+        self.assertLessEqual(rate, 1000)
+        self.assertEqual((after["errors"], after["errors_unsent"]), (0, 0))
+        self.assertEqual(after["requests"]["PULL"] - before["requests"]["PULL"], 1)
 
     def test_pools_do_not_mix(self):
         north = [self.node("--name", name, "--pool", "north") for name in ("car1", "car2")]
