@@ -29,6 +29,9 @@ cles::service_options options_of(const address_book& addresses, int verbosity, b
     addresses.check();
     cles::service_options options;
     options.name = "cles-" + std::to_string(::getpid());
+    if (const char* pool = std::getenv("CLES_POOL"); pool != nullptr) {
+        options.pool = pool;
+    }
     options.peers = addresses.peers();
     if (in_group || addresses.finds_by_name()) {
         options.multicast = addresses.group();

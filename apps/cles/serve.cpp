@@ -20,9 +20,12 @@
 
 #include <chrono>
 #include <csignal>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tool {
@@ -33,6 +36,8 @@ namespace {
 
 struct serve_command {
     std::string name = "car1";
+    std::string pool;
+    bool allow_clash = false;
     std::vector<std::string> listen;
     bool insecure = false;
     std::vector<std::string> networks;
@@ -46,6 +51,8 @@ struct serve_command {
 cles::service_options options_of(const serve_command& wanted, const cles::log_sink& log) {
     cles::service_options options;
     options.name = wanted.name;
+    const char* pool = std::getenv("CLES_POOL");
+    options.pool = wanted.pool.empty() && pool != nullptr ? pool : wanted.pool;
     options.listen = wanted.listen;
     if (options.listen.empty()) {
         options.listen.emplace_back(default_url);
@@ -69,9 +76,22 @@ int serve(const serve_command& wanted, int verbosity) {
         awake.emplace(std::chrono::microseconds{*wanted.wake_within_us});
     }
     asio::io_context io{1};
-    play_node node{io, options_of(wanted, log), wanted.rate};
-
     asio::signal_set signals{io, SIGINT, SIGTERM};
+    int ended = exit_code::success;
+    play_node* running = nullptr;
+    auto options = options_of(wanted, log);
+    if (!wanted.allow_clash) {
+        options.on_name_taken = [&](std::string_view where) {
+            log(cles::log_level::error, "stopping: the node at " + std::string{where} + " had the name '" +
+                                            wanted.name + "' first; --name gives another, --allow-clash goes on");
+            ended = exit_code::local_failure;
+            signals.cancel();
+            running->stop();
+        };
+    }
+    play_node node{io, std::move(options), wanted.rate};
+    running = &node;
+
     signals.async_wait([&](boost::system::error_code code, int signal) {
         if (!code) {
             log(cles::log_level::info, signal == SIGINT ? "stopping on SIGINT" : "stopping on SIGTERM");
@@ -84,7 +104,7 @@ int serve(const serve_command& wanted, int verbosity) {
     cles::run(io, {.busy_poll = std::chrono::microseconds{wanted.busy_poll_us},
                    .fifo_priority = wanted.real_time,
                    .lock_memory = wanted.real_time != 0});
-    return exit_code::success;
+    return ended;
 }
 
 } // namespace
@@ -93,6 +113,9 @@ void add_serve(CLI::App& app, context& shared) {
     auto wanted = std::make_shared<serve_command>();
     auto* command = app.add_subcommand("serve", "Run a node to play with");
     command->add_option("--name", wanted->name, "What the node is called (default car1)")->type_name("NAME");
+    command->add_option("--pool", wanted->pool, "To which pool it belongs; others are not known (default CLES_POOL)")
+        ->type_name("NAME");
+    command->add_flag("--allow-clash", wanted->allow_clash, "Go on where another live node had its name first");
     command
         ->add_option("-l,--listen", wanted->listen,
                      "Where it listens, may be repeated; port 0: a free one (default " + std::string{default_url} + ")")

@@ -122,10 +122,11 @@ int run(config setup, config_sources sources) {
         log.warning("the service manager could not be told");
     }
     cles::run(io, how);
+    const int code = running.gave_way() ? cannot_run : success;
     if (running.leaves_something()) {
-        std::_Exit(success); // it cannot be waited for
+        std::_Exit(code); // it cannot be waited for
     }
-    return success;
+    return code;
 }
 
 int start(int argc, const char* const* argv) {

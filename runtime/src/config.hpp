@@ -35,6 +35,8 @@ struct plugin_config {
 /// How a daemon is set up: what all its sources say together (docs/runtime.md).
 struct config {
     std::string node;
+    std::string pool;         ///< empty: the one without a name
+    bool allow_clash = false; ///< goes on where another live node had its name first
     std::vector<std::string> listen;
     bool insecure = false;
     std::vector<std::string> networks;

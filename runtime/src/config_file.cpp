@@ -98,6 +98,8 @@ void read_all(const config_node& from, config& over) {
     constexpr std::uint64_t most_workers = 1024;
     constexpr std::uint64_t most_queued = 1'000'000;
     from.map({{"node", [&](const config_node& v) { over.node = v.as(to_node_name); }},
+              {"pool", [&](const config_node& v) { over.pool = v.as(to_pool_name); }},
+              {"allow_clash", switch_into(over.allow_clash)},
               {"listen", [&](const config_node& v) { over.listen = texts(v, to_url); }},
               {"insecure", switch_into(over.insecure)},
               {"networks", [&](const config_node& v) { over.networks = texts(v, to_network); }},

@@ -65,6 +65,7 @@ overrides from_environment(const std::function<const char*(const char*)>& variab
     const auto whole = [](const char* value) { return std::string{value}; };
     const auto several = [](const char* value) { return parts_of(value); };
     text("CLES_NODE", found.node, whole);
+    text("CLES_POOL", found.pool, whole);
     text("CLES_LISTEN", found.listen, several);
     text("CLES_SEEDS", found.seeds, several);
     text("CLES_MULTICAST", found.multicast, whole);
@@ -74,6 +75,8 @@ overrides from_environment(const std::function<const char*(const char*)>& variab
 
 void apply(const overrides& wanted, config& over) {
     take(wanted.node, over, "node", [&](const std::string& text) { over.node = to_node_name(text); });
+    take(wanted.pool, over, "pool", [&](const std::string& text) { over.pool = to_pool_name(text); });
+    take(wanted.allow_clash, over, "allow_clash", [&](bool value) { over.allow_clash = value; });
     take(wanted.listen, over, "listen",
          [&](const std::vector<std::string>& texts) { over.listen = urls(texts, over, "listen"); });
     take(wanted.seeds, over, "seeds",

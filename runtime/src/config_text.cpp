@@ -73,6 +73,8 @@ std::string to_yaml(const config& whole) {
     yaml_lines out{whole};
     out.raw(whole.file.empty() ? "# no configuration file\n" : "# " + whole.file + "\n");
     out.line("node", in_quotes(whole.node));
+    out.line("pool", in_quotes(whole.pool));
+    out.line("allow_clash", whole.allow_clash ? "true" : "false");
     out.list("listen", whole.listen);
     out.line("insecure", whole.insecure ? "true" : "false");
     out.list("networks", whole.networks);

@@ -129,12 +129,26 @@ std::string wake_bound_text(std::optional<microseconds> bound) {
     return *bound == microseconds{0} ? "0us" : to_string(*bound);
 }
 
-std::string to_node_name(std::string_view text) {
-    const bool fits = !text.empty() && text.size() <= 64 && std::ranges::all_of(text, [](char c) {
+namespace {
+
+bool is_name(std::string_view text) {
+    return !text.empty() && text.size() <= 64 && std::ranges::all_of(text, [](char c) {
         return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
                c == '.';
     });
-    if (!fits) {
+}
+
+} // namespace
+
+std::string to_pool_name(std::string_view text) {
+    if (!text.empty() && !is_name(text)) {
+        refuse(text, "is not a pool's name (1 to 64 letters, digits, '_', '-', '.')");
+    }
+    return std::string{text};
+}
+
+std::string to_node_name(std::string_view text) {
+    if (!is_name(text)) {
         refuse(text, "is no node's name (1 to 64 letters, digits, '_', '-', '.')");
     }
     if (text == "self" || text == "any" || text == "all") {

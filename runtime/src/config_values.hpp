@@ -35,6 +35,8 @@ std::optional<std::chrono::microseconds> to_wake_bound(std::string_view text);
 std::string wake_bound_text(std::optional<std::chrono::microseconds> bound);
 
 std::string to_node_name(std::string_view text);
+/// Empty: the one without a name.
+std::string to_pool_name(std::string_view text);
 /// A URL at which a daemon may listen or ask: of a registered scheme, and not inside a process.
 std::string to_url(std::string_view text);
 /// "10.0.0.0/8", "fd00::/8"

@@ -22,6 +22,7 @@ using std::chrono::steady_clock;
 
 service_options options_of(const config& setup, const daemon_log& log) {
     service_options options{.name = setup.node};
+    options.pool = setup.pool;
     options.listen = setup.listen;
     options.peers = setup.peers;
     options.insecure = setup.insecure;
@@ -73,6 +74,9 @@ daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources
                [this] {
                    auto options = options_of(setup_, log_);
                    options.load = [this] { return has_pool_ ? pool_.load() : node_load{}; };
+                   if (!setup_.allow_clash) {
+                       options.on_name_taken = [this](std::string_view where) { give_way(where); };
+                   }
                    options.metrics = [this](json_writer& w) { write_metrics(w); };
                    return options;
                }()),
@@ -139,6 +143,21 @@ void daemon::stop(int signal) {
     const auto load = pool_.load();
     log_.info("stopping on " + name + "; " + counted(load.running, "job") + " running, " + std::to_string(load.queued) +
               " waiting");
+    drain();
+}
+
+void daemon::give_way(std::string_view where) {
+    if (std::exchange(stopping_, true)) {
+        return;
+    }
+    gave_way_ = true;
+    stop_begun_ = steady_clock::now();
+    log_.error("stopping: the node at " + std::string{where} + " had the name '" + setup_.node +
+               "' first; give this one another (--node), or let it go on all the same (--allow-clash)");
+    drain();
+}
+
+void daemon::drain() {
     if (!tell_.stopping()) {
         log_.warning("the service manager could not be told");
     }

@@ -15,6 +15,7 @@
 
 #include <chrono>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace cles::runtime {
@@ -22,7 +23,8 @@ namespace cles::runtime {
 /// A node that runs plugins on its workers until it is told to stop: what `clesd` is, put together.
 ///
 /// Used on the thread that runs the context. It ends by itself: after SIGTERM or SIGINT it admits no more jobs, lets
-/// those that run end within `config::drain`, and stops the context; a second signal cuts that short.
+/// those that run end within `config::drain`, and stops the context; a second signal cuts that short. Where another
+/// live node had its name first it does the same, unless `config::allow_clash` says otherwise.
 class daemon {
   public:
     /// Loads the plugins and listens. \param log, tell have to outlive it
@@ -33,6 +35,8 @@ class daemon {
     ~daemon();
 
     [[nodiscard]] std::vector<std::string> endpoints() const { return service_.endpoints(); }
+    /// Whether it has ended because another live node had its name first.
+    [[nodiscard]] bool gave_way() const noexcept { return gave_way_; }
     /// Whether something is left that does not end, a job or a plugin: the process then has to go without waiting for
     /// it, by `std::_Exit`.
     [[nodiscard]] bool leaves_something() const noexcept { return leaves_something_; }
@@ -41,6 +45,8 @@ class daemon {
     void load_plugins();
     void write_metrics(json_writer& w) const;
     void stop(int signal);
+    void give_way(std::string_view where);
+    void drain();
     void finish(const drain_report& how);
     void reload();
 
@@ -58,6 +64,7 @@ class daemon {
     bool stopping_ = false;
     bool finished_ = false;
     bool leaves_something_ = false;
+    bool gave_way_ = false;
 };
 
 } // namespace cles::runtime

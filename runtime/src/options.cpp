@@ -16,7 +16,7 @@ constexpr auto about = "A node that runs plugins, finds the others, and shares i
 constexpr auto footer =
     "The configuration is the first of --config, $CLES_CONFIG, ./clesd.yaml, $XDG_CONFIG_HOME/cles/clesd.yaml and\n"
     "/etc/cles/clesd.yaml; without any, the defaults hold. A flag goes before the environment (CLES_NODE,\n"
-    "CLES_LISTEN, CLES_SEEDS, CLES_MULTICAST, CLES_LOG), that before the file.\n\n"
+    "CLES_POOL, CLES_LISTEN, CLES_SEEDS, CLES_MULTICAST, CLES_LOG), that before the file.\n\n"
     "SIGTERM and Ctrl-C stop it when its jobs have ended, within the limit 'drain'; a second one at once. SIGHUP has "
     "it\n"
     "read 'seeds' and 'log' again.\n\n"
@@ -39,6 +39,8 @@ std::variant<options, std::string> parse_options(int argc, const char* const* ar
     options wanted;
     std::string file;
     std::string node;
+    std::string pool;
+    bool allow_clash = false;
     std::vector<std::string> listen;
     std::vector<std::string> seeds;
     std::string multicast;
@@ -52,6 +54,10 @@ std::variant<options, std::string> parse_options(int argc, const char* const* ar
     app.add_flag("--print-config", wanted.print_config,
                  "Only print the configuration, and where each value comes from");
     const auto* node_option = app.add_option("--node", node, "What the node is called")->type_name("NAME");
+    const auto* pool_option =
+        app.add_option("--pool", pool, "To which pool it belongs; others are not known")->type_name("NAME");
+    const auto* clash_option =
+        app.add_flag("--allow-clash", allow_clash, "Go on where another live node had its name first");
     const auto several = [](CLI::Option* option) {
         return option->type_name("URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     };
@@ -78,6 +84,8 @@ std::variant<options, std::string> parse_options(int argc, const char* const* ar
         wanted.config = file;
     }
     give(node_option, node, wanted.flags.node);
+    give(pool_option, pool, wanted.flags.pool);
+    give(clash_option, allow_clash, wanted.flags.allow_clash);
     give(listen_option, listen, wanted.flags.listen);
     give(seeds_option, seeds, wanted.flags.seeds);
     give(multicast_option, multicast, wanted.flags.multicast);

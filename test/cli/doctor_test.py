@@ -238,7 +238,7 @@ class Doctor(unittest.TestCase):
 
     def test_two_nodes_of_one_name(self):
         for _ in range(2):
-            self.serve("car1", "--listen", "tcp://127.0.0.1:0")
+            self.serve("car1", "--listen", "tcp://127.0.0.1:0", "--allow-clash")
         found = {}
 
         def clash():

@@ -171,8 +171,8 @@ class Lives(unittest.TestCase):
     def names(self):
         return [(p["node"], p["state"]) for p in json.loads(cles("ls", "-o", "json", env=self.env)[1])["peers"]]
 
-    def serve(self, name):
-        process = start("serve", "--name", name, "--listen", "tcp://127.0.0.1:0", env=self.env)
+    def serve(self, name, *arguments):
+        process = start("serve", "--name", name, "--listen", "tcp://127.0.0.1:0", *arguments, env=self.env)
         read_line(process)
         self.addCleanup(process.stdout.close)
         self.addCleanup(process.stderr.close)
@@ -199,8 +199,8 @@ class Lives(unittest.TestCase):
         self.assertIsNone(second.poll())
 
     def test_two_of_one_name_are_shown(self):
-        first = self.serve("car1")
-        second = self.serve("car1")
+        first = self.serve("car1", "--allow-clash")
+        second = self.serve("car1", "--allow-clash")
         for one in (first, second):
             self.assertIn("WARNING", told(one, "another node calls itself 'car1' too").upper())
         code, out, err = cles("ls", "-w", "3s", "-o", "json", env=self.env)

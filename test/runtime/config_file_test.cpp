@@ -55,6 +55,7 @@ const mistake mistakes[] = {
     {"listen: {a: b}\n", "clesd.yaml:1: listen: ", "has to be a list"},
     {"insecure: maybe\n", "clesd.yaml:1: insecure: ", "'maybe' is neither true nor false"},
     {"networks: [10.0.0.0]\n", "clesd.yaml:1: networks[0]: ", "is no network"},
+    {"pool: a b\n", "clesd.yaml:1: pool: ", "'a b' is not a pool's name"},
     {"multicast: lo,1.2.3.4\n", "clesd.yaml:1: multicast: ", "multicast group"},
     {"multicast: [lo]\n", "clesd.yaml:1: multicast: ", "has to have keys of its own"},
     {"multicast: {group: 10.1.1.1}\n", "clesd.yaml:1: multicast.group: ", "multicast group"},
@@ -109,6 +110,8 @@ BOOST_AUTO_TEST_SUITE(config_file)
 
 BOOST_AUTO_TEST_CASE(every_key_of_the_page) {
     const auto c = read("node: sat1\n"
+                        "pool: north\n"
+                        "allow_clash: true\n"
                         "listen: [tcp://127.0.0.1:25370, udp://127.0.0.1:25370]\n"
                         "multicast: {group: 239.255.25.38, port: 25371, interface: lo}\n"
                         "seeds: [tcp://127.0.0.1:25371]\n"
@@ -133,6 +136,8 @@ BOOST_AUTO_TEST_CASE(every_key_of_the_page) {
                         "real_time: 10\n"
                         "wake_within: 20us\n");
     BOOST_TEST(c.node == "sat1");
+    BOOST_TEST(c.pool == "north");
+    BOOST_TEST(c.allow_clash);
     BOOST_TEST(c.listen == (std::vector<std::string>{"tcp://127.0.0.1:25370", "udp://127.0.0.1:25370"}),
                boost::test_tools::per_element());
     BOOST_TEST(c.multicast.interface == "lo");

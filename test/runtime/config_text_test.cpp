@@ -13,7 +13,8 @@ namespace {
 
 config all_set() {
     auto c = default_config("host", 4);
-    read_config("node: \"007\"\nlisten: [tcp://127.0.0.1:1, unix://@a b]\ninsecure: on\nnetworks: [fd00::/8]\n"
+    read_config("node: \"007\"\npool: north\nallow_clash: on\nlisten: [tcp://127.0.0.1:1, unix://@a b]\ninsecure: "
+                "on\nnetworks: [fd00::/8]\n"
                 "multicast: {port: 4000, required: false}\nseeds: [tcp://127.0.0.1:2]\n"
                 "peers: {a: tcp://127.0.0.1:3, b.c: udp://127.0.0.1:3}\nworkers: 3\nqueue: 9\nstuck_after: 1500ms\n"
                 "replacements: 0\ndrain: 2min\nplugin_path: [/a, 'b: c']\n"

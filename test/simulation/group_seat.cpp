@@ -13,8 +13,9 @@ namespace cles::simulation {
 namespace {
 
 std::string_view name_of(core::presence::change what) noexcept {
-    constexpr std::array<std::string_view, 7> names{
-        "finds", "finds elsewhere", "hears nothing of", "hears again", "sees leaving", "gives up", "hears two of"};
+    constexpr std::array<std::string_view, 8> names{"finds",        "finds elsewhere", "hears nothing of",
+                                                    "hears again",  "sees leaving",    "gives up",
+                                                    "hears two of", "gives way to"};
     return names[static_cast<std::size_t>(what)];
 }
 

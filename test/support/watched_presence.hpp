@@ -23,7 +23,8 @@ struct watched_presence : core::presence::watcher {
     watched_presence() { table.watch(this); }
 
     void on_peer(std::string_view node, change what, std::string_view where) override {
-        static constexpr const char* words[] = {"appeared", "moved", "silent", "returned", "left", "gone", "clash"};
+        static constexpr const char* words[] = {"appeared", "moved", "silent", "returned",
+                                                "left",     "gone",  "clash",  "taken"};
         told.push_back(std::string{node} + " " + words[static_cast<int>(what)] +
                        (where.empty() ? std::string{} : " " + std::string{where}));
     }

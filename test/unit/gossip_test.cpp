@@ -294,6 +294,43 @@ BOOST_AUTO_TEST_CASE(a_stranger_who_tells_of_himself_is_asked_once) {
     BOOST_TEST(!talk.on_told("[]", cles::core::teller::at(url_of(1)), clock.now()));
 }
 
+BOOST_AUTO_TEST_CASE(one_that_takes_no_part_and_is_heard_in_the_group_is_hardly_asked) {
+    std::uint64_t heard = 0;
+    const auto announces = [&] {
+        others.hear({.node = "plain", .endpoints = {url_of(1)}}, 1, ++heard, {0x0A000001, 40000}, clock.now());
+    };
+    announces();
+    begin();
+    std::size_t asked = 0;
+    for (int i = 0; i < 600; ++i) { // a minute
+        pass(100ms);
+        if (i % 10 == 0) {
+            announces();
+        }
+        for (const auto& a : take_asks()) {
+            ++asked;
+            talk.on_answer(a.ticket, R"({"peers":[]})", clock.now());
+        }
+        for (const auto& a : std::exchange(whos, {})) {
+            talk.on_description(a.ticket, R"({"node":"plain","epoch":"00000001","endpoints":[")" + url_of(1) + "\"]}",
+                                clock.now());
+        }
+    }
+    BOOST_TEST(asked <= 2U);
+    others.hear({.node = "plain", .endpoints = {url_of(1)}}, 2, 1, {0x0A000001, 40001}, clock.now());
+    pass(4s); // the first run is silent
+    others.hear({.node = "plain", .endpoints = {url_of(1)}}, 2, 2, {0x0A000001, 40001}, clock.now());
+    BOOST_TEST(!take_asks_within(2s).empty()); // another run may be another program
+}
+
+BOOST_AUTO_TEST_CASE(tables_of_another_pool_are_nothing) {
+    others.begin("north", clock.now());
+    begin({url_of(1)});
+    talk.on_answer(take_asks().front().ticket, answer(1, {1, 2}), clock.now());
+    BOOST_TEST(others.size() == 0U);
+    BOOST_TEST(take_asks_within(100ms).empty());
+}
+
 BOOST_AUTO_TEST_CASE(a_node_that_knows_plain_tables_only_takes_part) {
     begin({url_of(1)});
     const std::string plain =

@@ -73,6 +73,19 @@ using lines = std::vector<std::string>;
 
 BOOST_FIXTURE_TEST_SUITE(group_feeds, fixture)
 
+BOOST_AUTO_TEST_CASE(a_node_that_begins_anew_is_asked_soon_and_several_are_asked_at_once) {
+    add(all);
+    add(one);
+    out.take();
+    feeds.on_new_run("car2", node.clock.now());
+    feeds.on_new_run("car3", node.clock.now());
+    node.pass(50ms);
+    BOOST_TEST((out.take() == lines{"BIND all:speed lease=10000"}));
+    feeds.on_new_run("car1", node.clock.now());
+    node.pass(50ms);
+    BOOST_TEST(out.take().size() == 2U);
+}
+
 BOOST_AUTO_TEST_CASE(the_first_feed_of_a_noun_binds_and_the_last_unbinds) {
     group_feed second{node.host->bounds, "all", "speed"};
     add(all);

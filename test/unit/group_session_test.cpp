@@ -8,6 +8,7 @@
 #include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -200,6 +201,46 @@ BOOST_AUTO_TEST_CASE(an_update_that_begins_like_a_failure_is_dropped) {
     BOOST_TEST(node.counts().updates_dropped == 1U);
     hear("UPDATE car2:speed seq=2 epoch=5f3a09c1 {}");
     BOOST_TEST(node.counts().updates_received == 1U);
+    session.feeds().remove(feed);
+}
+
+BOOST_AUTO_TEST_CASE(a_forged_update_does_not_silence_a_feed) {
+    using namespace std::chrono_literals;
+    constexpr group_source forger{.address = 0x7f000001, .port = 4666};
+    cles::core::group_feed feed{{}, "all", "speed"};
+    session.feeds().add(feed, node.clock.now());
+    node.host->others.hear({.node = "car2", .endpoints = {"tcp://127.0.0.1:1"}}, 0x5f3a09c1, 1, other,
+                           node.clock.now());
+    const auto received = [&](std::string_view update, const group_source& from) {
+        const auto before = node.counts().updates_received;
+        hear(update, from);
+        return node.counts().updates_received != before;
+    };
+    for (const std::string name : {"car2", "car3"}) { // of which car3 announces nothing
+        const auto head = "UPDATE " + name + ":speed ";
+        BOOST_TEST(received(head + "seq=1 epoch=5f3a09c1 {}", other));
+        BOOST_TEST(!received(head + "seq=1 epoch=00000bad {}", forger));
+        BOOST_TEST(!received(head + "seq=18446744073709551615 epoch=5f3a09c1 {}", forger));
+        BOOST_TEST(received(head + "seq=2 epoch=5f3a09c1 {}", other));
+    }
+    // One that takes the place of a publisher in a pause loses it again.
+    node.pass(3500ms);
+    BOOST_TEST(received("UPDATE car3:speed seq=9 epoch=00000bad {}", forger));
+    BOOST_TEST(!received("UPDATE car3:speed seq=3 epoch=5f3a09c1 {}", other));
+    node.pass(3500ms);
+    BOOST_TEST(received("UPDATE car3:speed seq=4 epoch=5f3a09c1 {}", other));
+    session.feeds().remove(feed);
+}
+
+BOOST_AUTO_TEST_CASE(another_pool_is_not_heard) {
+    cles::core::group_feed feed{{}, "all", "speed"};
+    session.feeds().add(feed, node.clock.now());
+    out.take();
+    session.pass_over(other, node.clock.now() + std::chrono::seconds{15});
+    hear("UPDATE car2:speed seq=1 epoch=5f3a09c1 {}");
+    BOOST_TEST(node.counts().updates_received == 0U);
+    BOOST_TEST(drops("BIND all:speed"));
+    BOOST_TEST(node.counts().group_leases == 0U);
     session.feeds().remove(feed);
 }
 

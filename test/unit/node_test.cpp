@@ -93,6 +93,20 @@ BOOST_AUTO_TEST_CASE(errors_are_counted_whether_or_not_they_are_sent) {
     BOOST_TEST(metric("errors_unsent") == 1);
 }
 
+BOOST_AUTO_TEST_CASE(what_nodes_ask_by_themselves_is_counted_apart) {
+    link.ask("PULL car1:cles");
+    link.ask("PULL self:cles/peers");
+    link.ask("PULL self:cles/peers since=0");
+    link.ask("PUSH self:cles/peers {\"peers\":[]}"); // refused: it takes no part in gossip
+    link.ask("PUSH self:cles/peers reply=no {\"peers\":[]}");
+    BOOST_TEST(metric("housekeeping") == 5);
+    BOOST_TEST(metric("housekeeping_errors") == 2);
+    BOOST_TEST(metric("errors") == 0);
+    BOOST_TEST(metric("errors_unsent") == 0);
+    const auto requests = pull("self:cles/metrics").at("requests");
+    BOOST_TEST(boost::json::serialize(requests) == "{\"PULL\":5,\"PUSH\":0,\"DELEGATE\":0,\"BIND\":0,\"UPDATE\":0}");
+}
+
 BOOST_AUTO_TEST_CASE(what_is_dropped_is_counted) {
     link.ask("id=7 {}");
     link.ask("UPDATE car2:speed seq=1 epoch=0000000a {}");

@@ -52,6 +52,13 @@ struct service_options {
     multicast_options multicast{};
     /// Finds other nodes by asking, without multicast and beyond its reach, where it is `cles::gossip({seeds})`.
     gossip_options gossip{};
+    /// The pool that it belongs to, a name; empty: the one without a name. Nodes of other pools are not known, so that
+    /// two that share a network, or a port that was used again, never become one.
+    std::string pool{};
+    /// Called on the service's executor when another live node turns out to have had this one's name first (of two that
+    /// started within a second, the one with the lower epoch has it), with the URL where that one is. The service goes
+    /// on, and is not asked by its name.
+    std::function<void(std::string_view where)> on_name_taken{};
     /// Acts for its clients on `any:`, `all:` and the names of other nodes (docs/routing.md) where it is
     /// `cles::routing()`. Without it these are answered `no_target`.
     const detail::routing_part* routing = nullptr;

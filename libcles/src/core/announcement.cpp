@@ -88,6 +88,9 @@ bool read_announcement_member(json_reader& r, std::string_view key, announcement
     if (key == "leaving") {
         return r.read(out.leaving);
     }
+    if (key == "pool") {
+        return r.read(out.pool);
+    }
     return r.skip();
 }
 
@@ -110,6 +113,10 @@ void append_body(std::string& out, const announcement& said, std::size_t endpoin
     w.begin_object();
     w.plain_key("node");
     w.value(std::string_view{said.node});
+    if (!said.pool.empty()) {
+        w.plain_key("pool");
+        w.value(std::string_view{said.pool});
+    }
     w.plain_key("endpoints");
     w.begin_array();
     for (std::size_t i = 0; i < endpoints; ++i) {

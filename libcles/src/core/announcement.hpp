@@ -31,6 +31,7 @@ struct announcement {
     std::chrono::milliseconds interval{1'000}; ///< until the next one, at most
     std::string tasks{};                       ///< a digest of its tasks
     bool leaving = false;
+    std::string pool{}; ///< empty: the one without a name
 };
 
 /// Reads an update of the noun `<node>:cles`. On failure false, and `why` says what is wrong.

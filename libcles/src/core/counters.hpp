@@ -13,6 +13,8 @@ struct counters {
     std::array<std::uint64_t, verb_count> requests{}; ///< served, by verb
     std::uint64_t errors = 0;                         ///< answered with an error
     std::uint64_t errors_unsent = 0;                  ///< not answered with one because of reply=no
+    std::uint64_t housekeeping = 0;                   ///< requests by which nodes know of each other: not among those
+    std::uint64_t housekeeping_errors = 0;            ///< of these, answered with an error or not at all
     std::uint64_t requests_repeated = 0;              ///< by datagram, and so not run again
     std::uint64_t requests_sent = 0;
     std::uint64_t requests_resent = 0; ///< copies, by datagram
@@ -26,6 +28,7 @@ struct counters {
     std::uint64_t announcements_sent = 0;
     std::uint64_t announcements_received = 0; ///< of others, and taken
     std::uint64_t announcements_dropped = 0;  ///< malformed or old
+    std::uint64_t announcements_foreign = 0;  ///< of nodes of other pools
     std::uint64_t peers_refused = 0;          ///< announcements of nodes past the limit
     std::uint64_t tables_asked = 0;           ///< of others, by gossip
     std::uint64_t tables_failed = 0;          ///< of these: refused, late, or no tables

@@ -93,6 +93,13 @@ void feed_machine::pause(time_point now) {
     deadlines_.arm(*this, later(now, backoff_.next()));
 }
 
+void feed_machine::hurry(time_point now) {
+    if (state_ == state::pausing) {
+        backoff_.reset();
+        deadlines_.arm(*this, now);
+    }
+}
+
 void feed_machine::on_deadline(time_point) {
     if (state_ == state::pausing) {
         state_ = state::binding;

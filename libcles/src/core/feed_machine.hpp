@@ -65,6 +65,10 @@ class feed_machine final : public subscription, private deadline, private renewa
     }
     void on_lost(std::string_view why, time_point now);
 
+    /// The publisher may be bound again: a pause ends.
+    void hurry(time_point now);
+    [[nodiscard]] bool is_bound() const noexcept { return state_ == state::bound; }
+
     /// Where its events are fetched.
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
     void close(errc why);

@@ -99,6 +99,8 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
     if (head.node == self_.name && head.epoch == self_.epoch) {
         seeds_.on_self(c->url);
         end(*c, true, now);
+    } else if (head.pool != others_.pool() && !head.node.empty()) {
+        end(*c, true, now);
     } else if (head.next.empty()) {
         c->since = "0";
         c->table_bytes = json.size();
@@ -142,6 +144,8 @@ void gossip::on_description(std::uint64_t ticket, std::string_view json, time_po
         seeds_.on_answer(c->url, report.said.node);
         if (c->as == part::guest || (!c->node.empty() && c->node != report.said.node)) {
             end(*c, c->as != part::guest, now);
+        } else if (plain_.add(others_, c->node, now + interval() * plain_nodes::intervals_apart, now)) {
+            end(*c, false, now);
         } else {
             const auto pause = milliseconds{c->table_bytes * 1000 / bytes_a_second};
             c->next = now + std::max(interval() / 2, pause);
@@ -233,7 +237,7 @@ void gossip::choose_successor(time_point now) {
     auto name = self_.name;
     for (std::size_t i = 0; i < others_.size(); ++i) {
         const auto k = others_.after(name);
-        if (can_be_asked(*k) && !contacts_.rests(k->node, now)) {
+        if (can_be_asked(*k) && !contacts_.rests(k->node, now) && !plain_.contain(*k, now)) {
             next = k;
             break;
         }
@@ -268,7 +272,7 @@ void gossip::choose_at_random(time_point now) {
     const auto size = others_.size();
     for (int i = 0; i < tries && size != 0 && contacts_.count(part::chosen) < at_random; ++i) {
         const auto k = others_.at(jitter_.below(size));
-        if (can_be_asked(k) && contacts_.find_node(k.node) == nullptr &&
+        if (can_be_asked(k) && contacts_.find_node(k.node) == nullptr && !plain_.contain(k, now) &&
             (size <= at_random + 1 || !contacts_.rests(k.node, now))) {
             const auto stay = interval() * intervals_of_stay;
             auto& c = contacts_.add(part::chosen, k.node, k.where, now);
@@ -369,7 +373,7 @@ void gossip::follow(time_point now) {
         due = std::min(due, c.ticket == 0 ? c.next : c.sent + limit * 2);
     }
     const bool wanting = contacts_.count(part::chosen) + contacts_.count(part::successor) <
-                         std::min<std::size_t>(at_random + 1, others_.size());
+                         std::min<std::size_t>(at_random + 1, plain_.worth_asking(others_, now));
     if (wanting) {
         due = std::min(due, now + interval() / turns_per_interval);
     }

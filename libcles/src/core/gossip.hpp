@@ -10,6 +10,7 @@
 #include "core/jitter.hpp"
 #include "core/lost_nodes.hpp"
 #include "core/peer_table.hpp"
+#include "core/plain_nodes.hpp"
 #include "core/presence.hpp"
 #include "core/seeds.hpp"
 #include "core/teller.hpp"
@@ -116,6 +117,7 @@ class gossip final : public gossip_answers, private deadline {
     seeds seeds_;
     lost_nodes lost_;
     gossip_contacts contacts_;
+    plain_nodes plain_;
     std::optional<std::string> stranger_; // who told of itself, and is to be asked
     time_point next_search_{};
     time_point next_successor_ = time_point::min();

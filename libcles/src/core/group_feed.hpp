@@ -29,6 +29,8 @@ class group_feed {
     [[nodiscard]] bool wants(std::string_view node) const noexcept { return target_ == "all" || target_ == node; }
     /// Hands an update on that it wants. False where it is old or repeated, or its body is no JSON.
     bool take(const protocol::request_line& update);
+    /// The next update of that node is the first.
+    void forget(std::string_view node) { publishers_.forget(node); }
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
     [[nodiscard]] std::size_t publishers() const noexcept { return publishers_.size(); }
 

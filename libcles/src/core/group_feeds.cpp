@@ -39,6 +39,38 @@ void group_feeds::send_bind(bound& b, time_point now) {
     node_.deadlines.arm(b, later(now, std::max(third - jitter_.quarter_of(third), std::chrono::milliseconds{1})));
 }
 
+// Several that begin together are asked together.
+void group_feeds::on_new_run(std::string_view node, time_point now) {
+    constexpr std::chrono::milliseconds soon{50};
+    const auto is_of = [](std::string_view noun, std::string_view target) {
+        return noun.size() > target.size() && noun.starts_with(target) && noun[target.size()] == ':';
+    };
+    for (const auto& [noun, b] : bound_) {
+        const auto due = now + soon - jitter_.quarter_of(soon);
+        if ((is_of(noun, node) || is_of(noun, "all")) && due < b->due()) {
+            node_.deadlines.arm(*b, due);
+        }
+    }
+}
+
+bool group_feeds::wants(const protocol::request_line& update) const {
+    std::string scratch;
+    const auto found = by_path_.find(protocol::canonical_path(update.noun, scratch));
+    return found != by_path_.end() && std::any_of(found->second.begin(), found->second.end(), [&](const group_feed* f) {
+               return f != nullptr && f->wants(update.noun.target);
+           });
+}
+
+void group_feeds::forget(std::string_view node) {
+    for (const auto& [path, feeds] : by_path_) {
+        for (auto* feed : feeds) {
+            if (feed != nullptr) {
+                feed->forget(node);
+            }
+        }
+    }
+}
+
 void group_feeds::send_unbind(const std::string& noun) {
     std::string line;
     protocol::append_request(line, {.verb = verb::bind, .noun = noun, .lease_ms = 0});

@@ -30,6 +30,13 @@ class group_feeds {
     void remove(group_feed& feed);
     /// Removes all, and says which they were.
     [[nodiscard]] std::vector<group_feed*> remove_all();
+    /// The node of that name has begun anew, and knows of no binding: what is bound there, or at all, is soon bound
+    /// again.
+    void on_new_run(std::string_view node, time_point now);
+    /// Whether a feed is bound to what it is an update of.
+    [[nodiscard]] bool wants(const protocol::request_line& update) const;
+    /// The next update of that node is the first.
+    void forget(std::string_view node);
     /// Hands an update on. False where nobody wants it, or it is not news to anybody.
     bool take(const protocol::request_line& update);
 

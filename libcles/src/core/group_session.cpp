@@ -52,7 +52,7 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
         return true;
     }
     if (!solicits) {
-        return bind_noun(from, bind, now);
+        return !sources_.is_foreign(from, now) && bind_noun(from, bind, now);
     }
     if (!allows(node_, identity_of(from), bind)) {
         return false;
@@ -83,6 +83,16 @@ bool group_session::bind_noun(const group_source& from, const protocol::request_
     return bindings_.bind(from, bind, now);
 }
 
+bool group_session::is_from_publisher(const group_source& from, const protocol::request_line& update, time_point now) {
+    using verdict = publisher_sources::verdict;
+    const auto node = update.noun.target;
+    const auto found = sources_.is_foreign(from, now) ? verdict::refused : sources_.look(node, from, now);
+    if (found == verdict::another) {
+        feeds_.forget(node);
+    }
+    return found != verdict::refused;
+}
+
 bool group_session::on_update(const group_source& from, const protocol::request_line& update, time_point now) {
     const auto& noun = update.noun;
     if (noun.task == "cles") {
@@ -94,7 +104,8 @@ bool group_session::on_update(const group_source& from, const protocol::request_
         }
         return true;
     }
-    if (protocol::begins_with_error(update.body) || !feeds_.take(update)) {
+    if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || !is_from_publisher(from, update, now) ||
+        !feeds_.take(update)) {
         ++node_.counts.updates_dropped;
     } else {
         ++node_.counts.updates_received;

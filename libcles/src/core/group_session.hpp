@@ -9,6 +9,7 @@
 #include "core/group_source.hpp"
 #include "core/group_welcomes.hpp"
 #include "core/node.hpp"
+#include "core/publisher_sources.hpp"
 #include "protocol/message.hpp"
 
 #include <cstdint>
@@ -45,7 +46,7 @@ class group_session {
                             ++node_.counts.group_dropped;
                         }
                     }),
-          feeds_(*host, out, ~seed) {}
+          feeds_(*host, out, ~seed), sources_(host->others, host->bounds.publishers) {}
 
     /// Who hears of the reserved task from now on; null: nobody. It must outlive this.
     void attend(group_presence* presence) noexcept { presence_ = presence; }
@@ -57,6 +58,8 @@ class group_session {
         welcomes_.clear();
         bindings_.clear();
     }
+    /// What comes from there is of another pool, and not heard until then.
+    void pass_over(const group_source& from, time_point until) { sources_.note_foreign(from, until); }
     /// What this node is bound to.
     [[nodiscard]] group_feeds& feeds() noexcept { return feeds_; }
 
@@ -67,6 +70,7 @@ class group_session {
     bool serve(const group_source& from, const protocol::request_line& request, time_point now);
     bool on_bind(const group_source& from, const protocol::request_line& bind, time_point now);
     bool bind_noun(const group_source& from, const protocol::request_line& bind, time_point now);
+    bool is_from_publisher(const group_source& from, const protocol::request_line& update, time_point now);
     bool on_update(const group_source& from, const protocol::request_line& update, time_point now);
 
     node& node_;
@@ -74,6 +78,7 @@ class group_session {
     group_bindings bindings_;
     group_welcomes welcomes_;
     group_feeds feeds_;
+    publisher_sources sources_;
     group_presence* presence_ = nullptr;
 };
 

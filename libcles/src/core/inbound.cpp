@@ -43,7 +43,7 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
     if (datagrams_ && !datagrams_->admit(r)) {
         return;
     }
-    ++node_->counts.requests[static_cast<std::size_t>(r.verb)];
+    ++(is_housekeeping(r) ? node_->counts.housekeeping : node_->counts.requests[static_cast<std::size_t>(r.verb)]);
     if (r.id != 0 && calls_.contains(r.id)) {
         replies_.fail(r, errc::bad_request, node_->name + ": the id " + std::to_string(r.id) + " is in flight already");
         lose();

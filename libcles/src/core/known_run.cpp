@@ -41,6 +41,7 @@ void known_run::take(const word& w, std::uint64_t& numbers) {
         described = ++numbers;
     }
     said.node = w.said.node;
+    said.pool = w.said.pool;
     said.load = w.said.load;
     said.interval = w.said.interval;
     if (describes) {

@@ -48,7 +48,9 @@ node::node(node_setup setup, const core::clock& source, std::function<void()> wa
       metrics(std::move(setup.metrics)), load(std::move(setup.load)), time(source), started(source.now()),
       others(name, setup.epoch, deadlines, bounds.peers),
       published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)),
-      remembered{.limit = bounds.remembered} {}
+      remembered{.limit = bounds.remembered} {
+    others.begin(setup.pool, started);
+}
 
 // What is handed on to other nodes is work of theirs.
 node_load node::load_now() const {
@@ -78,6 +80,10 @@ void write_description(json_writer& w, const node& n) {
     w.begin_object();
     w.key("node");
     w.value(std::string_view{n.name});
+    if (!n.others.pool().empty()) {
+        w.key("pool");
+        w.value(std::string_view{n.others.pool()});
+    }
     w.key("version");
     w.value(std::string_view{version});
     w.key("protocol");
@@ -116,6 +122,8 @@ void write_metrics(json_writer& w, const node& n) {
     w.end_object();
     number("errors", c.errors);
     number("errors_unsent", c.errors_unsent);
+    number("housekeeping", c.housekeeping);
+    number("housekeeping_errors", c.housekeeping_errors);
     number("handlers_running", c.handlers_running);
     number("routed", c.routed);
     number("requests_repeated", c.requests_repeated);
@@ -131,6 +139,7 @@ void write_metrics(json_writer& w, const node& n) {
     number("announcements_sent", c.announcements_sent);
     number("announcements_received", c.announcements_received);
     number("announcements_dropped", c.announcements_dropped);
+    number("announcements_foreign", c.announcements_foreign);
     number("peers_known", n.others.size());
     number("peers_refused", c.peers_refused);
     number("tables_asked", c.tables_asked);

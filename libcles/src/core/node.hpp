@@ -29,6 +29,7 @@ class gossip_answers;
 /// How a node begins.
 struct node_setup {
     std::string name;
+    std::string pool{};                  ///< empty: the one without a name
     std::uint32_t epoch = 0;             ///< drawn at random for each run
     std::uint64_t first_datagram_id = 0; ///< likewise; what ids count from in requests by datagram
     cles::limits bounds{};

@@ -48,6 +48,10 @@ void write_entry(json_writer& w, const entry_text& e, std::size_t endpoints) {
     w.begin_object();
     w.plain_key("node");
     w.value(e.node);
+    if (e.said != nullptr && !e.said->pool.empty()) {
+        w.plain_key("pool");
+        w.value(std::string_view{e.said->pool});
+    }
     if (e.said != nullptr) {
         write_endpoints(w, *e.endpoints, endpoints);
     }
@@ -298,6 +302,10 @@ void write_news(json_writer& w, const table_owner& who, const presence& others, 
     w.value(who.node);
     w.plain_key("epoch");
     w.value(who.epoch);
+    if (!others.pool().empty()) {
+        w.plain_key("pool");
+        w.value(std::string_view{others.pool()});
+    }
     w.plain_key("peers");
     w.raw(p.peers);
     w.plain_key("beats");
@@ -336,6 +344,7 @@ bool read_table(std::string_view json, std::size_t most_entries, table_reader& t
         }
         return key == "node"    ? r.read(head.node)
                : key == "epoch" ? r.read(head.epoch)
+               : key == "pool"  ? r.read(head.pool)
                : key == "next"  ? r.read(head.next)
                : key == "more"  ? r.read(head.more)
                                 : r.skip();
@@ -351,7 +360,8 @@ bool read_description(std::string_view json, peer_report& out) {
         if (key == "epoch") {
             return has_epoch = read_epoch(r, out.epoch);
         }
-        return key == "node" || key == "endpoints" ? read_announcement_member(r, key, out.said) : r.skip();
+        return key == "node" || key == "endpoints" || key == "pool" ? read_announcement_member(r, key, out.said)
+                                                                    : r.skip();
     });
     return good && has_epoch && protocol::is_name(out.said.node) && !protocol::is_reserved_target(out.said.node);
 }

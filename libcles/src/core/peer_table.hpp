@@ -54,6 +54,7 @@ class table_reader {
 struct table_head {
     std::string node;  ///< who answers; empty where that is not said
     std::string epoch; ///< as text
+    std::string pool;  ///< to which that one belongs
     std::string next;  ///< empty: the table is whole, and is so each time
     bool more = false;
 };

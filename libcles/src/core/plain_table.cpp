@@ -15,6 +15,10 @@ void write_peers(json_writer& w, const presence& others, time_point now) {
         w.begin_object();
         w.plain_key("node");
         w.value(std::string_view{p.node});
+        if (!others.pool().empty()) {
+            w.plain_key("pool");
+            w.value(std::string_view{others.pool()});
+        }
         w.plain_key("endpoints");
         w.begin_array();
         for (const auto& endpoint : p.endpoints) {

@@ -98,6 +98,9 @@ known_run presence::first_words(const word& w) {
 }
 
 presence::verdict presence::take_word(const word& w, time_point now) {
+    if (w.said.pool != own_pool_) {
+        return verdict::foreign;
+    }
     const bool own_name = w.said.node == own_name_;
     if (own_name && w.epoch == own_epoch_) {
         return verdict::own;
@@ -123,6 +126,7 @@ presence::verdict presence::take_word(const word& w, time_point now) {
         }
         if (second && result == verdict::taken) {
             freshen(*at);
+            check_owner(at->first, now);
         }
         return result;
     }
@@ -143,7 +147,7 @@ presence::verdict presence::take_word(const word& w, time_point now) {
     if (peers_.size() >= most_) {
         return verdict::refused;
     }
-    const auto made = peers_.emplace(w.said.node, entry{first_words(w), false, nullptr, {}}).first;
+    const auto made = peers_.emplace(w.said.node, entry{first_words(w), false, nullptr, {}, now}).first;
     made->second.in_news = by_news_.insert(by_news_.end(), &*made);
     by_epoch_.add(w.epoch, &*made);
     follow(silent_at(made->second.owner));
@@ -197,7 +201,9 @@ presence::verdict presence::take_namesakes_word(const word& w, time_point now) {
     if (namesake_) { // this node has announced itself since, or will; but what is told may be of its former run
         namesake_->first_heard_since |= !w.told() || (own_ && w.spoken > own_since_ + interval_of(w.said, w.from));
     }
-    return take_rivals_word(namesake_, w, now);
+    const auto result = take_rivals_word(namesake_, w, now);
+    check_namesake(now);
+    return result;
 }
 
 presence::verdict presence::take_rivals_word(std::unique_ptr<rival>& second, const word& w, time_point now) {
@@ -225,7 +231,7 @@ presence::verdict presence::take_rivals_word(std::unique_ptr<rival>& second, con
     if (w.said.leaving || (second && silent_at(second->of) > now) || is_stale(w, now)) {
         return verdict::old; // there is room for two of a name
     }
-    second = std::make_unique<rival>(rival{first_words(w), w.spoken, false, false});
+    second = std::make_unique<rival>(rival{first_words(w), w.spoken, false, false, {}});
     follow(silent_at(second->of));
     return verdict::taken;
 }
@@ -281,7 +287,8 @@ void presence::succeed(entries::iterator at, known_run next) {
     }
     by_epoch_.add(next.epoch, &*at);
     next.described = next.news = ++news_;
-    at->second = entry{std::move(next), false, nullptr, at->second.in_news};
+    const auto since = next.heard;
+    at->second = entry{std::move(next), false, nullptr, at->second.in_news, since};
     freshen(*at);
     follow(silent_at(at->second.owner));
     const auto name = at->first;

@@ -8,6 +8,7 @@
 #include "core/ended_runs.hpp"
 #include "core/group_source.hpp"
 #include "core/known_run.hpp"
+#include "core/name_check.hpp"
 #include "core/news_item.hpp"
 #include "core/peer_report.hpp"
 #include "core/run_index.hpp"
@@ -33,7 +34,9 @@ namespace cles::core {
 /// A name belongs to the run of a node that was heard under it first, for as long as that run is live: only it, from
 /// where it announces, moves the name or leaves. Another run that announces the same name waits. When the first one
 /// falls silent it was a restart, and the name is the other's; when both are heard in turn it is a clash, which is
-/// reported, and the second is not asked.
+/// reported, and the second is not asked. So as not to wait for that, the owner is asked whether it is still there,
+/// where somebody can do so: if it is not, the name moves at once; if it is, so is the other, and both answer, it is a
+/// clash.
 class presence final : private deadline {
   public:
     enum class change : std::uint8_t {
@@ -44,6 +47,7 @@ class presence final : private deadline {
         left,     ///< with a word
         gone,     ///< without one
         clash,    ///< a second live node of that name
+        taken,    ///< this node's own name is that of another live node, which was there first
     };
     /// Who is told of changes, after they have been made. `where`: the URL at which it is asked now, or was
     /// until now, or of `clash` where the second one was heard from; it may be empty.
@@ -70,12 +74,30 @@ class presence final : private deadline {
         ~observer() = default;
     };
 
+    /// Asks a run of a node whether it is there: `PULL self:cles` at that URL, for `probe_limit` at most. What came of
+    /// it is told by `on_probed`, never from inside the call.
+    class prober {
+      public:
+        prober() = default;
+        prober(const prober&) = delete;
+        prober& operator=(const prober&) = delete;
+        virtual void probe(std::uint64_t ticket, std::string_view url) = 0;
+
+      protected:
+        ~prober() = default;
+    };
+    static constexpr std::chrono::milliseconds probe_limit{500};
+    static constexpr std::chrono::milliseconds together{1'000}; ///< two that start within it, neither was there first
+    static constexpr std::chrono::milliseconds per_probe{50};   ///< one in so long, in the long run
+    static constexpr std::chrono::milliseconds probe_burst{1'600};
+
     enum class verdict : std::uint8_t {
         taken,
         own,     ///< this node's own word, back from the group
         old,     ///< overtaken, repeated, or from a run that has left
         refused, ///< as many are known as may be
         unknown, ///< of a run that has not been described
+        foreign, ///< of another pool
     };
     /// A node, as whoever asks it needs to know it. Views are valid until the next change.
     struct known {
@@ -91,6 +113,13 @@ class presence final : private deadline {
         : own_name_(std::move(own_name)), own_epoch_(own_epoch), deadlines_(deadlines), most_(most), ended_(most) {}
     void watch(watcher* who) noexcept { watcher_ = who; }
     void observe(observer* who) noexcept { observer_ = who; }
+    void probe_by(prober* who) noexcept { prober_ = who; }
+    /// This node itself has begun, and belongs to that pool. What is said by or of nodes of others counts for nothing.
+    void begin(std::string_view pool, time_point now) {
+        own_pool_ = pool;
+        begun_ = now;
+    }
+    [[nodiscard]] const std::string& pool() const noexcept { return own_pool_; }
 
     /// An announcement by multicast.
     verdict hear(const announcement& said, std::uint32_t epoch, std::uint64_t seq, const group_source& from,
@@ -104,6 +133,10 @@ class presence final : private deadline {
     void leave(time_point now);
     /// This node as it announced itself; null where it has not.
     [[nodiscard]] const known_run* own() const noexcept { return own_ ? &*own_ : nullptr; }
+    /// What came of a probe.
+    void on_probed(std::uint64_t ticket, const probe_outcome& found, time_point now);
+    /// Where the second live node of that name is, if both have answered; nothing where there is one alone, or none.
+    [[nodiscard]] std::optional<std::string_view> second_of(std::string_view node) const noexcept;
     /// This node was stopped, and could hear nobody: silence counts from now on.
     void excuse(time_point now) noexcept { excused_ = now; }
 
@@ -117,6 +150,8 @@ class presence final : private deadline {
     /// All of them by name, those that clash behind those whose name it is.
     [[nodiscard]] std::vector<peer> list(time_point now) const;
 
+    /// From where in the group that name is announced; nothing where it was not heard there.
+    [[nodiscard]] std::optional<group_source> source_of(std::string_view node) const noexcept;
     /// What is known of it; nothing where it is not known.
     [[nodiscard]] std::optional<known> look(std::string_view node) const;
     /// The node whose name follows, behind the last the first; nothing where nobody is known.
@@ -146,6 +181,7 @@ class presence final : private deadline {
         time_point first{};
         bool first_heard_since = false; // the name's owner, after this one
         bool clashes = false;
+        name_check check{};
     };
     struct entry;
     using named_entry = std::pair<const std::string, entry>;
@@ -154,6 +190,7 @@ class presence final : private deadline {
         bool suspect = false;
         std::unique_ptr<rival> second;
         std::list<named_entry*>::iterator in_news{};
+        time_point since{}; // the owner is known
     };
     using entries = std::map<std::string, entry, std::less<>>;
 
@@ -173,6 +210,14 @@ class presence final : private deadline {
     verdict take_namesakes_word(const word& w, time_point now);
     verdict take_rivals_word(std::unique_ptr<rival>& second, const word& w, time_point now);
     verdict take_farewell(const word& w, time_point now);
+    [[nodiscard]] bool may_probe(time_point now) noexcept;
+    void check_owner(const std::string& name, time_point now);
+    void check_namesake(time_point now);
+    void probe(name_check& check, name_check::stage of, std::string name, std::string_view where, time_point now);
+    void on_owner_probed(entries::iterator at, const probe_outcome& found, time_point now);
+    void on_rival_probed(entries::iterator at, const probe_outcome& found, time_point now);
+    void on_namesake_probed(const probe_outcome& found, time_point now);
+    void confirm_clash(rival& second);
     void heard_again(named_entry& one, bool moved, bool told, time_point now);
     void end(entries::iterator at, change how, time_point now);
     void succeed(entries::iterator at, known_run next);
@@ -187,10 +232,16 @@ class presence final : private deadline {
 
     const std::string own_name_;
     const std::uint32_t own_epoch_;
+    std::string own_pool_;
     deadline_queue& deadlines_;
     const std::size_t most_;
     watcher* watcher_ = nullptr;
     observer* observer_ = nullptr;
+    prober* prober_ = nullptr;
+    std::map<std::uint64_t, std::string> probes_; // under way: of which names
+    std::uint64_t last_probe_ = 0;
+    time_point probe_debt_{};
+    time_point begun_{};
     entries peers_;
     std::list<named_entry*> by_news_; // the latest last
     run_index<named_entry> by_epoch_;

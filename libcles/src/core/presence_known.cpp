@@ -18,6 +18,12 @@ std::optional<std::string_view> presence::find(std::string_view node) const noex
     return at == peers_.end() ? std::nullopt : std::optional{at->second.owner.where()};
 }
 
+std::optional<group_source> presence::source_of(std::string_view node) const noexcept {
+    const auto found = peers_.find(node);
+    const bool heard = found != peers_.end() && found->second.owner.from != group_source{};
+    return heard ? std::optional{found->second.owner.from} : std::nullopt;
+}
+
 std::optional<presence::known> presence::look(std::string_view node) const {
     const auto found = peers_.find(node);
     return found == peers_.end() ? std::nullopt : std::optional{known_of(*found)};

@@ -32,6 +32,11 @@ class publisher_orders {
         at->second.heard = ++heard_;
         return at->second.order;
     }
+    void forget(std::string_view publisher) {
+        if (const auto at = sources_.find(publisher); at != sources_.end()) {
+            sources_.erase(at);
+        }
+    }
     [[nodiscard]] std::size_t size() const noexcept { return sources_.size(); }
 
   private:

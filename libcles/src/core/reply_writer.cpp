@@ -63,11 +63,11 @@ void reply_writer::send(reply_to where, std::string& text, std::size_t body) {
 
 void reply_writer::fail(reply_to where, const protocol::failure& why) {
     if (!where.wanted) {
-        ++node_.counts.errors_unsent;
+        ++(where.housekeeping ? node_.counts.housekeeping_errors : node_.counts.errors_unsent);
         note(where.id, {});
         return;
     }
-    ++node_.counts.errors;
+    ++(where.housekeeping ? node_.counts.housekeeping_errors : node_.counts.errors);
     auto told = why;
     if (told.answer.empty() &&
         !told.message.starts_with(node_.name)) { // a handler's own words do not say whose they are

@@ -28,6 +28,7 @@ core::node_setup setup_of(service_options& options) {
     constexpr std::uint64_t apart = 1U << 20U;
     const auto epoch = source();
     return {.name = std::move(options.name),
+            .pool = std::move(options.pool),
             .epoch = epoch,
             .first_datagram_id = (source() & 0xFFFFFFFFU) * apart,
             .bounds = options.limits,
@@ -35,6 +36,13 @@ core::node_setup setup_of(service_options& options) {
             .log = std::move(options.log),
             .metrics = std::move(options.metrics),
             .load = std::move(options.load)};
+}
+
+void check_pool_name(const std::string& pool) {
+    if (!pool.empty() && !protocol::is_name(pool)) {
+        throw error(errc::invalid_name,
+                    protocol::quoted(pool) + " is not a pool's name (1 to 64 letters, digits, '_', '-', '.')");
+    }
 }
 
 void check_node_name(const std::string& name) {
@@ -51,9 +59,11 @@ void check_node_name(const std::string& name) {
 
 engine::engine(asio::any_io_executor executor, service_options options)
     : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks),
-      multicast_(options.multicast), gossip_(options.gossip), routing_wanted_(options.routing) {
+      multicast_(options.multicast), gossip_(options.gossip), on_name_taken_(std::move(options.on_name_taken)),
+      routing_wanted_(options.routing) {
     check_node_name(options.name);
     check(options.limits);
+    check_pool_name(options.pool);
     for (const auto& [name, where] : options.peers) {
         routes_.set_peer(name, where);
     }
@@ -116,6 +126,16 @@ void engine::on_round_over() {
     routes_.on_round_over();
     if (routing_) {
         routing_->release(now());
+    }
+}
+
+void engine::on_name_taken(const std::string& where) {
+    if (on_name_taken_) {
+        asio::post(executor_, [self = shared_from_this(), where] {
+            if (!self->stopped_) {
+                self->on_name_taken_(where);
+            }
+        });
     }
 }
 

@@ -25,6 +25,7 @@
 #include <boost/asio/any_io_executor.hpp>
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -62,6 +63,8 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     [[nodiscard]] shell::group* group() noexcept { return group_.get(); }
     /// Whoever is there has been heard of, as far as could be waited for.
     void on_round_over();
+    /// This node's name is another's.
+    void on_name_taken(const std::string& where);
     /// A connection has ended.
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
     [[nodiscard]] core::turns& turns() noexcept { return turns_; }
@@ -111,6 +114,7 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     std::unique_ptr<shell::group> group_;
     std::unique_ptr<shell::neighbours> neighbours_;
     std::shared_ptr<shell::outside_updates> outside_updates_; ///< once somebody wants to publish from elsewhere
+    std::function<void(std::string_view)> on_name_taken_;
     const routing_part* routing_wanted_;
     std::unique_ptr<routing_host> routing_; // null: off
     core::turns turns_{*this, clock_};

@@ -12,6 +12,7 @@
 
 #include <optional>
 #include <utility>
+#include <vector>
 
 namespace cles::shell {
 namespace {
@@ -110,7 +111,7 @@ class renewal_reply final : public detail::pending {
 } // namespace
 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
-    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, 0});
+    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0});
 }
 
 void feed_links::leave(core::feed_machine& feed) { feeds_.erase(&feed); }
@@ -139,6 +140,7 @@ void feed_links::bind(core::feed_machine& feed) {
         refuse_later(feed, code, why);
         return;
     }
+    found->second.at = r->address();
     r->connect(feed,
                [host = engine_.shared_from_this(), handle = found->second.handle.lock(), &feed](
                    const std::shared_ptr<connection>& c, boost::system::error_code failed, std::string_view message) {
@@ -218,6 +220,33 @@ void feed_links::unbind(core::feed_machine& feed) {
         c->session().asking().send(
             {.verb = verb::bind, .noun = found->second.terms.noun, .id = engine_.draw_id(), .lease_ms = 0},
             core::later(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new core::ignored_reply});
+    }
+}
+
+void feed_links::on_new_run(std::string_view node, bool replaced) {
+    const std::string where{engine_.neighbours().find(node).value_or(std::string_view{})};
+    struct concern {
+        core::feed_machine* feed;
+        std::weak_ptr<detail::feed_control> handle;
+        bool elsewhere;
+    };
+    std::vector<concern> concerned;
+    for (const auto& [feed, e] : feeds_) {
+        if (feed->target() == node && e.terms.at.empty()) {
+            concerned.push_back({feed, e.handle, e.at != where});
+        }
+    }
+    const auto now = engine_.now();
+    for (const auto& [feed, handle, elsewhere] : concerned) {
+        const auto alive = handle.lock(); // what another was told may have closed this one
+        if (!alive || !feeds_.contains(feed)) {
+            continue;
+        }
+        if (replaced && elsewhere && feed->is_bound()) {
+            detach(*feed);
+            feed->on_lost("another run of " + std::string{node} + " has its name", now);
+        }
+        feed->hurry(now);
     }
 }
 

@@ -39,6 +39,9 @@ class feed_links final : public core::feed_host {
     void unbind(core::feed_machine& feed) override;
     void detach(core::feed_machine& feed) override;
     void renew(core::feed_machine& feed, time_point until) override;
+    /// Another run has that name: feeds that wait to bind there do so at once. `replaced`: feeds that are still bound
+    /// at the run before are bound anew.
+    void on_new_run(std::string_view node, bool replaced);
     /// Closes all.
     void stop();
 
@@ -47,6 +50,7 @@ class feed_links final : public core::feed_host {
         std::weak_ptr<detail::feed_control> handle;
         feed_terms terms;
         std::weak_ptr<connection> on;
+        std::string at{};         // the URL where it was asked for last
         std::uint64_t asking = 0; // the id of its last BIND by datagram
     };
 

@@ -5,6 +5,8 @@
 
 #include "shell/engine.hpp"
 #include "shell/group.hpp"
+#include "shell/probe_reply.hpp"
+#include "shell/route.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -15,9 +17,13 @@ namespace cles::shell {
 neighbours::neighbours(detail::engine& host, std::uint32_t seed)
     : engine_(host), announcer_(*this, host.deadlines(), seed), round_(*this, host.deadlines()), seed_(seed * 7 + 3) {
     host.node().others.watch(this);
+    host.node().others.probe_by(this);
 }
 
-neighbours::~neighbours() { engine_.node().others.watch(nullptr); }
+neighbours::~neighbours() {
+    engine_.node().others.watch(nullptr);
+    engine_.node().others.probe_by(nullptr);
+}
 
 void neighbours::join(group& through, std::string interface) {
     group_ = &through;
@@ -92,6 +98,7 @@ void neighbours::leave() {
 
 void neighbours::stop() {
     engine_.node().others.watch(nullptr);
+    engine_.node().others.probe_by(nullptr);
     leave();
     round_.stop();
     if (gossiper_) {
@@ -120,7 +127,8 @@ void neighbours::announce(std::chrono::milliseconds interval, bool leaving) {
                             .load = node.load_now(),
                             .interval = interval,
                             .tasks = core::digest_of_tasks(tasks),
-                            .leaving = leaving};
+                            .leaving = leaving,
+                            .pool = node.others.pool()};
     ++seq_;
     if (gossiper_ && !leaving) {
         said.endpoints = endpoints_for_gossip();
@@ -195,6 +203,10 @@ void neighbours::on_announcement(const core::group_source& from, const protocol:
     case core::presence::verdict::taken: ++counts.announcements_received; break;
     case core::presence::verdict::old: ++counts.announcements_dropped; break;
     case core::presence::verdict::refused: ++counts.peers_refused; break;
+    case core::presence::verdict::foreign:
+        ++counts.announcements_foreign;
+        group_->session().pass_over(from, now + said.interval * 15);
+        break;
     case core::presence::verdict::own:
     case core::presence::verdict::unknown: break;
     }
@@ -221,9 +233,58 @@ void neighbours::on_peer(std::string_view node, core::presence::change what, std
                     name == engine_.node().name
                         ? "another node calls itself '" + name + "' too, on " + std::string{where}
                         : "there is a second '" + name + "', on " + std::string{where} + ", and it is not asked");
+        if (name != engine_.node().name) {
+            engine_.routes().on_whereabouts(name);
+        }
+        return;
+    case core::presence::change::taken: on_name_taken(std::string{where}); return;
+    }
+    follow_run(name);
+    engine_.routes().on_whereabouts(name);
+}
+
+// Feeds of a run that is over are bound anew at the next one at once.
+void neighbours::follow_run(const std::string& name) {
+    const auto known = engine_.node().others.look(name);
+    if (!known) {
+        return; // the next one may still come
+    }
+    const auto [at, is_new] = runs_.try_emplace(name, known->epoch);
+    const bool another = std::exchange(at->second, known->epoch) != known->epoch;
+    if (runs_.size() > 2 * engine_.bounds().peers + 1) {
+        std::erase_if(runs_, [&](const auto& run) { return !engine_.node().others.find(run.first); });
+    }
+    if (is_new || another) {
+        engine_.feeds().on_new_run(name, another);
+        if (group_ != nullptr) {
+            group_->session().feeds().on_new_run(name, engine_.now());
+        }
+    }
+}
+
+void neighbours::on_name_taken(const std::string& where) {
+    engine_.say(log_level::error, "the name '" + engine_.node().name + "' is taken: the node at " + where +
+                                      " was there first, and is asked by it");
+    engine_.on_name_taken(where);
+}
+
+void neighbours::probe(std::uint64_t ticket, std::string_view url) {
+    auto reply = detail::pending_ptr{new probe_reply{engine_.weak_from_this(), ticket, std::string{url}}};
+    boost::system::error_code code;
+    std::string why;
+    auto* way = engine_.routes().to("self", url, false, code, why);
+    if (way == nullptr) {
+        engine_.fail_later(std::move(reply), code, std::move(why));
         return;
     }
-    engine_.routes().on_whereabouts(name);
+    const auto now = engine_.now();
+    way->send({.verb = verb::pull,
+               .noun = "self:cles",
+               .id = engine_.draw_id(),
+               .begun = now,
+               .deadline = now + core::presence::probe_limit},
+              std::move(reply), {});
+    engine_.settle();
 }
 
 void neighbours::on_round_over() { engine_.on_round_over(); }
@@ -232,11 +293,17 @@ std::optional<std::string_view> neighbours::find(std::string_view node) const no
     return engine_.node().others.find(node);
 }
 
+std::optional<std::string_view> neighbours::second_of(std::string_view node) const noexcept {
+    return engine_.node().others.second_of(node);
+}
+
 std::string neighbours::why_unknown() const {
     if (group_ == nullptr) {
         return gossiper_ ? "no node that it asks knows of it; " : "";
     }
-    return "nobody of that name has announced itself on " + interface_ + "; ";
+    const bool others = engine_.node().counts.announcements_foreign != 0;
+    return "nobody of that name has announced itself on " + interface_ +
+           (others ? ", where there are nodes of other pools too; " : "; ");
 }
 
 } // namespace cles::shell

@@ -12,6 +12,8 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +32,7 @@ class group;
 /// Without either there are none.
 class neighbours final : private core::group_presence,
                          private core::presence::watcher,
+                         private core::presence::prober,
                          private core::announcer::voice,
                          private core::first_round::listener {
   public:
@@ -51,6 +54,8 @@ class neighbours final : private core::group_presence,
 
     /// As `presence::find`.
     [[nodiscard]] std::optional<std::string_view> find(std::string_view node) const noexcept;
+    /// Where a second live node of that name is, where both have answered.
+    [[nodiscard]] std::optional<std::string_view> second_of(std::string_view node) const noexcept;
     /// Asks the node of that name where it is.
     void ask_for(std::string_view node);
     /// Whether a name that is not known may be heard any moment.
@@ -67,6 +72,9 @@ class neighbours final : private core::group_presence,
     void on_solicitation(bool by_name, time_point now) override;
     void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) override;
     void on_peer(std::string_view node, core::presence::change what, std::string_view where) override;
+    void probe(std::uint64_t ticket, std::string_view url) override;
+    void follow_run(const std::string& name);
+    void on_name_taken(const std::string& where);
     [[nodiscard]] std::vector<std::string> endpoints_for_group() const;
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
@@ -77,6 +85,7 @@ class neighbours final : private core::group_presence,
     std::uint32_t seed_;
     group* group_ = nullptr;
     std::string interface_;
+    std::map<std::string, std::uint32_t, std::less<>> runs_; // of each name: its epoch
     std::uint64_t seq_ = 0;
     bool begun_ = false;
     bool left_ = false;

@@ -65,6 +65,11 @@ std::string routes::address_of(std::string_view target) const {
     const auto unknown = own_name + " knows no way to '" + std::string{target} + "': ";
     const auto& neighbours = engine_.neighbours();
     if (const auto heard = neighbours.find(target)) {
+        if (const auto second = neighbours.second_of(target)) {
+            throw error(errc::no_target, "there are two nodes that call themselves '" + std::string{target} + "', at " +
+                                             std::string{*heard} + " and at " + std::string{*second} +
+                                             ": give the URL of one");
+        }
         if (heard->empty()) {
             throw error(errc::no_target, unknown + "it is there, but at no address that can be used from here");
         }

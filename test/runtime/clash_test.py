@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Two daemons of one name: the second ends, and says who has it, unless it is told to go on."""
+
+import time
+import unittest
+
+from daemon import DEFAULTS, Daemon, body
+from support import free_port, wait_until
+
+
+class Clash(unittest.TestCase):
+    def setUp(self):
+        self.base = DEFAULTS.replace("multicast: off", f"multicast: {{interface: lo, port: {free_port()}}}")
+        self.first = self.daemon()
+        time.sleep(1.1)  # of two that start within a second neither was there first
+
+    def daemon(self, more=""):
+        made = Daemon(more, base=self.base)
+        self.addCleanup(made.__exit__)
+        made.__enter__()
+        return made
+
+    def test_the_second_ends_and_says_why(self):
+        second = self.daemon()
+        code, took = second.end()
+        self.assertEqual(code, 1)
+        self.assertLess(took, 10)
+        entry = second.wait_for_entry("stopping: ")
+        self.assertEqual(entry["level"], "error")
+        self.assertIn(f"the node at {self.first.url} had the name 'sat1' first", entry["message"])
+        self.assertIsNone(self.first.process.poll())
+        peers = self.first.ask("PULL self:cles/peers")
+        self.assertEqual(body(peers)["peers"], [])
+
+    def test_it_goes_on_where_it_is_told_to(self):
+        second = self.daemon("allow_clash: true\n")
+        second.wait_for_entry("is taken: the node at " + self.first.url)
+        wait_until(lambda: '"clash"' in self.first.ask("PULL self:cles/peers"), "the first knows of it")
+        self.assertIsNone(second.process.poll())
+        for each in (self.first, second):
+            self.assertEqual(each.stop()[0], 0)
+
+    def test_in_another_pool_there_is_no_clash(self):
+        second = self.daemon("pool: north\n")
+        wait_until(lambda: body(second.ask("PULL self:cles/metrics"))["announcements_foreign"] > 2, "the first is heard")
+        self.assertIsNone(second.process.poll())
+        self.assertEqual(body(second.ask("PULL self:cles/peers"))["peers"], [])
+        self.assertEqual(body(self.first.ask("PULL self:cles/peers"))["peers"], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
