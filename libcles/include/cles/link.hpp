@@ -76,6 +76,10 @@ class link {
     virtual void finish() = 0;
     /// Closes at once. Nothing follows.
     virtual void close() = 0;
+    /// Bytes of memory that it holds for what it reads and writes.
+    [[nodiscard]] virtual std::size_t buffered() const noexcept { return 0; }
+    /// Gives back what it does not need while nothing goes on; called when nothing has for a while.
+    virtual void shrink() {}
     [[nodiscard]] virtual const identity& peer() const noexcept = 0;
 };
 

@@ -4,6 +4,7 @@
 #include "core/feed_machine.hpp"
 #include "shell/engine.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace cles::shell {
@@ -13,12 +14,14 @@ constexpr unsigned lines_per_write = 32;
 constexpr std::size_t udp_over_v4 = 28; // bytes of headers
 constexpr std::size_t udp_over_v6 = 48;
 constexpr std::size_t updates_wait_past = 65536; // unsent bytes past which updates stay in their topics
+constexpr std::size_t modest_buffers = 32768;    // bytes that an idle link may keep
+constexpr std::chrono::seconds idle_after{2};
 
 } // namespace
 
 connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from)
     : engine_(std::move(host)), link_(std::move(carrier)), from_(from),
-      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this) {
+      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
     if (link_->datagram() == 0) {
         return;
     }
@@ -198,6 +201,24 @@ void connection::follow_backlog() {
         stall_.sent = link_->sent();
         engine_->deadlines().arm(stall_, engine_->now() + bounds.stall);
     }
+    follow_buffers();
+}
+
+// Many links are idle most of the time: what a large message took is given back when no other follows it soon.
+void connection::follow_buffers() {
+    if (!idle_.armed() && link_->buffered() > modest_buffers) {
+        idle_.moved = link_->received() + link_->sent();
+        engine_->deadlines().arm(idle_, engine_->now() + idle_after);
+    }
+}
+
+void connection::on_idle(time_point now) {
+    const auto moved = link_->received() + link_->sent();
+    if (std::exchange(idle_.moved, moved) == moved) {
+        link_->shrink();
+    } else {
+        engine_->deadlines().arm(idle_, now + idle_after);
+    }
 }
 
 void connection::on_stall(time_point now) {
@@ -259,6 +280,7 @@ void connection::end(std::string_view why) {
     gone_ = true;
     usable_ = false;
     engine_->deadlines().disarm(stall_);
+    engine_->deadlines().disarm(idle_);
     life_.reset();
     engine_->forget(*this, link_->received(), link_->sent());
     lose_feeds(why);

@@ -93,11 +93,20 @@ class connection final : public link_events,
         std::uint64_t sent = 0;
     };
 
+    struct idle_watch final : core::deadline {
+        explicit idle_watch(connection& c) : owner(c) {}
+        void on_deadline(time_point now) override { owner.on_idle(now); }
+        connection& owner;
+        std::uint64_t moved = 0; // bytes, both ways
+    };
+
     time_point now();
     /// The peer has said something. False where it has been turned away with it.
     bool hears(std::string_view text);
     void on_quiet() override;
     void on_stall(time_point now);
+    void follow_buffers();
+    void on_idle(time_point now);
     void send_output();
     [[nodiscard]] bool may_serve_more();
     void serve_more();
@@ -110,6 +119,7 @@ class connection final : public link_events,
     origin from_;
     core::session session_;
     stall_watch stall_;
+    idle_watch idle_;
     std::optional<core::datagram_output> datagrams_;
     std::optional<core::source_life> life_;
     std::vector<core::feed_machine*> feeds_;

@@ -19,6 +19,9 @@ constexpr std::size_t bytes_per_turn = 65536; // of what is written in answer
 constexpr std::size_t piece = 65536;          // sent as one, before what is urgent has another chance
 constexpr std::size_t roomy = 262144;         // buffers that grew past this are given back
 
+// Assigning an empty string keeps the memory.
+void release(std::string& text) noexcept { std::string{}.swap(text); }
+
 } // namespace
 
 stream_link::stream_link(socket_type socket, identity peer, const limits& bounds)
@@ -52,6 +55,15 @@ void stream_link::on_read(error_code code, std::size_t count) {
         return;
     }
     received_ += count;
+    if (std::exchange(shrinking_, false) && code == asio::error::operation_aborted) {
+        if (state_ == state::open) {
+            input_.shrink();
+            read();
+        } else {
+            discard();
+        }
+        return;
+    }
     if (state_ == state::discarding || state_ == state::finishing) {
         if (code) {
             ended_ = true;
@@ -164,6 +176,9 @@ void stream_link::flush() {
     }
     if (!urgent_.empty()) {
         output_.insert(0, urgent_);
+        if (urgent_.capacity() > roomy) {
+            release(urgent_);
+        }
         urgent_.clear();
     }
     if (output_.empty()) {
@@ -180,7 +195,7 @@ void stream_link::flush() {
     sent_ += count;
     if (count == output_.size()) {
         if (output_.capacity() > roomy) {
-            output_ = {};
+            release(output_);
         }
         output_.clear();
         return;
@@ -222,7 +237,7 @@ void stream_link::on_written(error_code code, std::size_t count) {
         return;
     }
     if (sending_.capacity() > roomy) {
-        sending_ = {};
+        release(sending_);
     }
     sending_.clear();
     sending_at_ = 0;
@@ -234,6 +249,29 @@ void stream_link::on_written(error_code code, std::size_t count) {
         say_goodbye();
     } else if (const auto owner = owner_) {
         owner->on_room();
+    }
+}
+
+// -- memory --------------------------------------------------------------------------------------------------------
+
+// The read that waits holds the input's buffer, and is begun anew with a smaller one.
+void stream_link::shrink() {
+    if (state_ != state::open || !sending_.empty() || handing_) {
+        return;
+    }
+    release(sending_);
+    if (output_.empty()) {
+        release(output_);
+    }
+    if (urgent_.empty()) {
+        release(urgent_);
+    }
+    if (!reading_) {
+        input_.shrink();
+    } else if (!shrinking_) {
+        shrinking_ = true;
+        error_code ignored;
+        socket_.cancel(ignored);
     }
 }
 

@@ -38,6 +38,10 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void pause(bool stop) override;
     void finish() override;
     void close() override;
+    [[nodiscard]] std::size_t buffered() const noexcept override {
+        return input_.capacity() + output_.capacity() + urgent_.capacity() + sending_.capacity();
+    }
+    void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return peer_; }
 
   private:
@@ -70,9 +74,10 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     std::uint64_t sent_ = 0;
     std::uint64_t received_ = 0;
     state state_ = state::open;
-    bool reading_ = false; // a read is under way
-    bool handing_ = false; // lines are being handed over, further up the stack
-    bool posted_ = false;  // `hand_over` is to go on
+    bool reading_ = false;   // a read is under way
+    bool shrinking_ = false; // and was cancelled, to go on with a smaller buffer
+    bool handing_ = false;   // lines are being handed over, further up the stack
+    bool posted_ = false;    // `hand_over` is to go on
     bool paused_ = false;
     bool ended_ = false; // the peer sends no more
     bool told_end_ = false;
