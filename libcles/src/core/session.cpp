@@ -4,10 +4,26 @@
 #include "core/request_checks.hpp"
 #include "protocol/line.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
 namespace cles::core {
+namespace {
+
+// Whether any of its lines is a web client's: its requests, and what is alike (as of UPnP), have several.
+bool is_web_datagram(std::string_view datagram) {
+    while (!datagram.empty()) {
+        const auto end = std::min(datagram.find('\n'), datagram.size());
+        if (protocol::is_http(protocol::trim(datagram.substr(0, end)))) {
+            return true;
+        }
+        datagram.remove_prefix(std::min(end + 1, datagram.size()));
+    }
+    return false;
+}
+
+} // namespace
 
 session::session(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
     : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {}
@@ -18,7 +34,9 @@ void session::on_line(std::string_view line, time_point now) {
         return;
     }
     if (is_datagram() && protocol::has_many_lines(line)) {
-        refuse(line, "a datagram holds one line", now);
+        if (!is_web_datagram(line)) {
+            refuse(line, "a datagram holds one line", now);
+        }
         return;
     }
     if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
@@ -91,6 +109,9 @@ void session::turn_away(std::string_view line) {
 
 void session::on_overlong(std::string_view head, time_point now) {
     head = protocol::trim(head);
+    if (is_datagram() && is_web_datagram(head)) {
+        return;
+    }
     if (!protocol::is_reply(head)) {
         inbound_.on_overlong(head, now);
         return;
