@@ -19,10 +19,11 @@ struct count_limit {
 
 constexpr std::uint64_t mebi = 1U << 20U;
 
-constexpr std::array<count_limit, 15> counts{{
+constexpr std::array<count_limit, 16> counts{{
     {"line", &limits::line, 1024, 64 * mebi},
     {"depth", &limits::depth, 1, 64},
     {"links", &limits::links, 1, 20'000},
+    {"links_per_address", &limits::links_per_address, 0, 20'000},
     {"in_flight", &limits::in_flight, 1, 1'000'000},
     {"bindings", &limits::bindings, 1, 1'000'000},
     {"nouns", &limits::nouns, 1, 1'000'000},
@@ -42,10 +43,12 @@ struct span_limit {
     std::chrono::milliseconds limits::*member;
 };
 
-constexpr std::array<span_limit, 4> spans{{{"stall", &limits::stall},
+constexpr std::array<span_limit, 6> spans{{{"stall", &limits::stall},
                                            {"lease", &limits::lease},
                                            {"connect", &limits::connect},
-                                           {"discard", &limits::discard}}};
+                                           {"discard", &limits::discard},
+                                           {"first_line", &limits::first_line},
+                                           {"probe", &limits::probe}}};
 
 std::chrono::milliseconds to_milliseconds(const std::string& text) {
     const auto span = std::chrono::duration_cast<std::chrono::milliseconds>(to_duration(text));

@@ -15,6 +15,7 @@ struct limits {
     std::size_t line = 1U << 20U;            ///< bytes of a line or reply on a stream
     std::size_t depth = 32;                  ///< brackets of JSON, the outermost being 1
     std::size_t links = 1024;                ///< links that others opened
+    std::size_t links_per_address = 0;       ///< of these, what one address keeps when others need room; 0: 3/4 of them
     std::size_t in_flight = 4096;            ///< requests per link that wait or run
     std::size_t bindings = 1024;             ///< bindings per link
     std::size_t nouns = 4096;                ///< nouns per task that are published or bound
@@ -31,6 +32,11 @@ struct limits {
     std::chrono::milliseconds lease{10'000}; ///< what feeds ask for by datagram; they renew at a third of it
     std::chrono::milliseconds connect{5'000}; ///< a connection that is not made within this has failed
     std::chrono::milliseconds discard{1'000}; ///< how long input is discarded before a link closes
+
+    /// A link that others opened and that brings no whole line for so long is closed; 0: never.
+    std::chrono::milliseconds first_line{60'000};
+    /// How long after a peer has ended its stream it is probed first, then at three times that: every 15 s at least.
+    std::chrono::milliseconds probe{5'000};
 };
 
 } // namespace cles

@@ -107,6 +107,12 @@ void session::turn_away(std::string_view line) {
     }
 }
 
+void session::say_busy() {
+    auto& out = out_.output();
+    protocol::append_failure(out, no_room_for_links(*node_));
+    out.push_back('\n');
+}
+
 void session::on_overlong(std::string_view head, time_point now) {
     head = protocol::trim(head);
     if (is_datagram() && is_web_datagram(head)) {

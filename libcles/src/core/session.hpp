@@ -35,6 +35,8 @@ class session {
     }
     /// Answers a line with `busy` and nothing else.
     void turn_away(std::string_view line);
+    /// Tells the peer that there is no room for its link, in answer to nothing.
+    void say_busy();
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
     [[nodiscard]] outbound& asking() noexcept { return outbound_; }
     [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }

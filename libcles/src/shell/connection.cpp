@@ -23,6 +23,11 @@ connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, o
     : engine_(std::move(host)), link_(std::move(carrier)), from_(from),
       session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
     if (link_->datagram() == 0) {
+        monitor_.emplace(static_cast<core::link_monitor::owner&>(*this), engine_->deadlines(), engine_->bounds(),
+                         engine_->now());
+        if (from_ == origin::accepted) {
+            monitor_->expect_line();
+        }
         return;
     }
     const bool came_in = from_ == origin::accepted || from_ == origin::refused;
@@ -49,6 +54,8 @@ bool connection::hears(std::string_view text) {
     }
     if (life_) {
         life_->heard(now());
+    } else if (monitor_ && !text.empty()) {
+        monitor_->on_line(now());
     }
     return true;
 }
@@ -89,9 +96,15 @@ void connection::on_end() {
     usable_ = false;
     lose_feeds("the publisher ended the link");
     session_.on_end(now());
+    if (monitor_ && !finished_ && !gone_) {
+        monitor_->on_end(now());
+    }
 }
 
-void connection::on_lost(boost::system::error_code why) { end("the link was lost: " + why.message()); }
+void connection::on_lost(boost::system::error_code why) {
+    engine_->connections().seen_off(*link_);
+    end("the link was lost: " + why.message());
+}
 
 void connection::on_room() {
     const auto keep = shared_from_this();
@@ -117,6 +130,10 @@ void connection::pause(bool stop) {
 
 void connection::finish() {
     usable_ = false;
+    finished_ = true;
+    if (monitor_) {
+        monitor_->stop();
+    }
     link_->finish();
 }
 
@@ -238,6 +255,21 @@ void connection::on_stall(time_point now) {
 // A source of datagrams that has nothing more to say.
 void connection::on_quiet() { abandon("nothing came for a while"); }
 
+void connection::on_silence() {
+    engine_->say(log_level::debug,
+                 {"closed a link that brought no line: " + link_->peer().address, link_->peer().address});
+    part("no line came in time");
+}
+
+// Where something is being written anyway, that shows as well whether the peer is there.
+void connection::on_probe() {
+    if (!gone_ && link_->unsent() == 0) {
+        link_->output().push_back('\n');
+        send_output();
+        follow_backlog();
+    }
+}
+
 // -- feeds ---------------------------------------------------------------------------------------------------------
 
 void connection::bind(core::feed_machine& feed, protocol::request_text request, time_point deadline,
@@ -264,6 +296,24 @@ void connection::lose_feeds(std::string_view why) {
 
 // -- the end -------------------------------------------------------------------------------------------------------
 
+// A silent peer gets the answer that a refused one gets: its first request may be on its way.
+void connection::give_way() {
+    ++engine_->node().counts.links_evicted;
+    if (!monitor_->has_spoken()) {
+        session_.say_busy();
+    }
+    part("others needed the room");
+}
+
+// Ends it with what is written, while the link itself takes its time to close.
+void connection::part(std::string_view why) {
+    if (!gone_) {
+        const auto keep = shared_from_this();
+        engine_->connections().see_off(link_);
+        end(why);
+    }
+}
+
 void connection::abandon(std::string_view why) {
     if (!gone_) {
         const auto keep = shared_from_this();
@@ -282,6 +332,9 @@ void connection::end(std::string_view why) {
     engine_->deadlines().disarm(stall_);
     engine_->deadlines().disarm(idle_);
     life_.reset();
+    if (monitor_) {
+        monitor_->stop();
+    }
     engine_->forget(*this, link_->received(), link_->sent());
     lose_feeds(why);
     session_.on_lost(why);

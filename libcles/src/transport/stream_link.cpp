@@ -9,6 +9,8 @@
 
 #include <utility>
 
+#include <poll.h>
+
 namespace cles::transport {
 namespace asio = boost::asio;
 using boost::system::error_code;
@@ -136,6 +138,9 @@ bool stream_link::hand_over_batch() {
         }
         if (state_ == state::open) {
             owner->on_end();
+        }
+        if (state_ == state::open) {
+            watch_for_hang_up();
         }
     }
     if (state_ != state::closed) {
@@ -276,6 +281,22 @@ void stream_link::shrink() {
 }
 
 // -- ending --------------------------------------------------------------------------------------------------------
+
+void stream_link::watch_for_hang_up() {
+    socket_.async_wait(socket_type::wait_error, [self = shared_from_this()](error_code code) {
+        if (!code && self->state_ != state::closed) {
+            self->on_error_condition();
+        }
+    });
+}
+
+// It may be urgent data, which means nothing here. That stays, so there is no more waiting: a write shows what is next.
+void stream_link::on_error_condition() {
+    pollfd now{.fd = socket_.native_handle(), .events = 0, .revents = 0};
+    if (::poll(&now, 1, 0) > 0 && (now.revents & (POLLERR | POLLHUP)) != 0) {
+        lose(asio::error::connection_reset);
+    }
+}
 
 void stream_link::finish() {
     if (state_ != state::open) {

@@ -19,7 +19,8 @@ namespace cles::transport {
 ///
 /// One read hands over many lines and one write carries many replies. Output is written at once, without waiting for
 /// the reactor; only what the socket does not take waits for it. After a bounded number of lines it lets other links
-/// have their turn. In steady state neither allocates.
+/// have their turn. In steady state neither allocates. At the peer's end of stream it goes on to watch for a reset and
+/// for the hang-up of a Unix socket, which no read would show any more.
 class stream_link final : public link, public std::enable_shared_from_this<stream_link> {
   public:
     using socket_type = boost::asio::generic::stream_protocol::socket;
@@ -58,6 +59,8 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void on_written(boost::system::error_code code, std::size_t count);
     void say_goodbye();
     void discard();
+    void watch_for_hang_up();
+    void on_error_condition();
     void lose(boost::system::error_code why);
 
     socket_type socket_;
