@@ -4,6 +4,9 @@
 #include <cles/error.hpp>
 
 #include "support/link_pair.hpp"
+#include "support/link_recorder.hpp"
+#include "support/run_until.hpp"
+#include "transport/udp_port.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/udp.hpp>
@@ -11,10 +14,14 @@
 #include <boost/test/data/test_case.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <array>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <sys/socket.h>
+#include <unistd.h>
 
 BOOST_AUTO_TEST_SUITE(datagram_link)
 
@@ -281,6 +288,41 @@ BOOST_DATA_TEST_CASE(an_owner_may_close_the_link_from_inside_its_line, every_dat
     pair.until([&] { return pair.far.lines() >= 1; });
     run_ready(pair.io);
     BOOST_TEST(pair.far.events->calls == "l");
+}
+
+// Else whoever limits what leaves, and counts it when he flushes, would count it again or not at all.
+BOOST_AUTO_TEST_CASE(what_is_flushed_is_taken_even_where_the_socket_has_no_room) {
+    asio::io_context io;
+    std::array<int, 2> ends{}; // of a kind of datagram that waits for its reader
+    BOOST_REQUIRE(::socketpair(AF_UNIX, SOCK_DGRAM, 0, ends.data()) == 0);
+    const auto port = std::make_shared<cles::transport::udp_port>(udp::socket{io, udp::v4(), ends[0]});
+    const auto link = port->connect_link({asio::ip::address_v4::loopback(), 1},
+                                         {.transport = "udp", .address = {}, .name = {}, .uid = {}});
+    const auto events = std::make_shared<link_recorder>();
+    link->start(events);
+    lines sent;
+    for (int i = 0; i < 1000; ++i) {
+        sent.push_back(std::to_string(i));
+        link->output().append(sent.back()).append("\n");
+        link->flush();
+        BOOST_TEST(link->output().empty());
+    }
+    BOOST_TEST(link->unsent() > 0U);
+    BOOST_TEST(!events->has('r'));
+    lines arrived;
+    run_until(io, [&] {
+        std::array<char, 2000> text{};
+        const auto count = ::recv(ends[1], text.data(), text.size(), MSG_DONTWAIT);
+        if (count > 0) {
+            arrived.emplace_back(text.data(), static_cast<std::size_t>(count) - 1);
+        }
+        return arrived.size() == sent.size();
+    });
+    BOOST_TEST((arrived == sent));
+    run_until(io, [&] { return events->has('r'); });
+    BOOST_TEST(link->unsent() == 0U);
+    link->close();
+    ::close(ends[1]);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

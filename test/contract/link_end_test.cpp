@@ -107,6 +107,30 @@ BOOST_DATA_TEST_CASE(after_the_peers_end_there_is_still_writing, every_carrier, 
     BOOST_TEST(pair.far.run([&] { return pair.far.link->sent(); }) == 10U);
 }
 
+// No read shows it any more.
+BOOST_DATA_TEST_CASE(a_peer_that_vanishes_after_its_end_of_stream_is_noticed, every_socket, kind) {
+    link_pair pair{kind};
+    scripted_peer peer{pair.io, to_string(pair.address())};
+    pair.accept();
+    pair.far.start();
+    peer.send("BIND self:place\n");
+    peer.shut();
+    pair.until([&] { return pair.far.events->has('e'); });
+    pair.far.say("an update\n");
+    BOOST_TEST(peer.line() == "an update");
+    run_ready(pair.io);
+    BOOST_TEST(!pair.far.lost()); // it reads on
+
+    peer.close();
+    if (kind == carrier::tcp4 || kind == carrier::tcp6) { // of TCP only something that is sent there shows it
+        run_ready(pair.io);
+        BOOST_TEST(!pair.far.lost());
+        pair.far.say("\n");
+    }
+    pair.until([&] { return pair.far.lost(); });
+    BOOST_TEST(pair.far.events->in_order());
+}
+
 BOOST_DATA_TEST_CASE(nothing_follows_close_and_the_peer_is_told, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();

@@ -199,4 +199,44 @@ BOOST_DATA_TEST_CASE(a_socket_that_nobody_reads_fills_and_drains, every_socket, 
     BOOST_TEST(pair.far.events->count('r') == 1U);
 }
 
+BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_socket, kind) {
+    link_pair pair{kind};
+    pair.open();
+    const auto large = std::string(1'000'000, 'x') + "\n";
+    const auto buffered = [](link_end& end) { return end.run([&] { return end.link->buffered(); }); };
+    pair.near.say(large);
+    pair.until([&] { return pair.far.lines() == 1; });
+    pair.far.say(large);
+    pair.until([&] { return pair.near.lines() == 1; });
+    // What is far too much goes at once, what may be needed again stays for a while.
+    BOOST_TEST(buffered(pair.near) < 400'000U);
+    BOOST_TEST(buffered(pair.far) < 400'000U);
+    pair.near.run([&] { pair.near.link->shrink(); });
+    pair.far.run([&] { pair.far.link->shrink(); });
+    pair.until([&] { return buffered(pair.near) < 5'000 && buffered(pair.far) < 5'000; });
+    pair.near.say(large);
+    pair.until([&] { return pair.far.lines() == 2; });
+    pair.far.say(large);
+    pair.until([&] { return pair.near.lines() == 2; });
+}
+
+BOOST_DATA_TEST_CASE(nothing_is_lost_while_a_link_gives_back_memory, every_socket, kind) {
+    link_pair pair{kind};
+    pair.open();
+    for (std::size_t i = 0; i < 300; ++i) {
+        const auto line = std::to_string(i) + std::string(i * 37, '.');
+        pair.near.say(line + "\n" + line.substr(0, line.size() / 2)); // the rest of it comes later
+        pair.far.run([&] { pair.far.link->shrink(); });
+        pair.near.say(line.substr(line.size() / 2) + "\n");
+        pair.near.run([&] { pair.near.link->shrink(); });
+        pair.far.run([&] { pair.far.link->shrink(); });
+    }
+    pair.until([&] { return pair.far.lines() == 600; });
+    const auto lines = pair.far.run([&] { return pair.far.events->lines; });
+    for (std::size_t i = 0; i < 600; ++i) {
+        BOOST_REQUIRE(lines[i] == std::to_string(i / 2) + std::string(i / 2 * 37, '.'));
+    }
+    BOOST_TEST(!pair.far.lost());
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -237,4 +237,36 @@ BOOST_AUTO_TEST_CASE(a_cr_before_the_lf_does_not_count) {
     BOOST_CHECK(feed("0123456789\r\r\n") == status::overlong);
 }
 
+BOOST_AUTO_TEST_CASE(an_idle_buffer_gives_back_what_it_grew_to) {
+    line_buffer buffer{1U << 20U};
+    put(buffer, std::string(1'000'000, 'x') + "\n");
+    BOOST_TEST(take_lines(buffer).size() == 1U);
+    BOOST_TEST(buffer.capacity() > 1'000'000U);
+    buffer.shrink();
+    BOOST_TEST(buffer.capacity() == 4096U);
+    put(buffer, "next\nbeg");
+    BOOST_TEST(take_lines(buffer).front() == "next");
+    buffer.shrink();
+    put(buffer, "un\n");
+    BOOST_TEST(take_lines(buffer).front() == "begun");
+}
+
+BOOST_AUTO_TEST_CASE(what_is_there_of_a_line_survives_shrinking) {
+    line_buffer buffer{1U << 20U};
+    const std::string line(100'000, 'y');
+    put(buffer, std::string(500'000, 'x') + "\n" + line);
+    std::string_view first;
+    BOOST_TEST((buffer.next(first) == status::line));
+    buffer.shrink();
+    BOOST_TEST(buffer.capacity() == 200'000U);
+    put(buffer, "z\n");
+    BOOST_TEST((take_lines(buffer).front() == line + "z"));
+}
+
+BOOST_AUTO_TEST_CASE(an_unused_buffer_has_nothing_to_give_back) {
+    line_buffer buffer{1U << 20U};
+    buffer.shrink();
+    BOOST_TEST(buffer.capacity() == 0U);
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -38,6 +38,22 @@ BOOST_AUTO_TEST_CASE(no_second_sees_more_than_64_KiB_to_one_address) {
     BOOST_TEST(sent > 5U * 45U * 1024U); // and it is not far less either
 }
 
+// Both ends of the second counted: what goes at its beginning may be seen to arrive a little later.
+BOOST_AUTO_TEST_CASE(the_limit_is_not_reached_to_the_byte_either) {
+    for (const std::size_t size : {29U, 64U, 100U, 1024U, 1228U}) {
+        cles::core::reflection_limit limit;
+        limit.admit("192.0.2.1", size, start - 10s); // its bucket is full when the second begins
+        std::size_t sent = 0;
+        for (auto now = start; now <= start + 1s + 50ms; now += 1ms) {
+            while (limit.admit("192.0.2.1", size, now)) {
+                sent += size;
+            }
+        }
+        BOOST_TEST(sent < 65536U, size);
+        BOOST_TEST(sent > 60000U, size);
+    }
+}
+
 BOOST_AUTO_TEST_CASE(addresses_are_apart) {
     cles::core::reflection_limit limit;
     while (limit.admit("192.0.2.1", 1000, start)) {

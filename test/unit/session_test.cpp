@@ -116,6 +116,25 @@ BOOST_AUTO_TEST_CASE(a_web_clients_line_closes_the_link_unanswered) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(a_datagram_of_a_web_client_is_not_answered_however_many_lines_it_has) {
+    const std::string head =
+        "GET / HTTP/1.1\r\nHost: 127.0.0.1:25370\r\nUser-Agent: curl/7.88.1\r\nAccept: */*\r\n\r\n";
+    for (const auto& datagram :
+         {std::string{"GET / HTTP/1.1"}, head, head + "x=1", std::string{"POST /a HTTP/1.0\n\n{}"},
+          std::string{"M-SEARCH * HTTP/1.1\r\nHOST: 239.255.255.250:1900\r\nMAN: \"ssdp:discover\"\r\n\r\n"},
+          std::string{"PULL car1:speed\nHost: x\n"}}) {
+        cles::test::test_link web{node, 1200};
+        BOOST_TEST(web.ask(datagram).empty(), datagram);
+        BOOST_TEST(web.closes == 0, datagram);
+    }
+    cles::test::test_link web{node, 1200};
+    web.overlong(head + std::string(1200, 'x')); // its cookies
+    BOOST_TEST(web.take().empty());
+    BOOST_TEST(web.kind("PULL car1:speed\nPULL car1:speed\n") == "bad_request"); // others are told as ever
+    web.overlong("PUSH car1:log {\"x");
+    BOOST_TEST(web.sent() == "too_large");
+}
+
 BOOST_AUTO_TEST_CASE(a_web_client_ends_what_ran_before_it) {
     node.on_later(verb::delegate, "work");
     link.ask("DELEGATE car1:work id=7");

@@ -38,10 +38,11 @@ inline constexpr std::chrono::milliseconds day = std::chrono::hours{24};
 } // namespace detail
 
 /// All members of `limits`, for programs that read them from somewhere.
-inline constexpr std::array<count_range, 15> count_ranges{{
+inline constexpr std::array<count_range, 16> count_ranges{{
     {"line", &limits::line, 256, 64 * detail::mebi},
     {"depth", &limits::depth, 1, 64},
     {"links", &limits::links, 1, detail::many},
+    {"links_per_address", &limits::links_per_address, 0, detail::many},
     {"in_flight", &limits::in_flight, 1, detail::many},
     {"bindings", &limits::bindings, 1, detail::many},
     {"nouns", &limits::nouns, 1, detail::many},
@@ -56,11 +57,13 @@ inline constexpr std::array<count_range, 15> count_ranges{{
     {"feed", &limits::feed, 1, detail::many},
 }};
 
-inline constexpr std::array<time_range, 4> time_ranges{{
+inline constexpr std::array<time_range, 6> time_ranges{{
     {"stall", &limits::stall, detail::instant, detail::day},
     {"lease", &limits::lease, std::chrono::milliseconds{20}, std::chrono::minutes{1}},
     {"connect", &limits::connect, detail::instant, detail::day},
     {"discard", &limits::discard, detail::instant, detail::day},
+    {"first_line", &limits::first_line, std::chrono::milliseconds{0}, detail::day},
+    {"probe", &limits::probe, detail::instant, detail::day},
 }};
 
 /// \throws cles::error with `invalid_option`, naming the first member that is not what it may be

@@ -16,6 +16,8 @@ struct limits {
     std::size_t line = 1U << 20U; ///< bytes of a line or reply on a stream; 256 to 64 MiB
     std::size_t depth = 32;       ///< brackets of JSON, the outermost being 1; 1 to 64
     std::size_t links = 1024;     ///< links that others opened; 1 to 1,000,000, like all counts below
+    /// Of these, what one address keeps when others need room; 0: three quarters of them.
+    std::size_t links_per_address = 0;
     std::size_t in_flight = 4096; ///< requests per link that wait or run
     std::size_t bindings = 1024;  ///< bindings per link
     std::size_t nouns = 4096;     ///< nouns per task that are published or bound
@@ -40,6 +42,11 @@ struct limits {
     std::chrono::milliseconds connect{5'000};
     /// How long input is discarded before a link closes; 1 ms to a day.
     std::chrono::milliseconds discard{1'000};
+    /// A link that others opened and that brings no whole line for so long is closed; up to a day; 0: never.
+    std::chrono::milliseconds first_line{60'000};
+    /// How long after a peer has ended its stream it is probed first, then at three times that, and every 15 s at least;
+    /// 1 ms to a day.
+    std::chrono::milliseconds probe{5'000};
 };
 
 } // namespace cles

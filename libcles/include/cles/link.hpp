@@ -62,7 +62,8 @@ class link {
     virtual std::string& urgent_output() { return output(); }
     /// Bytes of a datagram at most, a line's LF among them; 0 where the link is a stream.
     [[nodiscard]] virtual std::size_t datagram() const noexcept { return 0; }
-    /// Tries to hand the output to the transport at once; what it does not take follows when it does.
+    /// Tries to hand the output to the transport at once; what it does not take follows when it does. A link of
+    /// datagrams takes the output in any case: what stands there at the next flush is new.
     virtual void flush() = 0;
     /// Bytes that the transport has not taken yet.
     [[nodiscard]] virtual std::size_t unsent() const noexcept = 0;
@@ -76,6 +77,10 @@ class link {
     virtual void finish() = 0;
     /// Closes at once. Nothing follows.
     virtual void close() = 0;
+    /// Bytes of memory that it holds for what it reads and writes.
+    [[nodiscard]] virtual std::size_t buffered() const noexcept { return 0; }
+    /// Gives back what it does not need while nothing goes on; called when nothing has for a while.
+    virtual void shrink() {}
     [[nodiscard]] virtual const identity& peer() const noexcept = 0;
 };
 

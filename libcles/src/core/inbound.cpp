@@ -267,7 +267,7 @@ void inbound::serve_task(const protocol::request_line& r, time_point arrived, ti
     } else {
         run_later(r, *h, cles::request{data}, now);
     }
-    decoded_ = std::move(storage);
+    release_if_large(decoded_ = std::move(storage), path_);
 }
 
 void inbound::run_plain(const protocol::request_line& r, const handler& h, const cles::request& request, time_point) {

@@ -156,6 +156,7 @@ void write_metrics(json_writer& w, const node& n) {
     number("links_open", c.links_open);
     number("links_accepted", c.links_accepted);
     number("links_refused", c.links_refused);
+    number("links_evicted", c.links_evicted);
     number("links_lost", c.links_lost);
     number("bytes_received", c.bytes_received);
     number("bytes_sent", c.bytes_sent);

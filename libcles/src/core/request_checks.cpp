@@ -27,6 +27,15 @@ decoded_parameters decode(const protocol::noun_view& noun, std::string& storage)
     return result;
 }
 
+void release_if_large(std::string& decoded, std::string& path) {
+    constexpr std::size_t kept = 4096;
+    for (auto* text : {&decoded, &path}) {
+        if (text->capacity() > kept) {
+            std::string{}.swap(*text);
+        }
+    }
+}
+
 bool passes(std::string_view via, std::string_view name) {
     while (!via.empty()) {
         const auto comma = via.find(',');

@@ -4,10 +4,26 @@
 #include "core/request_checks.hpp"
 #include "protocol/line.hpp"
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
 namespace cles::core {
+namespace {
+
+// Whether any of its lines is a web client's: its requests, and what is alike (as of UPnP), have several.
+bool is_web_datagram(std::string_view datagram) {
+    while (!datagram.empty()) {
+        const auto end = std::min(datagram.find('\n'), datagram.size());
+        if (protocol::is_http(protocol::trim(datagram.substr(0, end)))) {
+            return true;
+        }
+        datagram.remove_prefix(std::min(end + 1, datagram.size()));
+    }
+    return false;
+}
+
+} // namespace
 
 session::session(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
     : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {}
@@ -18,8 +34,13 @@ void session::on_line(std::string_view line, time_point now) {
         return;
     }
     if (is_datagram() && protocol::has_many_lines(line)) {
-        refuse(line, "a datagram holds one line", now);
+        if (!is_web_datagram(line)) {
+            refuse(line, "a datagram holds one line", now);
+        }
         return;
+    }
+    if (refusal_ != refusal::ruled_out) {
+        note_refusal(line);
     }
     if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
         on_update(found);
@@ -46,6 +67,27 @@ void session::on_line(std::string_view line, time_point now) {
         on_update(subscriptions_.find(line, request));
     } else {
         inbound_.on_request(line, request, now);
+    }
+}
+
+// It refuses the link where it is all that ever comes.
+void session::note_refusal(std::string_view line) {
+    const bool first = refusal_ == refusal::possible;
+    refusal_ = refusal::ruled_out;
+    refusal_text_.clear();
+    protocol::failure why;
+    if (first && protocol::is_failure(line) && protocol::parse_failure(line, why) && why.code == errc::busy &&
+        !why.ran) {
+        refusal_ = refusal::told;
+        refusal_text_ = line;
+    }
+}
+
+void session::lose_requests(std::string_view why) {
+    if (refusal_ == refusal::told) {
+        outbound_.refuse(refusal_text_);
+    } else {
+        outbound_.lose(errc::unavailable, why);
     }
 }
 
@@ -89,8 +131,18 @@ void session::turn_away(std::string_view line) {
     }
 }
 
+void session::say_busy() {
+    auto& out = out_.output();
+    protocol::append_failure(out, no_room_for_links(*node_));
+    out.push_back('\n');
+}
+
 void session::on_overlong(std::string_view head, time_point now) {
+    refusal_ = refusal::ruled_out;
     head = protocol::trim(head);
+    if (is_datagram() && is_web_datagram(head)) {
+        return;
+    }
     if (!protocol::is_reply(head)) {
         inbound_.on_overlong(head, now);
         return;
@@ -119,13 +171,13 @@ void session::on_cut(std::string_view rest, time_point now) {
 
 void session::on_end(time_point now) {
     inbound_.end(now);
-    outbound_.lose(errc::unavailable, "the peer ended the link before it answered");
+    lose_requests("the peer ended the link before it answered");
 }
 
 void session::on_lost(std::string_view why) {
     closed_ = true;
     inbound_.lose();
-    outbound_.lose(errc::unavailable, why);
+    lose_requests(why);
 }
 
 } // namespace cles::core

@@ -47,6 +47,14 @@ std::span<char> line_buffer::prepare() {
     return {data_.get() + end_, capacity_ - end_};
 }
 
+void line_buffer::shrink() {
+    const auto enough = std::max(initial_capacity, (end_ - begin_) * 2);
+    if (capacity_ > enough) {
+        resize(enough);
+        filled_ = false;
+    }
+}
+
 void line_buffer::commit(std::size_t count) noexcept {
     end_ += count;
     filled_ = end_ == capacity_;

@@ -22,6 +22,10 @@ class line_buffer {
     std::span<char> prepare();
     /// Says how many bytes of the prepared space were filled.
     void commit(std::size_t count) noexcept;
+    /// Bytes of memory that it holds.
+    [[nodiscard]] std::size_t capacity() const noexcept { return capacity_; }
+    /// Gives back what the lines that are still here do not need. Prepared space ends here.
+    void shrink();
     /// The next line, without its LF. `overlong`: the line exceeds the limit, `line` is what is there of it, and no
     /// more lines follow.
     status next(std::string_view& line) noexcept;

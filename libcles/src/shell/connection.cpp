@@ -5,6 +5,7 @@
 #include "core/later.hpp"
 #include "shell/engine.hpp"
 
+#include <chrono>
 #include <utility>
 
 namespace cles::shell {
@@ -14,13 +15,20 @@ constexpr unsigned lines_per_write = 32;
 constexpr std::size_t udp_over_v4 = 28; // bytes of headers
 constexpr std::size_t udp_over_v6 = 48;
 constexpr std::size_t updates_wait_past = 65536; // unsent bytes past which updates stay in their topics
+constexpr std::size_t modest_buffers = 32768;    // bytes that an idle link may keep
+constexpr std::chrono::seconds idle_after{2};
 
 } // namespace
 
 connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from)
     : engine_(std::move(host)), link_(std::move(carrier)), from_(from),
-      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this) {
+      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
     if (link_->datagram() == 0) {
+        monitor_.emplace(static_cast<core::link_monitor::owner&>(*this), engine_->deadlines(), engine_->bounds(),
+                         engine_->now());
+        if (from_ == origin::accepted) {
+            monitor_->expect_line();
+        }
         return;
     }
     const bool came_in = from_ == origin::accepted || from_ == origin::refused;
@@ -47,6 +55,8 @@ bool connection::hears(std::string_view text) {
     }
     if (life_) {
         life_->heard(now());
+    } else if (monitor_ && !text.empty()) {
+        monitor_->on_line(now());
     }
     return true;
 }
@@ -87,9 +97,15 @@ void connection::on_end() {
     usable_ = false;
     lose_feeds("the publisher ended the link");
     session_.on_end(now());
+    if (monitor_ && !finished_ && !gone_) {
+        monitor_->on_end(now());
+    }
 }
 
-void connection::on_lost(boost::system::error_code why) { end("the link was lost: " + why.message()); }
+void connection::on_lost(boost::system::error_code why) {
+    engine_->connections().seen_off(*link_);
+    end("the link was lost: " + why.message());
+}
 
 void connection::on_room() {
     const auto keep = shared_from_this();
@@ -115,6 +131,10 @@ void connection::pause(bool stop) {
 
 void connection::finish() {
     usable_ = false;
+    finished_ = true;
+    if (monitor_) {
+        monitor_->stop();
+    }
     link_->finish();
 }
 
@@ -199,6 +219,24 @@ void connection::follow_backlog() {
         stall_.sent = link_->sent();
         engine_->deadlines().arm(stall_, core::later(engine_->now(), bounds.stall));
     }
+    follow_buffers();
+}
+
+// Many links are idle most of the time: what a large message took is given back when no other follows it soon.
+void connection::follow_buffers() {
+    if (!idle_.armed() && link_->buffered() > modest_buffers) {
+        idle_.moved = link_->received() + link_->sent();
+        engine_->deadlines().arm(idle_, engine_->now() + idle_after);
+    }
+}
+
+void connection::on_idle(time_point now) {
+    const auto moved = link_->received() + link_->sent();
+    if (std::exchange(idle_.moved, moved) == moved) {
+        link_->shrink();
+    } else {
+        engine_->deadlines().arm(idle_, now + idle_after);
+    }
 }
 
 void connection::on_stall(time_point now) {
@@ -217,6 +255,21 @@ void connection::on_stall(time_point now) {
 
 // A source of datagrams that has nothing more to say.
 void connection::on_quiet() { abandon("nothing came for a while"); }
+
+void connection::on_silence() {
+    engine_->say(log_level::debug,
+                 {"closed a link that brought no line: " + link_->peer().address, link_->peer().address});
+    part("no line came in time");
+}
+
+// Where something is being written anyway, that shows as well whether the peer is there.
+void connection::on_probe() {
+    if (!gone_ && link_->unsent() == 0) {
+        link_->output().push_back('\n');
+        send_output();
+        follow_backlog();
+    }
+}
 
 // -- feeds ---------------------------------------------------------------------------------------------------------
 
@@ -244,6 +297,24 @@ void connection::lose_feeds(std::string_view why) {
 
 // -- the end -------------------------------------------------------------------------------------------------------
 
+// A silent peer gets the answer that a refused one gets: its first request may be on its way.
+void connection::give_way() {
+    ++engine_->node().counts.links_evicted;
+    if (!monitor_->has_spoken()) {
+        session_.say_busy();
+    }
+    part("others needed the room");
+}
+
+// Ends it with what is written, while the link itself takes its time to close.
+void connection::part(std::string_view why) {
+    if (!gone_) {
+        const auto keep = shared_from_this();
+        engine_->connections().see_off(link_);
+        end(why);
+    }
+}
+
 void connection::abandon(std::string_view why) {
     if (!gone_) {
         const auto keep = shared_from_this();
@@ -260,7 +331,11 @@ void connection::end(std::string_view why) {
     gone_ = true;
     usable_ = false;
     engine_->deadlines().disarm(stall_);
+    engine_->deadlines().disarm(idle_);
     life_.reset();
+    if (monitor_) {
+        monitor_->stop();
+    }
     engine_->forget(*this, link_->received(), link_->sent());
     lose_feeds(why);
     session_.on_lost(why);

@@ -4,6 +4,8 @@
 #include <cles/link.hpp>
 
 #include "core/datagram_output.hpp"
+#include "core/link_admission.hpp"
+#include "core/link_monitor.hpp"
 #include "core/outlet.hpp"
 #include "core/session.hpp"
 #include "core/source_life.hpp"
@@ -31,6 +33,8 @@ class connection final : public link_events,
                          public core::outlet,
                          public core::binder,
                          public core::turn_taker,
+                         public core::link_admission::guest,
+                         private core::link_monitor::owner,
                          private core::source_life::keeper,
                          public std::enable_shared_from_this<connection> {
   public:
@@ -49,6 +53,9 @@ class connection final : public link_events,
     [[nodiscard]] bool at_rest() const override { return session_.at_rest() && link_->unsent() == 0; }
     /// Whether requests can still be sent.
     [[nodiscard]] bool usable() const noexcept { return usable_; }
+    // link_admission::guest, of a stream
+    [[nodiscard]] const core::link_monitor& monitor() const override { return *monitor_; }
+    void give_way() override;
     /// Ends it at once, without a word to its owner.
     void abandon(std::string_view why);
     /// Sends a BIND for a feed and follows it from then on.
@@ -93,15 +100,27 @@ class connection final : public link_events,
         std::uint64_t sent = 0;
     };
 
+    struct idle_watch final : core::deadline {
+        explicit idle_watch(connection& c) : owner(c) {}
+        void on_deadline(time_point now) override { owner.on_idle(now); }
+        connection& owner;
+        std::uint64_t moved = 0; // bytes, both ways
+    };
+
     time_point now();
     /// The peer has said something. False where it has been turned away with it.
     bool hears(std::string_view text);
     void on_quiet() override;
+    void on_silence() override;
+    void on_probe() override;
     void on_stall(time_point now);
+    void follow_buffers();
+    void on_idle(time_point now);
     void send_output();
     [[nodiscard]] bool may_serve_more();
     void serve_more();
     void follow_backlog();
+    void part(std::string_view why);
     void end(std::string_view why);
     void lose_feeds(std::string_view why);
 
@@ -110,12 +129,15 @@ class connection final : public link_events,
     origin from_;
     core::session session_;
     stall_watch stall_;
+    idle_watch idle_;
     std::optional<core::datagram_output> datagrams_;
-    std::optional<core::source_life> life_;
+    std::optional<core::source_life> life_;     // of a source of datagrams
+    std::optional<core::link_monitor> monitor_; // of a stream
     std::vector<core::feed_machine*> feeds_;
     std::optional<time_point> now_; // while a batch is handed over
     unsigned lines_ = 0;            // of this batch
     bool usable_ = true;
+    bool finished_ = false; // the link was told to end
     bool gone_ = false;
     mutable bool updates_wait_ = false; // some were not taken
     bool pause_for_queue_ = false;

@@ -5,16 +5,82 @@
 #include "protocol/message.hpp"
 #include "shell/engine.hpp"
 
+#include <boost/asio/ip/address_v6.hpp>
+#include <boost/asio/ip/network_v6.hpp>
+
+#include <algorithm>
+#include <string>
 #include <utility>
 
 namespace cles::shell {
+namespace {
+
+// Whose share a link counts for: a host's; an IPv6 network's, since a host may use all of its addresses; a local
+// user's.
+std::string address_of(const identity& peer) {
+    if (peer.uid) {
+        return "user " + std::to_string(*peer.uid);
+    }
+    const auto host = parse_url(peer.address).host;
+    boost::system::error_code not_v6;
+    const auto address = boost::asio::ip::make_address_v6(host, not_v6);
+    if (not_v6 || address.is_loopback() || address.is_link_local() || address.is_v4_mapped()) {
+        return host.empty() ? peer.transport : host;
+    }
+    return boost::asio::ip::make_network_v6(address, 64).canonical().to_string();
+}
+
+// How many links are seen off at a time: each holds a descriptor for up to `limits::discard`.
+std::size_t most_parting(const limits& bounds) { return std::max<std::size_t>(64, bounds.links / 4); }
+
+} // namespace
+
+/// The owner of a link that is refused: ignores what arrives, and waits until the link has closed.
+class connections::refused final : public link_events {
+  public:
+    refused(std::weak_ptr<detail::engine> host, const link& which) noexcept : host_(std::move(host)), which_(which) {}
+    void on_line(std::string_view) override {}
+    void on_overlong(std::string_view) override {}
+    void on_batch() override {}
+    void on_end() override {}
+    void on_room() override {}
+    void on_lost(boost::system::error_code) override {
+        if (const auto host = host_.lock()) {
+            host->connections().seen_off(which_);
+        }
+    }
+
+  private:
+    std::weak_ptr<detail::engine> host_;
+    const link& which_; // which owns this
+};
+
+void connections::start() { admission_.emplace(engine_.bounds()); }
+
+void connections::stop() {
+    for (const auto& [key, parting] : std::exchange(parting_, {})) {
+        parting->close();
+    }
+}
+
+void connections::see_off(link_ptr parting) {
+    parting->flush();
+    if (parting->unsent() != 0 || parting_.size() >= most_parting(engine_.bounds())) {
+        parting->close(); // there is no room to wait for a peer that does not read
+        return;
+    }
+    parting_.emplace(parting.get(), parting);
+    parting->finish();
+}
+
+void connections::seen_off(const link& parting) { parting_.erase(&parting); }
 
 void connections::on_accepted(link_ptr arrived, bool counted) {
     if (engine_.stopped()) {
         arrived->close();
         return;
     }
-    if (counted && !has_room(arrived->datagram() != 0)) {
+    if (counted && !has_room(*arrived)) {
         turn_away(std::move(arrived));
         return;
     }
@@ -24,10 +90,10 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
     adopt(std::move(arrived), counted ? connection::origin::accepted : connection::origin::local);
 }
 
-bool connections::has_room(bool is_source) {
+bool connections::has_room(const link& arrived) {
     const auto most = engine_.bounds().links;
-    if (!is_source) {
-        return accepted_ < most;
+    if (arrived.datagram() == 0) {
+        return admission_->make_room(address_of(arrived.peer()), engine_.now());
     }
     if (sources_ >= most) {
         drop_sources_at_rest();
@@ -52,17 +118,27 @@ void connections::turn_away(link_ptr arrived) {
     }
     protocol::append_failure(arrived->output(), core::no_room_for_links(engine_.node()));
     arrived->output().push_back('\n');
-    arrived->flush();
-    arrived->close();
+    // The link is read until it closes: unread input would turn that into a reset, which takes the line away.
+    arrived->start(std::make_shared<refused>(engine_.weak_from_this(), *arrived));
+    see_off(std::move(arrived));
 }
 
 std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin from) {
+    const bool counted = from == connection::origin::accepted;
+    const auto address = counted ? address_of(made->peer()) : std::string{};
     auto c = std::make_shared<connection>(engine_.shared_from_this(), std::move(made), from);
     open_.emplace(c.get(), c);
-    if (from == connection::origin::accepted) {
-        ++(c->is_source() ? sources_ : accepted_);
+    if (counted) {
+        if (c->datagram() != 0) {
+            ++sources_;
+        } else {
+            admission_->enter(*c, address);
+        }
     }
     ++engine_.node().counts.links_open;
+    if (from == connection::origin::dialled && c->datagram() == 0) {
+        c->session().may_be_refused();
+    }
     c->start();
     return c;
 }
@@ -72,7 +148,11 @@ bool connections::forget(connection& c, std::uint64_t received, std::uint64_t se
         return false;
     }
     if (c.from() == connection::origin::accepted) {
-        --(c.datagram() != 0 ? sources_ : accepted_);
+        if (c.datagram() != 0) {
+            --sources_;
+        } else {
+            admission_->leave(c);
+        }
     }
     auto& counts = engine_.node().counts;
     --counts.links_open;

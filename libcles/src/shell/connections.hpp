@@ -3,12 +3,14 @@
 
 #include <cles/link.hpp>
 
+#include "core/link_admission.hpp"
 #include "shell/connection.hpp"
 
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <vector>
 
 namespace cles::detail {
@@ -24,6 +26,8 @@ namespace cles::shell {
 class connections {
   public:
     explicit connections(detail::engine& host) noexcept : engine_(host) {}
+    /// \pre the engine has its node
+    void start();
 
     /// A link that came in; those from other processes are counted against the limit.
     void on_accepted(link_ptr arrived, bool counted);
@@ -33,15 +37,23 @@ class connections {
     /// Withdraws a request that waits for its reply. False where there is none of that id.
     bool cancel(std::uint64_t id);
     [[nodiscard]] std::vector<std::shared_ptr<connection>> all() const;
+    /// Finishes a link that nobody needs any more, and keeps it until it has closed.
+    void see_off(link_ptr parting);
+    void seen_off(const link& parting);
+    /// Closes those that are being seen off.
+    void stop();
 
   private:
-    [[nodiscard]] bool has_room(bool is_source);
+    class refused;
+
+    [[nodiscard]] bool has_room(const link& arrived);
     void turn_away(link_ptr arrived);
     void drop_sources_at_rest();
 
     detail::engine& engine_;
     std::map<connection*, std::shared_ptr<connection>> open_;
-    std::size_t accepted_ = 0;
+    std::map<const link*, link_ptr> parting_;
+    std::optional<core::link_admission> admission_;
     std::size_t sources_ = 0;
 };
 

@@ -68,6 +68,7 @@ engine::engine(asio::any_io_executor executor, service_options options)
         routes_.set_peer(name, where);
     }
     node_ = std::make_shared<core::node>(setup_of(options), clock_, [this] { turns_.ask(); });
+    connections_.start();
     neighbours_ = std::make_unique<shell::neighbours>(*this, std::random_device{}());
 }
 
@@ -356,6 +357,7 @@ void engine::stop() {
         c->flush();
         c->abandon("the service has been stopped");
     }
+    connections_.stop();
 }
 
 } // namespace cles::detail

@@ -130,6 +130,7 @@ bool inproc_link::next_text() {
     text_.clear();
     read_at_ = 0;
     if (inbox_.empty()) {
+        std::string{}.swap(text_); // which came with its memory
         return false;
     }
     text_ = std::move(inbox_.front());

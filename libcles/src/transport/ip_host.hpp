@@ -4,18 +4,24 @@
 #include <cles/url.hpp>
 
 #include <boost/asio/ip/address.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/system/error_code.hpp>
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace cles::transport {
 
-/// All addresses of a URL's host, in the order in which the system prefers them: as it stands, or looked up, which
-/// waits for the system's resolver. None only with an error.
-std::vector<boost::asio::ip::address> resolve_all(const url& where, boost::system::error_code& code);
-/// The first of them.
+/// The address of a URL's host, where it is one or `localhost`. Nothing: it is a name that has to be looked up.
+std::optional<boost::asio::ip::address> literal_address(const url& where);
+
+/// What was found for a host, in the order in which the system prefers it.
+std::vector<boost::asio::ip::address> addresses_of(const boost::asio::ip::tcp::resolver::results_type& found);
+
+/// The first address of a URL's host: as it stands, or looked up, which waits for the system's resolver. Only for where
+/// a service is to listen; to dial there is `host_lookup`.
 boost::asio::ip::address resolve(const url& where, boost::system::error_code& code);
 
 /// The URL of a socket's end.

@@ -15,7 +15,7 @@ namespace cles::transport {
 
 /// Accepts connections of one protocol and makes links of them.
 ///
-/// Where the process has run out of descriptors it waits a little and goes on, so that a burst does not end it.
+/// Where the process or the system has run out of descriptors or memory it waits a little and goes on.
 template <class Protocol>
 class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Protocol>> {
   public:
@@ -53,13 +53,26 @@ class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Prot
                 if (self->on_link_) {
                     self->accept();
                 }
-            } else if (code == boost::asio::error::no_descriptors || code == boost::asio::error::no_memory ||
-                       code == boost::asio::error::no_buffer_space) {
-                self->accept_later();
+            } else if (is_the_peers(code)) {
+                self->accept();
             } else {
-                self->accept(); // the peer was gone before it was accepted
+                self->accept_later();
             }
         });
+    }
+
+    // Whether one connection failed before it was accepted (accept(2)): the next one may be well. All else, as when the
+    // process or the system has no more descriptors, would fail again at once.
+    static bool is_the_peers(const boost::system::error_code& code) {
+        using namespace boost::system::errc;
+        for (const auto one :
+             {connection_aborted, connection_reset, protocol_error, no_protocol_option, host_unreachable,
+              network_unreachable, network_down, operation_not_supported, timed_out, interrupted}) {
+            if (code == one) {
+                return true;
+            }
+        }
+        return false;
     }
 
     void accept_later() {

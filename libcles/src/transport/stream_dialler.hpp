@@ -9,6 +9,7 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/steady_timer.hpp>
 
+#include <chrono>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -32,9 +33,11 @@ class stream_dialler : public std::enable_shared_from_this<stream_dialler<Protoc
           done_(std::move(done)) {}
 
     /// \pre there is one at least
-    void start(std::vector<endpoint_type> where) {
+    void start(std::vector<endpoint_type> where) { start(std::move(where), bounds_.connect); }
+    /// With so much of the time left.
+    void start(std::vector<endpoint_type> where, std::chrono::milliseconds left) {
         where_ = std::move(where);
-        patience_.expires_after(bounds_.connect);
+        patience_.expires_after(left);
         patience_.async_wait([self = this->shared_from_this()](boost::system::error_code code) {
             if (!code) {
                 self->end(boost::asio::error::timed_out);

@@ -9,6 +9,8 @@
 
 #include <utility>
 
+#include <poll.h>
+
 namespace cles::transport {
 namespace asio = boost::asio;
 using boost::system::error_code;
@@ -18,6 +20,9 @@ namespace {
 constexpr std::size_t bytes_per_turn = 65536; // of what is written in answer
 constexpr std::size_t piece = 65536;          // sent as one, before what is urgent has another chance
 constexpr std::size_t roomy = 262144;         // buffers that grew past this are given back
+
+// Assigning an empty string keeps the memory.
+void release(std::string& text) noexcept { std::string{}.swap(text); }
 
 } // namespace
 
@@ -52,6 +57,15 @@ void stream_link::on_read(error_code code, std::size_t count) {
         return;
     }
     received_ += count;
+    if (std::exchange(shrinking_, false) && code == asio::error::operation_aborted) {
+        if (state_ == state::open) {
+            input_.shrink();
+            read();
+        } else {
+            discard();
+        }
+        return;
+    }
     if (state_ == state::discarding || state_ == state::finishing) {
         if (code) {
             ended_ = true;
@@ -125,6 +139,9 @@ bool stream_link::hand_over_batch() {
         if (state_ == state::open) {
             owner->on_end();
         }
+        if (state_ == state::open) {
+            watch_for_hang_up();
+        }
     }
     if (state_ != state::closed) {
         owner->on_batch();
@@ -164,6 +181,9 @@ void stream_link::flush() {
     }
     if (!urgent_.empty()) {
         output_.insert(0, urgent_);
+        if (urgent_.capacity() > roomy) {
+            release(urgent_);
+        }
         urgent_.clear();
     }
     if (output_.empty()) {
@@ -180,7 +200,7 @@ void stream_link::flush() {
     sent_ += count;
     if (count == output_.size()) {
         if (output_.capacity() > roomy) {
-            output_ = {};
+            release(output_);
         }
         output_.clear();
         return;
@@ -222,7 +242,7 @@ void stream_link::on_written(error_code code, std::size_t count) {
         return;
     }
     if (sending_.capacity() > roomy) {
-        sending_ = {};
+        release(sending_);
     }
     sending_.clear();
     sending_at_ = 0;
@@ -237,7 +257,46 @@ void stream_link::on_written(error_code code, std::size_t count) {
     }
 }
 
+// -- memory --------------------------------------------------------------------------------------------------------
+
+// The read that waits holds the input's buffer, and is begun anew with a smaller one.
+void stream_link::shrink() {
+    if (state_ != state::open || !sending_.empty() || handing_) {
+        return;
+    }
+    release(sending_);
+    if (output_.empty()) {
+        release(output_);
+    }
+    if (urgent_.empty()) {
+        release(urgent_);
+    }
+    if (!reading_) {
+        input_.shrink();
+    } else if (!shrinking_) {
+        shrinking_ = true;
+        error_code ignored;
+        socket_.cancel(ignored);
+    }
+}
+
 // -- ending --------------------------------------------------------------------------------------------------------
+
+void stream_link::watch_for_hang_up() {
+    socket_.async_wait(socket_type::wait_error, [self = shared_from_this()](error_code code) {
+        if (!code && self->state_ != state::closed) {
+            self->on_error_condition();
+        }
+    });
+}
+
+// It may be urgent data, which means nothing here. That stays, so there is no more waiting: a write shows what is next.
+void stream_link::on_error_condition() {
+    pollfd now{.fd = socket_.native_handle(), .events = 0, .revents = 0};
+    if (::poll(&now, 1, 0) > 0 && (now.revents & (POLLERR | POLLHUP)) != 0) {
+        lose(asio::error::connection_reset);
+    }
+}
 
 void stream_link::finish() {
     if (state_ != state::open) {

@@ -19,7 +19,8 @@ namespace cles::transport {
 ///
 /// One read hands over many lines and one write carries many replies. Output is written at once, without waiting for
 /// the reactor; only what the socket does not take waits for it. After a bounded number of lines it lets other links
-/// have their turn. In steady state neither allocates.
+/// have their turn. In steady state neither allocates. At the peer's end of stream it goes on to watch for a reset and
+/// for the hang-up of a Unix socket, which no read would show any more.
 class stream_link final : public link, public std::enable_shared_from_this<stream_link> {
   public:
     using socket_type = boost::asio::generic::stream_protocol::socket;
@@ -38,6 +39,10 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void pause(bool stop) override;
     void finish() override;
     void close() override;
+    [[nodiscard]] std::size_t buffered() const noexcept override {
+        return input_.capacity() + output_.capacity() + urgent_.capacity() + sending_.capacity();
+    }
+    void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return peer_; }
 
   private:
@@ -54,6 +59,8 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void on_written(boost::system::error_code code, std::size_t count);
     void say_goodbye();
     void discard();
+    void watch_for_hang_up();
+    void on_error_condition();
     void lose(boost::system::error_code why);
 
     socket_type socket_;
@@ -70,9 +77,10 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     std::uint64_t sent_ = 0;
     std::uint64_t received_ = 0;
     state state_ = state::open;
-    bool reading_ = false; // a read is under way
-    bool handing_ = false; // lines are being handed over, further up the stack
-    bool posted_ = false;  // `hand_over` is to go on
+    bool reading_ = false;   // a read is under way
+    bool shrinking_ = false; // and was cancelled, to go on with a smaller buffer
+    bool handing_ = false;   // lines are being handed over, further up the stack
+    bool posted_ = false;    // `hand_over` is to go on
     bool paused_ = false;
     bool ended_ = false; // the peer sends no more
     bool told_end_ = false;

@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include "transport/host_lookup.hpp"
 #include "transport/ip_host.hpp"
 #include "transport/stream_acceptor.hpp"
 #include "transport/stream_dialler.hpp"
@@ -10,10 +11,16 @@
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
-#include <boost/asio/post.hpp>
 
+#include <algorithm>
+#include <chrono>
+#include <memory>
 #include <utility>
 #include <vector>
+
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <sys/socket.h>
 
 namespace cles::transport {
 namespace asio = boost::asio;
@@ -22,23 +29,33 @@ using boost::system::error_code;
 
 namespace {
 
-std::vector<tcp::endpoint> endpoints_of(const url& where, error_code& code) {
-    std::vector<tcp::endpoint> endpoints;
-    for (const auto& address : resolve_all(where, code)) {
-        endpoints.emplace_back(address, where.port);
-    }
-    return endpoints;
-}
-
-void tune(tcp::socket& socket, const url& where) {
+// A peer whose host is gone, or cannot be reached any more, is noticed after `limits::stall`, whether something is on
+// its way to it or nothing is.
+void notice_loss(tcp::socket& socket, const limits& bounds) {
+    constexpr int least = 6; // seconds
+    constexpr int most = 3600;
+    const auto wanted = std::chrono::duration_cast<std::chrono::seconds>(bounds.stall).count();
+    const int seconds = static_cast<int>(std::clamp<decltype(wanted)>(wanted, least, most));
+    const auto set = [&](int option, int value) {
+        ::setsockopt(socket.native_handle(), IPPROTO_TCP, option, &value, sizeof value);
+    };
+    set(TCP_USER_TIMEOUT, seconds * 1000);
+    set(TCP_KEEPIDLE, seconds / 2);
+    set(TCP_KEEPINTVL, seconds / 6);
+    set(TCP_KEEPCNT, 3);
     error_code ignored;
-    set_traffic_class(socket, where, ignored);
-    socket.set_option(tcp::no_delay{true}, ignored);
     socket.set_option(asio::socket_base::keep_alive{true}, ignored);
 }
 
-identity identify(tcp::socket& socket, const url& where) {
-    tune(socket, where);
+void tune(tcp::socket& socket, const url& where, const limits& bounds) {
+    error_code ignored;
+    set_traffic_class(socket, where, ignored);
+    socket.set_option(tcp::no_delay{true}, ignored);
+    notice_loss(socket, bounds);
+}
+
+identity identify(tcp::socket& socket, const url& where, const limits& bounds) {
+    tune(socket, where, bounds);
     error_code gone;
     const auto peer = socket.remote_endpoint(gone);
     identity who{.transport = "tcp", .address = {}, .name = {}, .uid = {}};
@@ -52,8 +69,10 @@ identity identify(tcp::socket& socket, const url& where) {
 class tcp_acceptor final : public acceptor {
   public:
     tcp_acceptor(tcp::acceptor socket, const url& where, const limits& bounds)
-        : inside_(std::make_shared<stream_acceptor<tcp>>(
-              std::move(socket), bounds, [where](tcp::socket& accepted) { return identify(accepted, where); })) {}
+        : inside_(
+              std::make_shared<stream_acceptor<tcp>>(std::move(socket), bounds, [where, bounds](tcp::socket& accepted) {
+                  return identify(accepted, where, bounds);
+              })) {}
     ~tcp_acceptor() override { inside_->close(); }
 
     [[nodiscard]] url local() const override {
@@ -65,6 +84,62 @@ class tcp_acceptor final : public acceptor {
 
   private:
     std::shared_ptr<stream_acceptor<tcp>> inside_;
+};
+
+/// Makes one connection to a host: looks it up, where it has a name, and tries its addresses.
+class tcp_call : public std::enable_shared_from_this<tcp_call> {
+  public:
+    tcp_call(const asio::any_io_executor& executor, url where, const limits& bounds, dial_callback done)
+        : executor_(executor), where_(std::move(where)), bounds_(bounds), done_(std::move(done)) {}
+
+    void start() {
+        if (const auto literal = literal_address(where_)) {
+            connect({*literal}, bounds_.connect);
+            return;
+        }
+        lookup_ = std::make_shared<host_lookup>(executor_);
+        lookup_->start(where_, bounds_.connect,
+                       [self = shared_from_this(), begun = std::chrono::steady_clock::now()](
+                           error_code code, const std::vector<asio::ip::address>& found) {
+                           if (code) {
+                               const auto done = std::move(self->done_);
+                               done(code, nullptr);
+                               return;
+                           }
+                           const auto spent = std::chrono::steady_clock::now() - begun;
+                           self->connect(found,
+                                         std::chrono::ceil<std::chrono::milliseconds>(self->bounds_.connect - spent));
+                       });
+    }
+
+    void give_up() {
+        if (lookup_) {
+            lookup_->give_up();
+        }
+        if (dialler_) {
+            dialler_->give_up();
+        }
+    }
+
+  private:
+    void connect(const std::vector<asio::ip::address>& addresses, std::chrono::milliseconds left) {
+        std::vector<tcp::endpoint> endpoints;
+        for (const auto& address : addresses) {
+            endpoints.emplace_back(address, where_.port);
+        }
+        dialler_ = std::make_shared<stream_dialler<tcp>>(
+            executor_, bounds_,
+            [where = where_, bounds = bounds_](tcp::socket& made) { return identify(made, where, bounds); },
+            std::move(done_));
+        dialler_->start(std::move(endpoints), left);
+    }
+
+    asio::any_io_executor executor_;
+    url where_;
+    limits bounds_;
+    dial_callback done_;
+    std::shared_ptr<host_lookup> lookup_;
+    std::shared_ptr<stream_dialler<tcp>> dialler_;
 };
 
 class tcp_transport final : public link_transport {
@@ -95,20 +170,9 @@ class tcp_transport final : public link_transport {
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
-        error_code code;
-        auto endpoints = endpoints_of(where, code);
-        if (code) {
-            asio::post(executor, [done = std::move(done), code] { done(code, nullptr); });
-            return [] {};
-        }
-        auto dialler = std::make_shared<stream_dialler<tcp>>(
-            executor, bounds, [where](tcp::socket& socket) { return identify(socket, where); }, std::move(done));
-        dialler->start(std::move(endpoints));
-        return [weak = std::weak_ptr{dialler}] {
-            if (const auto alive = weak.lock()) {
-                alive->give_up();
-            }
-        };
+        const auto call = std::make_shared<tcp_call>(executor, where, bounds, std::move(done));
+        call->start();
+        return [call] { call->give_up(); };
     }
 };
 

@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/udp.hpp"
 
+#include "transport/host_lookup.hpp"
 #include "transport/ip_host.hpp"
 #include "transport/traffic_class.hpp"
 #include "transport/udp_port.hpp"
 
 #include <boost/asio/ip/udp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
-#include <boost/asio/post.hpp>
 
+#include <memory>
 #include <utility>
+#include <vector>
 
 namespace cles::transport {
 namespace asio = boost::asio;
@@ -59,38 +61,41 @@ class udp_transport final : public link_transport {
     }
 
     // Nothing is sent: whether somebody is there shows when requests are answered.
-    std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits&,
+    std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
-        error_code code;
-        const udp::endpoint endpoint{resolve(where, code), where.port};
+        const auto lookup = std::make_shared<host_lookup>(executor);
+        lookup->start(
+            where, bounds.connect,
+            [executor, where, done = std::move(done)](error_code code, const std::vector<asio::ip::address>& found) {
+                link_ptr made;
+                if (!code) {
+                    made = connect(executor, where, {found.front(), where.port}, code);
+                }
+                done(code, made);
+            });
+        return [lookup] { lookup->give_up(); };
+    }
+
+  private:
+    static link_ptr connect(const asio::any_io_executor& executor, const url& where, const udp::endpoint& endpoint,
+                            error_code& code) {
         udp::socket socket{executor};
-        if (!code) {
-            socket.open(endpoint.protocol(), code);
-        }
+        socket.open(endpoint.protocol(), code);
         if (!code) {
             set_traffic_class(socket, where, code);
         }
         if (!code) {
             socket.connect(endpoint, code);
         }
-        link_ptr made;
-        if (!code) {
-            made = std::make_shared<udp_port>(std::move(socket))
-                       ->connect_link(endpoint, {.transport = "udp",
-                                                 .address = to_string(url_of("udp", endpoint)),
-                                                 .name = {},
-                                                 .uid = {},
-                                                 .local = endpoint.address().is_loopback()});
+        if (code) {
+            return nullptr;
         }
-        auto given_up = std::make_shared<bool>(false);
-        asio::post(executor, [done = std::move(done), code, made = std::move(made), given_up] {
-            if (!*given_up) {
-                done(code, made);
-            } else if (made) {
-                made->close();
-            }
-        });
-        return [given_up] { *given_up = true; };
+        return std::make_shared<udp_port>(std::move(socket))
+            ->connect_link(endpoint, {.transport = "udp",
+                                      .address = to_string(url_of("udp", endpoint)),
+                                      .name = {},
+                                      .uid = {},
+                                      .local = endpoint.address().is_loopback()});
     }
 };
 

@@ -60,30 +60,45 @@ void udp_link::deliver(std::string_view datagram) {
 }
 
 void udp_link::flush() {
-    if (port_ == nullptr || output_.empty() || !sending_.empty()) {
+    if (port_ == nullptr || output_.empty()) {
         return;
     }
-    sending_.swap(output_);
-    sending_at_ = 0;
+    take_output();
     send_rest();
 }
 
+// All of it at once: whoever flushes may count on it that what he finds here next time is new.
+void udp_link::take_output() {
+    if (sending_.empty()) {
+        sending_.swap(output_);
+        sending_at_ = 0;
+        return;
+    }
+    if (sending_at_ > sending_.size() / 2) {
+        sending_.erase(0, sending_at_);
+        sending_at_ = 0;
+    }
+    sending_.append(output_);
+    output_.clear();
+}
+
 void udp_link::send_rest() {
-    while (sending_at_ < sending_.size()) {
+    while (!waiting_ && sending_at_ < sending_.size()) {
         const auto done = port_->send(*this, std::string_view{sending_}.substr(sending_at_));
         if (done.lines == 0) {
-            if (!waiting_) {
-                waiting_ = true;
-                port_->wait_for_room(weak_from_this());
-            }
+            waiting_ = true;
+            port_->wait_for_room(weak_from_this());
             return;
         }
         sent_ += done.bytes;
         sending_at_ += done.bytes;
     }
+    if (waiting_) {
+        return;
+    }
     constexpr std::size_t largest_kept = 65536;
     if (sending_.capacity() > largest_kept) {
-        sending_ = {};
+        std::string{}.swap(sending_); // an empty one that is assigned would keep the memory
     }
     sending_.clear();
     sending_at_ = 0;
@@ -95,9 +110,6 @@ void udp_link::on_room() {
         return;
     }
     send_rest();
-    if (sending_.empty()) {
-        flush();
-    }
     if (const auto owner = owner_; owner && sending_.empty()) {
         owner->on_room();
     }
@@ -118,6 +130,13 @@ void udp_link::finish() {
             }
         }
     });
+}
+
+void udp_link::shrink() {
+    if (output_.empty() && sending_.empty()) {
+        std::string{}.swap(output_);
+        std::string{}.swap(sending_);
+    }
 }
 
 void udp_link::close() {

@@ -39,6 +39,8 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     void pause(bool stop) override { paused_ = stop; }
     void finish() override;
     void close() override;
+    [[nodiscard]] std::size_t buffered() const noexcept override { return output_.capacity() + sending_.capacity(); }
+    void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return who_; }
 
     // For the port.
@@ -49,6 +51,7 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     void on_room();
 
   private:
+    void take_output();
     void send_rest();
 
     std::shared_ptr<udp_port> port_; // null: closed
