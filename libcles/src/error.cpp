@@ -2,38 +2,49 @@
 #include <cles/error.hpp>
 
 #include <array>
+#include <optional>
 #include <utility>
 
 namespace cles {
 namespace {
 
+namespace conditions = boost::system::errc;
+
 struct entry {
     errc code;
     std::string_view name;
     const char* text;
+    std::optional<conditions::errc_t> condition{}; // that says the same
 };
 
 // The order is that of the protocol's table, so that the wire codes are the first ten.
 constexpr std::array entries{
-    entry{errc::bad_request, "bad_request", "the request is malformed"},
-    entry{errc::denied, "denied", "the access rules forbid it"},
-    entry{errc::no_target, "no_target", "no way to the target is known"},
-    entry{errc::no_task, "no_task", "the target does not offer that verb and task"},
-    entry{errc::too_large, "too_large", "the message or its answer exceeds a limit"},
-    entry{errc::cancelled, "cancelled", "the request was withdrawn"},
+    entry{errc::bad_request, "bad_request", "the request is malformed", conditions::invalid_argument},
+    entry{errc::denied, "denied", "the access rules forbid it", conditions::permission_denied},
+    entry{errc::no_target, "no_target", "no way to the target is known", conditions::host_unreachable},
+    entry{errc::no_task, "no_task", "the target does not offer that verb and task",
+          conditions::operation_not_supported},
+    entry{errc::too_large, "too_large", "the message or its answer exceeds a limit", conditions::message_size},
+    entry{errc::cancelled, "cancelled", "the request was withdrawn", conditions::operation_canceled},
     entry{errc::failed, "failed", "the handler failed"},
-    entry{errc::unavailable, "unavailable", "the link or node was lost before the answer"},
-    entry{errc::busy, "busy", "refused before it started"},
-    entry{errc::deadline, "deadline", "the time ran out"},
-    entry{errc::would_deadlock, "would_deadlock", "a blocking request inside a handler would never end"},
-    entry{errc::invalid_url, "invalid_url", "not a link address"},
-    entry{errc::unknown_scheme, "unknown_scheme", "no transport has that URL scheme"},
-    entry{errc::insecure_listen, "insecure_listen", "listening beyond this host without credentials needs 'insecure'"},
-    entry{errc::invalid_name, "invalid_name", "not a name that a node or task may bear"},
-    entry{errc::already_registered, "already_registered", "the verb and task have a handler already"},
-    entry{errc::conversion, "conversion", "the JSON does not have the shape of the type"},
-    entry{errc::stopped, "stopped", "the service has been stopped"},
-    entry{errc::invalid_option, "invalid_option", "an option is outside of what it may be"},
+    entry{errc::unavailable, "unavailable", "the link or node was lost before the answer",
+          conditions::connection_reset},
+    entry{errc::busy, "busy", "refused before it started", conditions::resource_unavailable_try_again},
+    entry{errc::deadline, "deadline", "the time ran out", conditions::timed_out},
+    entry{errc::would_deadlock, "would_deadlock", "a blocking request inside a handler would never end",
+          conditions::resource_deadlock_would_occur},
+    entry{errc::invalid_url, "invalid_url", "not a link address", conditions::invalid_argument},
+    entry{errc::unknown_scheme, "unknown_scheme", "no transport has that URL scheme",
+          conditions::protocol_not_supported},
+    entry{errc::insecure_listen, "insecure_listen", "listening beyond this host without credentials needs 'insecure'",
+          conditions::operation_not_permitted},
+    entry{errc::invalid_name, "invalid_name", "not a name that a node or task may bear", conditions::invalid_argument},
+    entry{errc::already_registered, "already_registered", "the verb and task have a handler already",
+          conditions::file_exists},
+    entry{errc::conversion, "conversion", "the JSON does not have the shape of the type", conditions::bad_message},
+    entry{errc::stopped, "stopped", "the service has been stopped", conditions::operation_canceled},
+    entry{errc::invalid_option, "invalid_option", "an option is outside of what it may be",
+          conditions::invalid_argument},
 };
 constexpr std::size_t wire_codes = 10;
 
@@ -52,6 +63,29 @@ class category final : public boost::system::error_category {
     std::string message(int value) const override {
         const auto* e = find(value);
         return e != nullptr ? e->text : "unknown error";
+    }
+    boost::system::error_condition default_error_condition(int value) const noexcept override {
+        const auto* e = find(value);
+        if (e == nullptr || !e->condition) {
+            return {value, *this};
+        }
+        return make_error_condition(*e->condition);
+    }
+    bool equivalent(int value, const boost::system::error_condition& condition) const noexcept override {
+        switch (static_cast<errc>(value)) {
+        case errc::busy:
+            if (condition == make_error_condition(conditions::device_or_resource_busy)) {
+                return true;
+            }
+            break;
+        case errc::unavailable:
+            if (condition == make_error_condition(conditions::connection_aborted)) {
+                return true;
+            }
+            break;
+        default: break;
+        }
+        return default_error_condition(value) == condition;
     }
 };
 

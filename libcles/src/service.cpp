@@ -70,6 +70,10 @@ void service::add(registration task) { engine_->add(std::move(task)); }
 
 publisher service::make_publisher() { return publisher{engine_->outside_updates()}; }
 
+void service::fail_later(detail::pending_ptr operation, const detail::outgoing_body& why) {
+    engine_->fail_later(std::move(operation), why.wrong, why.text);
+}
+
 void service::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
     engine_->publish(noun, write);
 }

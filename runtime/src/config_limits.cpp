@@ -13,7 +13,9 @@ namespace {
 
 constexpr std::size_t most_links = 20'000; // each is a file descriptor, of which a process has fewer
 
-std::size_t most_of(const count_range& range) { return range.member == &limits::links || range.member == &limits::links_per_address ? most_links : range.most; }
+std::size_t most_of(const count_range& range) {
+    return range.member == &limits::links || range.member == &limits::links_per_address ? most_links : range.most;
+}
 
 std::chrono::milliseconds to_milliseconds(const std::string& text, const time_range& range) {
     const auto span = std::chrono::duration_cast<std::chrono::milliseconds>(to_duration(text));

@@ -15,6 +15,21 @@
 namespace cles::runtime {
 namespace {
 
+struct checked_json {
+    std::string text;
+};
+
+} // namespace
+} // namespace cles::runtime
+
+template <>
+struct cles::converter<cles::runtime::checked_json> {
+    static void write(json_writer& w, const runtime::checked_json& value) { w.raw(value.text); }
+};
+
+namespace cles::runtime {
+namespace {
+
 using detail::abi_text;
 using detail::known_part;
 using detail::view_of;
@@ -27,7 +42,7 @@ void answer_with(const responder& to, std::string_view json) {
         return;
     }
     try {
-        to.done(json_text{std::string{json}});
+        to.done(checked_json{to_json(json_text{std::string{json}})});
     } catch (...) {
         to.fail(errc::failed, "the plugin's answer is not JSON");
     }

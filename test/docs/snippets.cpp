@@ -26,6 +26,14 @@ struct state {
 };
 BOOST_DESCRIBE_STRUCT(state, (), (selected, pressures, driver))
 
+struct pose {
+    double x = 0;
+    double y = 0;
+    double heading = 90; // new in the second release
+};
+BOOST_DESCRIBE_STRUCT(pose, (), (x, y, heading))
+CLES_DEFAULTS(pose, (heading))
+
 bool only_look(const cles::access& asked) { return asked.verb == cles::verb::pull || asked.verb == cles::verb::bind; }
 
 void a_service();

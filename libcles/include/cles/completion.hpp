@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/asio_error.hpp>
+#include <cles/completion_token.hpp>
 #include <cles/error.hpp>
 
 #include <boost/asio/any_io_executor.hpp>
@@ -9,7 +11,6 @@
 #include <boost/asio/associated_executor.hpp>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/executor_work_guard.hpp>
-#include <boost/asio/use_awaitable.hpp>
 
 #include <exception>
 #include <memory>
@@ -21,31 +22,7 @@
 
 /// How an operation's handler is kept and called. Not for applications.
 
-namespace boost::asio {
-template <typename Allocator>
-class use_future_t;
-}
-
 namespace cles::detail {
-
-/// Tokens whose user is told of a failure by an exception, which then carries the peer's own words.
-template <class Token>
-inline constexpr bool throws = false;
-template <class E>
-inline constexpr bool throws<boost::asio::use_awaitable_t<E>> = true;
-template <class A>
-inline constexpr bool throws<boost::asio::use_future_t<A>> = true;
-
-template <bool Throws, class... T>
-struct signature {
-    using type = void(boost::system::error_code, T...);
-};
-template <class... T>
-struct signature<true, T...> {
-    using type = void(std::exception_ptr, T...);
-};
-template <class Token, class... T>
-using signature_for = typename signature<throws<std::remove_cvref_t<Token>>, T...>::type;
 
 /// Completes a handler on its executor: in line where that is the service's own, which completions run on already.
 template <bool Throws, class Handler>
@@ -65,7 +42,7 @@ class completion {
 
     template <class... T>
     void operator()(boost::system::error_code code, std::string_view message, T&&... values) && {
-        if constexpr (Throws) {
+        if constexpr (Throws || takes_exception<Handler>) {
             auto thrown = code ? std::make_exception_ptr(error(code, std::string{message})) : std::exception_ptr{};
             std::move(*this).run(std::move(thrown), std::forward<T>(values)...);
         } else {

@@ -4,6 +4,7 @@
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
+#include <cles/standard.hpp>
 
 #include <boost/describe/enumerators.hpp>
 #include <boost/describe/members.hpp>
@@ -19,14 +20,25 @@
 
 /// Conversion between C++ types and JSON text, without a document tree in between.
 ///
-/// Understood are `bool`, integers, floating-point numbers, strings, `std::optional`, `std::vector`, `std::array`,
-/// `std::map<std::string, T>`, structs described with `BOOST_DESCRIBE_STRUCT` (their described bases too), described
-/// enums (by name), `json_text`, and `boost::json::value` with `<cles/json_value.hpp>`. A type of your own joins them
-/// by a specialisation of `cles::converter`.
+/// Understood are
 ///
-/// Reading is tolerant where a newer writer may differ: unknown members are passed over, and a `std::optional` member
-/// may be absent or null. Any other member that is missing, or of another kind, is an error that names the path to it,
-/// as in "route[2].lat: expected a number, got a string".
+/// - `bool`, integers, floating-point numbers, strings, and enums described with `BOOST_DESCRIBE_ENUM`, by name;
+/// - `std::vector`, `std::array`, `std::tuple` and `std::pair` as arrays;
+/// - structs described with `BOOST_DESCRIBE_STRUCT` (their described bases too), and `std::map` and
+/// `std::unordered_map`
+///   from `std::string`, as objects;
+/// - `std::optional` as its value or null, `std::variant` as the value that it holds (`<cles/convert_variant.hpp>`);
+/// - `std::chrono` durations and points in time of the system clock as ISO 8601 (`<cles/convert_chrono.hpp>`);
+/// - `json_text`, JSON as it is, and `boost::json::value` with `<cles/json_value.hpp>`.
+///
+/// A type of your own joins them by a specialisation of `cles::converter`.
+///
+/// Reading is tolerant where a newer or older writer may differ: unknown members are passed over, and a member may be
+/// missing where it is a `std::optional` (or null then), or `CLES_DEFAULTS` names it (`<cles/convert_described.hpp>`).
+/// Any other member that is missing, or of another kind, is an error that names the path to it, as in "route[2].lat:
+/// expected a number, got a string".
+///
+/// Text to be written has to be UTF-8. Where it is not, nothing is sent: `to_json` throws.
 
 namespace cles {
 namespace detail {
@@ -49,21 +61,61 @@ struct json_text {
 };
 
 /// How T is written and read. Specialise with
-/// `static void write(json_writer&, const T&)` and `static bool read(json_reader&, T&)`.
+/// `static void write(json_writer&, const T&)` and `static bool read(json_reader&, T&)`. Where what is written is no
+/// object and no array, say so by `static constexpr bool is_scalar = true;`, since scalars travel as {"value":x}.
 template <class T>
 struct converter;
 
+namespace detail {
+
+template <class T>
+concept writable = requires(json_writer& w, const T& value) {
+    converter<T>::write(w, value);
+};
+template <class T>
+concept readable = requires(json_reader& r, T& value) {
+    static_cast<bool>(converter<T>::read(r, value));
+};
+
+} // namespace detail
+
 template <class T>
 void write_json(json_writer& w, const T& value) {
-    converter<T>::write(w, value);
+    static_assert(detail::writable<T>, "this type cannot be written as JSON: describe a struct with "
+                                       "BOOST_DESCRIBE_STRUCT, an enum with BOOST_DESCRIBE_ENUM, or specialise "
+                                       "cles::converter (see <cles/convert.hpp>)");
+    if constexpr (detail::writable<T>) {
+        converter<T>::write(w, value);
+    }
 }
 
 /// False on failure; the reader then says what and where.
 template <class T>
 bool read_json(json_reader& r, T& value) {
-    return converter<T>::read(r, value);
+    static_assert(detail::readable<T>, "this type cannot be read from JSON: describe a struct with "
+                                       "BOOST_DESCRIBE_STRUCT, an enum with BOOST_DESCRIBE_ENUM, or specialise "
+                                       "cles::converter (see <cles/convert.hpp>)");
+    if constexpr (detail::readable<T>) {
+        return converter<T>::read(r, value);
+    } else {
+        return false;
+    }
 }
 
+namespace detail {
+
+[[noreturn]] void throw_broken_text(const json_writer& w);
+
+/// \throws cles::error with `conversion` where text that is not UTF-8 was written
+inline void require_utf8(const json_writer& w) {
+    if (w.broken_text() != json_writer::npos) {
+        throw_broken_text(w);
+    }
+}
+
+} // namespace detail
+
+/// \throws cles::error with `conversion` where text is not UTF-8, or a value has no JSON form
 template <class T>
 std::string to_json(const T& value) {
     std::string out;
@@ -73,6 +125,7 @@ std::string to_json(const T& value) {
     }
     json_writer writer{out};
     write_json(writer, value);
+    detail::require_utf8(writer);
     return out;
 }
 
@@ -102,7 +155,7 @@ T from_json(std::string_view text) {
 
 namespace detail {
 
-/// \throws cles::error with `failed` where the text is not JSON
+/// \throws cles::error with `conversion` where the text is not JSON
 void write_text(json_writer& w, std::string_view json);
 
 } // namespace detail
@@ -204,3 +257,4 @@ struct converter<std::optional<T>> {
 
 #include <cles/convert_containers.hpp>
 #include <cles/convert_described.hpp>
+#include <cles/convert_variant.hpp>

@@ -8,6 +8,9 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <tuple>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 /// Conversion of the standard containers; comes with `<cles/convert.hpp>`.
@@ -30,6 +33,62 @@ bool read_elements(json_reader& r, Sequence& out) {
     }
     return r.ok();
 }
+
+template <class Map>
+void write_members(json_writer& w, const Map& values) {
+    w.begin_object();
+    for (const auto& [name, value] : values) {
+        w.key(name);
+        write_json(w, value);
+    }
+    w.end_object();
+}
+
+template <class Map>
+bool read_members(json_reader& r, Map& values) {
+    values.clear();
+    if (!r.begin_object()) {
+        return false;
+    }
+    std::string_view key;
+    while (r.next_key(key)) {
+        const auto at = values.try_emplace(std::string{key}).first;
+        if (!read_json(r, at->second)) {
+            r.inside_member(at->first);
+            return false;
+        }
+    }
+    return r.ok();
+}
+
+bool fail_count(json_reader& r, std::string_view which, std::size_t wanted);
+
+/// A tuple's elements, each of a type of its own: an array of that length.
+template <class Tuple>
+struct fixed_elements {
+    static void write(json_writer& w, const Tuple& values) {
+        w.begin_array();
+        std::apply([&w](const auto&... value) { (write_json(w, value), ...); }, values);
+        w.end_array();
+    }
+    static bool read(json_reader& r, Tuple& values) {
+        constexpr std::size_t count = std::tuple_size_v<Tuple>;
+        std::size_t next = 0;
+        const auto read_one = [&](auto& value) {
+            if (!r.next_element()) {
+                return r.ok() && fail_count(r, "fewer", count);
+            }
+            if (!read_json(r, value)) {
+                r.inside_element(next);
+                return false;
+            }
+            ++next;
+            return true;
+        };
+        return r.begin_array() && std::apply([&](auto&... value) { return (read_one(value) && ...); }, values) &&
+               (!r.next_element() ? r.ok() : fail_count(r, "more", count));
+    }
+};
 
 } // namespace detail
 
@@ -87,7 +146,7 @@ struct converter<std::array<T, N>> {
         std::size_t count = 0;
         while (r.next_element()) {
             if (count == N) {
-                return r.fail("more than " + std::to_string(N) + " elements");
+                return detail::fail_count(r, "more", N);
             }
             if (!read_json(r, values[count])) {
                 r.inside_element(count);
@@ -95,35 +154,29 @@ struct converter<std::array<T, N>> {
             }
             ++count;
         }
-        return r.ok() && (count == N || r.fail("fewer than " + std::to_string(N) + " elements"));
+        return r.ok() && (count == N || detail::fail_count(r, "fewer", N));
     }
 };
 
 template <class T, class C, class A>
 struct converter<std::map<std::string, T, C, A>> {
-    static void write(json_writer& w, const std::map<std::string, T, C, A>& values) {
-        w.begin_object();
-        for (const auto& [name, value] : values) {
-            w.key(name);
-            write_json(w, value);
-        }
-        w.end_object();
-    }
-    static bool read(json_reader& r, std::map<std::string, T, C, A>& values) {
-        values.clear();
-        if (!r.begin_object()) {
-            return false;
-        }
-        std::string_view key;
-        while (r.next_key(key)) {
-            const auto at = values.try_emplace(std::string{key}).first;
-            if (!read_json(r, at->second)) {
-                r.inside_member(at->first);
-                return false;
-            }
-        }
-        return r.ok();
-    }
+    using map = std::map<std::string, T, C, A>;
+    static void write(json_writer& w, const map& values) { detail::write_members(w, values); }
+    static bool read(json_reader& r, map& values) { return detail::read_members(r, values); }
 };
+
+/// In no particular order.
+template <class T, class H, class E, class A>
+struct converter<std::unordered_map<std::string, T, H, E, A>> {
+    using map = std::unordered_map<std::string, T, H, E, A>;
+    static void write(json_writer& w, const map& values) { detail::write_members(w, values); }
+    static bool read(json_reader& r, map& values) { return detail::read_members(r, values); }
+};
+
+template <class... T>
+struct converter<std::tuple<T...>> : detail::fixed_elements<std::tuple<T...>> {};
+
+template <class T, class U>
+struct converter<std::pair<T, U>> : detail::fixed_elements<std::pair<T, U>> {};
 
 } // namespace cles

@@ -17,6 +17,20 @@
 
 /// Conversion of structs and enums that are described with Boost.Describe; comes with `<cles/convert.hpp>`.
 
+/// Names members that may be missing from what is read: they keep what their initialisers give. So a message can grow
+/// without refusing those of older senders. It stands behind the description of the struct, in the struct's namespace
+/// (or in the struct, behind `friend`):
+///
+///     struct position {
+///         double lat = 0;
+///         double lon = 0;
+///         double heading = 0; // since 1.1
+///     };
+///     BOOST_DESCRIBE_STRUCT(position, (), (lat, lon, heading))
+///     CLES_DEFAULTS(position, (heading))
+#define CLES_DEFAULTS(type, members)                                                                                   \
+    constexpr ::std::string_view cles_members_with_defaults(const type*) noexcept { return #members; }
+
 namespace cles {
 
 namespace detail {
@@ -36,10 +50,45 @@ struct member {
     bool required;
 };
 
+template <class M, class C>
+C class_of(M C::*);
+
+template <class C>
+concept has_defaults = requires {
+    cles_members_with_defaults(static_cast<const C*>(nullptr));
+};
+
+/// Takes the next name off a list as "(lat, lon)".
+constexpr std::string_view next_name(std::string_view& list) noexcept {
+    constexpr std::string_view between = "(), ";
+    while (!list.empty() && between.find(list.front()) != std::string_view::npos) {
+        list.remove_prefix(1);
+    }
+    const auto name = list.substr(0, list.find_first_of(between));
+    list.remove_prefix(name.size());
+    return name;
+}
+
+/// Whether the class that declares a member, or one that inherits it, gives it a default.
+template <class C>
+constexpr bool has_default(std::string_view member) noexcept {
+    if constexpr (has_defaults<C>) {
+        auto list = cles_members_with_defaults(static_cast<const C*>(nullptr));
+        for (auto name = next_name(list); !name.empty(); name = next_name(list)) {
+            if (name == member) {
+                return true;
+            }
+        }
+    }
+    return false;
+}
+
 template <class T, class D>
 constexpr member<T> member_for() {
     using field = std::remove_cvref_t<decltype(std::declval<T&>().*D::pointer)>;
-    return {D::name, [](json_reader& r, T& object) { return read_json(r, object.*D::pointer); }, !is_optional<field>};
+    using owner = decltype(class_of(D::pointer));
+    return {D::name, [](json_reader& r, T& object) { return read_json(r, object.*D::pointer); },
+            !is_optional<field> && !has_default<owner>(D::name) && !has_default<T>(D::name)};
 }
 
 template <class T, class... D>
@@ -61,6 +110,19 @@ constexpr std::size_t find_member(const Table& table, std::string_view name) noe
 
 template <class T>
 inline constexpr auto member_table = table_of<T>(boost::mp11::mp_rename<members_of<T>, boost::mp11::mp_list>{});
+
+template <class T>
+constexpr bool defaults_are_members() noexcept {
+    if constexpr (has_defaults<T>) {
+        auto list = cles_members_with_defaults(static_cast<const T*>(nullptr));
+        for (auto name = next_name(list); !name.empty(); name = next_name(list)) {
+            if (find_member(member_table<T>, name) == member_table<T>.size()) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
 
 } // namespace detail
 
@@ -112,6 +174,8 @@ struct converter<T> {
     }
 
     static bool read(json_reader& r, T& object) {
+        static_assert(detail::defaults_are_members<T>(),
+                      "CLES_DEFAULTS names a member that BOOST_DESCRIBE_STRUCT does not");
         constexpr auto& table = detail::member_table<T>;
         std::array<bool, table.size()> seen{};
         std::size_t next = 0; // members mostly come in their order

@@ -3,9 +3,11 @@
 
 #include <cles/convert.hpp>
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <type_traits>
+#include <variant>
 
 /// Scalars travel as {"value":x}, and come unwrapped. Not for applications.
 
@@ -15,8 +17,25 @@ template <class T>
 struct wrapped {
     T value;
 };
+
+/// What is always written as a scalar.
 template <class T>
-inline constexpr bool comes_wrapped = std::is_arithmetic_v<T> || std::is_same_v<T, std::string> || described_enum<T>;
+inline constexpr bool is_scalar =
+    std::is_arithmetic_v<T> || std::is_same_v<T, std::string> || described_enum<T> || requires {
+    requires converter<T>::is_scalar;
+};
+template <class T>
+inline constexpr bool is_scalar<std::optional<T>> = is_scalar<T>;
+template <class... T>
+inline constexpr bool is_scalar<std::variant<T...>> = (is_scalar<T> && ...);
+
+/// What may be written as one.
+template <class T>
+inline constexpr bool comes_wrapped = is_scalar<T>;
+template <class T>
+inline constexpr bool comes_wrapped<std::optional<T>> = true; // as null
+template <class... T>
+inline constexpr bool comes_wrapped<std::variant<T...>> = (comes_wrapped<T> || ...);
 
 } // namespace cles::detail
 
@@ -24,6 +43,15 @@ namespace cles {
 template <class T>
 struct converter<detail::wrapped<T>> {
     static bool read(json_reader& r, detail::wrapped<T>& out) {
+        if constexpr (detail::is_scalar<T>) {
+            return read_wrapped(r, out);
+        } else {
+            return read_either(r, out);
+        }
+    }
+
+  private:
+    static bool read_wrapped(json_reader& r, detail::wrapped<T>& out) {
         bool found = false;
         std::string_view key;
         if (!r.begin_object()) {
@@ -41,11 +69,56 @@ struct converter<detail::wrapped<T>> {
                 return false;
             }
         }
+        if constexpr (detail::is_optional<T>) {
+            found = true; // or else it was missing
+        }
         if (r.ok() && !found) {
             r.fail("is missing");
             r.inside_member("value");
         }
         return r.ok();
     }
+
+    // Only a scalar is wrapped, so that an object with a member `value` of another kind is what it is.
+    static bool read_either(json_reader& r, detail::wrapped<T>& out) {
+        std::string_view raw;
+        if (!r.read_raw(raw)) {
+            return false;
+        }
+        json_reader scalar{raw, std::string_view::npos}; // it has been checked
+        if (scalar.peek() == json_reader::kind::object && scalar.begin_object()) {
+            std::string_view key;
+            if (scalar.next_key(key) && key == "value" && scalar.peek() != json_reader::kind::object &&
+                scalar.peek() != json_reader::kind::array && read_json(scalar, out.value) && !scalar.next_key(key) &&
+                scalar.ok()) {
+                return true;
+            }
+        }
+        json_reader plain{raw, std::string_view::npos};
+        return read_json(plain, out.value) || r.fail_as(plain);
+    }
 };
 } // namespace cles
+
+namespace cles::detail {
+
+/// A value as the body of a message.
+template <class T>
+std::string to_body(const T& value) {
+    if constexpr (!is_scalar<T> && !comes_wrapped<T> && !std::is_convertible_v<const T&, std::string_view>) {
+        return to_json(value);
+    } else {
+        constexpr std::string_view head = "{\"value\":";
+        std::string out{head};
+        json_writer writer{out};
+        write_json(writer, value);
+        require_utf8(writer);
+        if (out[head.size()] == '{' || out[head.size()] == '[') {
+            return out.substr(head.size());
+        }
+        out.push_back('}');
+        return out;
+    }
+}
+
+} // namespace cles::detail

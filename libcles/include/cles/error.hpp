@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/standard.hpp>
+
 #include <boost/system/error_code.hpp>
 #include <boost/system/system_error.hpp>
 
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 
 namespace cles {
 
@@ -35,10 +38,36 @@ enum class errc {
     invalid_option,       ///< an option is outside of what it may be; the message names it
 };
 
-/// The category of `errc`; its name is "cles".
+/// The category of `errc`; its name is "cles". Its codes equal the conditions of `std::errc` and `boost::system::errc`
+/// that say the same:
+///
+/// | | |
+/// | --- | --- |
+/// | `cancelled`, `stopped` | `operation_canceled` |
+/// | `deadline` | `timed_out` |
+/// | `busy` | `resource_unavailable_try_again`, `device_or_resource_busy` |
+/// | `unavailable` | `connection_reset`, `connection_aborted` |
+/// | `no_target` | `host_unreachable` |
+/// | `no_task` | `operation_not_supported` |
+/// | `denied` | `permission_denied` |
+/// | `too_large` | `message_size` |
+/// | `bad_request`, `invalid_url`, `invalid_name` | `invalid_argument` |
+/// | `conversion` | `bad_message` |
+/// | `would_deadlock` | `resource_deadlock_would_occur` |
+/// | `unknown_scheme` | `protocol_not_supported` |
+/// | `insecure_listen` | `operation_not_permitted` |
+/// | `already_registered` | `file_exists` |
+///
+/// `failed` is what the handler makes of it, and equals none. With `<cles/service.hpp>` the codes of Asio compare too:
+/// `code == boost::asio::error::operation_aborted`.
 const boost::system::error_category& error_category() noexcept;
 
 inline boost::system::error_code make_error_code(errc e) noexcept { return {static_cast<int>(e), error_category()}; }
+
+inline bool operator==(errc code, std::errc condition) noexcept { return make_error_code(code) == condition; }
+inline bool operator==(errc code, boost::system::errc::errc_t condition) noexcept {
+    return make_error_code(code) == condition;
+}
 
 /// The name that stands in `{"error":"..."}`; names without a wire form give "failed".
 std::string_view wire_name(errc e) noexcept;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/standard.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -52,6 +54,8 @@ class json_reader {
     [[nodiscard]] bool ok() const noexcept { return message_.empty(); }
     /// Fails with this message at the current place.
     bool fail(std::string_view message);
+    /// Fails as another reader did, which was given a part of this one's text.
+    bool fail_as(const json_reader& part);
     /// Called while unwinding from a failure: names the member or element that it happened in.
     void inside_member(std::string_view name);
     void inside_element(std::size_t index);

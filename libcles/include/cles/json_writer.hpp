@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/prepared_key.hpp>
+#include <cles/standard.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -39,11 +40,16 @@ class json_writer {
     /// JSON text that is known to be valid and free of white space.
     void raw(std::string_view json);
 
+    /// Where the first text that is not UTF-8 was mended, as an index into `written`; `npos` where none was.
+    [[nodiscard]] std::size_t broken_text() const noexcept { return broken_; }
+    static constexpr std::size_t npos = std::string_view::npos;
+
     /// What has been written by this writer.
     [[nodiscard]] std::string_view written() const noexcept { return std::string_view{out_}.substr(start_); }
 
   private:
     void open(char bracket);
+    void append_string(std::string_view text);
     // Compact JSON tells by its last character whether a comma is due, so that no stack of open brackets is needed.
     void separate() {
         if (out_.size() > start_) {
@@ -56,6 +62,7 @@ class json_writer {
 
     std::string& out_;
     std::size_t start_;
+    std::size_t broken_ = npos;
 };
 
 } // namespace cles

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <algorithm>
+#include <cles/standard.hpp>
+
 #include <array>
 #include <cstddef>
 #include <string_view>
@@ -17,7 +18,9 @@ class prepared_key_text {
     consteval explicit prepared_key_text(std::string_view name) {
         text_[0] = ',';
         text_[1] = '"';
-        std::copy(name.begin(), name.end(), text_.begin() + 2);
+        for (std::size_t i = 0; i < name.size(); ++i) { // without <algorithm>, which every user would pay for
+            text_[i + 2] = name[i];
+        }
         text_[Length + 2] = '"';
         text_[Length + 3] = ':';
     }

@@ -33,6 +33,7 @@ class publisher {
     explicit publisher(std::shared_ptr<detail::update_sink> to) noexcept : to_(std::move(to)) {}
 
     /// Publishes a value to all that are bound to the task (or to "task/parameter/...").
+    /// \throws cles::error with `conversion` where it cannot be written as JSON, as text that is not UTF-8
     template <class T>
     void update(std::string_view noun, const T& value) const {
         to_->publish(noun, to_json(value));

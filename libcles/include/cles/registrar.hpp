@@ -1,23 +1,22 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/handler_shape.hpp>
 #include <cles/publisher.hpp>
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
+#include <cles/standard.hpp>
 #include <cles/task_info.hpp>
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/cancellation_signal.hpp>
 #include <boost/asio/co_spawn.hpp>
-#include <boost/callable_traits/args.hpp>
-#include <boost/callable_traits/return_type.hpp>
 
 #include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
 #include <utility>
 
@@ -39,61 +38,6 @@ struct registration {
 };
 
 namespace detail {
-
-template <class T>
-struct awaited {
-    static constexpr bool is_awaitable = false;
-    using type = T;
-};
-template <class T, class E>
-struct awaited<boost::asio::awaitable<T, E>> {
-    static constexpr bool is_awaitable = true;
-    using type = T;
-};
-
-template <class Tuple>
-struct last {
-    using type = void;
-};
-template <class T>
-struct last<std::tuple<T>> {
-    using type = T;
-};
-template <class T, class U>
-struct last<std::tuple<T, U>> {
-    using type = U;
-};
-
-/// How a handler wants its arguments: (), (request), (body), (request, body), (request, responder).
-template <class F>
-struct handler_shape {
-    using arguments = boost::callable_traits::args_t<F, std::tuple>;
-    using result = boost::callable_traits::return_type_t<F>;
-    static constexpr std::size_t arity = std::tuple_size_v<arguments>;
-    static_assert(arity <= 2, "a handler takes (), (request), (body), (request, body) or (request, responder)");
-
-    template <std::size_t I>
-    using argument = std::remove_cvref_t<std::tuple_element_t<I, arguments>>;
-
-    static constexpr bool takes_request = [] {
-        if constexpr (arity > 0) {
-            return std::is_same_v<argument<0>, request>;
-        } else {
-            return false;
-        }
-    }();
-    static constexpr bool takes_responder = [] {
-        if constexpr (arity == 2) {
-            return std::is_same_v<argument<1>, responder>;
-        } else {
-            return false;
-        }
-    }();
-    static constexpr bool takes_body = arity > (takes_request ? 1 : 0) && !takes_responder;
-    static_assert(arity < 2 || takes_request, "of two arguments the first is the request");
-    static_assert(!(takes_body && awaited<result>::is_awaitable && std::is_reference_v<typename last<arguments>::type>),
-                  "a coroutine takes its body by value: a reference would dangle once it waits");
-};
 
 template <class F>
 decltype(auto) invoke_handler(F& f, const request& r) {
@@ -130,28 +74,57 @@ boost::asio::awaitable<void> run_handler(std::shared_ptr<F> f, request r, respon
     }
 }
 
+// The same for one that answers through its responder. What it throws is the answer where there is none yet.
+template <class F>
+boost::asio::awaitable<void> run_answering_handler(std::shared_ptr<F> f, request r, responder answer) {
+    try {
+        co_await (*f)(r, answer);
+    } catch (...) {
+        answer.fail(std::current_exception());
+    }
+}
+
+inline void spawn_handler(const responder& answer, boost::asio::awaitable<void> work) {
+    auto signal = std::make_shared<boost::asio::cancellation_signal>();
+    answer.on_stop([signal] { signal->emit(boost::asio::cancellation_type::terminal); });
+    // The completion keeps the signal, which must outlive the coroutine.
+    boost::asio::co_spawn(answer.get_executor(), std::move(work),
+                          boost::asio::bind_cancellation_slot(signal->slot(), [signal](std::exception_ptr) {}));
+}
+
+/// A function object as `std::function` wants it, which copies.
+template <class F>
+auto copyable(F f) {
+    if constexpr (std::is_copy_constructible_v<F>) {
+        return f;
+    } else {
+        return [f = std::make_shared<F>(std::move(f))](auto&&... arguments) -> decltype(auto) {
+            return (*f)(std::forward<decltype(arguments)>(arguments)...);
+        };
+    }
+}
+
 template <class F>
 void set_handler(registration& to, F f) {
     using shape = handler_shape<F>;
-    using result = typename shape::result;
-    if constexpr (shape::takes_responder) {
-        to.async = std::move(f);
-    } else if constexpr (awaited<result>::is_awaitable) {
+    if constexpr (shape::is_coroutine) {
         to.coroutine = true;
         to.async = [f = std::make_shared<F>(std::move(f))](const request& r, responder answer) {
-            auto signal = std::make_shared<boost::asio::cancellation_signal>();
-            answer.on_stop([signal] { signal->emit(boost::asio::cancellation_type::terminal); });
-            const auto executor = answer.get_executor();
-            // The completion keeps the signal, which must outlive the coroutine.
-            boost::asio::co_spawn(executor, run_handler(f, r, std::move(answer)),
-                                  boost::asio::bind_cancellation_slot(signal->slot(), [signal](std::exception_ptr) {}));
+            if constexpr (shape::takes_responder) {
+                spawn_handler(answer, run_answering_handler(f, r, answer));
+            } else {
+                spawn_handler(answer, run_handler(f, r, answer));
+            }
         };
-    } else if constexpr (std::is_void_v<result>) {
-        to.plain = [f = std::move(f)](const request& r, json_writer&) mutable { invoke_handler(f, r); };
+    } else if constexpr (shape::takes_responder) {
+        to.async = copyable(std::move(f));
+    } else if constexpr (std::is_void_v<typename shape::result>) {
+        to.plain = copyable([f = std::move(f)](const request& r, json_writer&) mutable { invoke_handler(f, r); });
     } else {
-        to.plain = [f = std::move(f)](const request& r, json_writer& w) mutable {
+        to.plain = copyable([f = std::move(f)](const request& r, json_writer& w) mutable {
             write_json(w, invoke_handler(f, r));
-        };
+            require_utf8(w);
+        });
     }
 }
 
@@ -161,11 +134,11 @@ void set_handler(registration& to, F f) {
 /// a plugin and a test, so that one `void register_tasks(cles::registrar&)` serves all three.
 ///
 /// A handler takes `()`, `(request)`, `(body)`, `(request, body)` or `(request, responder)`, the body being any type
-/// that
-/// `<cles/convert.hpp>` reads, and gives nothing, a value that it writes, or `asio::awaitable` of either. A plain
-/// function runs in line, between two lines of the link, and should be quick; a coroutine may wait. A body that does
-/// not fit is answered with `bad_request` before the handler runs. What a handler throws becomes the answer:
-/// `cles::error` with its code, anything else `failed`.
+/// that `<cles/convert.hpp>` reads, and gives nothing, a value that it writes, or `asio::awaitable` of either. It may
+/// hold what can only be moved. A plain function runs in line, between two lines of the link, and should be quick; a
+/// coroutine may wait. One that takes a responder answers through it and may be a coroutine too, an `awaitable<void>`.
+/// A body that does not fit is answered with `bad_request` before the handler runs. What a handler throws becomes the
+/// answer: `cles::error` with its code, anything else `failed`.
 ///
 /// In a plugin, handlers, those of BIND too, run on threads of a pool, several at once, unless the task is `inline_ok`;
 /// coroutines, which need the executor of an application, are refused there.
@@ -208,18 +181,22 @@ class registrar {
     /// parameter is none that it publishes. What it returns is not used.
     template <class F>
     void on_bind(std::string_view task, F handler, task_info info = {}) {
-        static_assert(!detail::handler_shape<F>::takes_responder &&
-                          !detail::awaited<typename detail::handler_shape<F>::result>::is_awaitable,
-                      "a BIND is decided at once: its handler is a plain function");
+        if constexpr (detail::one_signature<F>) {
+            using shape = detail::handler_shape<F>;
+            static_assert(!shape::takes_responder && !shape::is_coroutine,
+                          "a BIND is decided at once: its handler is a plain function");
+        }
         add_handler(verb::bind, task, std::move(handler), std::move(info));
     }
 
   private:
     template <class F>
     void add_handler(cles::verb verb, std::string_view task, F handler, task_info info) {
-        registration entry{.verb = verb, .task = std::string{task}, .info = std::move(info)};
-        detail::set_handler(entry, std::move(handler));
-        add(std::move(entry));
+        if constexpr (detail::fits_handler<F>()) {
+            registration entry{.verb = verb, .task = std::string{task}, .info = std::move(info)};
+            detail::set_handler(entry, std::move(handler));
+            add(std::move(entry));
+        }
     }
 };
 

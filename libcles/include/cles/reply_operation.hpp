@@ -3,6 +3,7 @@
 
 #include <cles/completion.hpp>
 #include <cles/convert.hpp>
+#include <cles/convert_chrono.hpp>
 #include <cles/convert_wrapped.hpp>
 #include <cles/error.hpp>
 #include <cles/pending.hpp>

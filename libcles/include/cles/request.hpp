@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/convert.hpp>
+#include <cles/convert_chrono.hpp>
 #include <cles/convert_wrapped.hpp>
 #include <cles/error.hpp>
 #include <cles/identity.hpp>

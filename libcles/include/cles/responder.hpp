@@ -56,10 +56,18 @@ class responder {
   public:
     explicit responder(std::shared_ptr<detail::call_control> call) noexcept : call_(std::move(call)) {}
 
-    /// Answers with a result: a described struct, a scalar, `json_text`, or nothing.
+    /// Answers with a result: a described struct, a scalar, `json_text`, or nothing. What cannot be written, as text
+    /// that is not UTF-8, is answered `failed`.
     template <class T>
     void done(const T& result) const {
-        call_->done(to_json(result));
+        std::string json;
+        try {
+            json = to_json(result);
+        } catch (...) {
+            detail::fail_with(*call_, std::current_exception());
+            return;
+        }
+        call_->done(json);
     }
     void done() const { call_->done({}); }
     void fail(errc code, std::string_view message) const { call_->fail(code, message); }

@@ -15,6 +15,7 @@
 #include <cles/reply_operation.hpp>
 #include <cles/routing.hpp>
 #include <cles/short_text.hpp>
+#include <cles/standard.hpp>
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/async_result.hpp>
@@ -83,6 +84,12 @@ concept token = !std::derived_from<std::remove_cvref_t<T>, call_options>;
 
 inline const call_options no_options{};
 
+/// A body to send, or why it cannot be.
+struct outgoing_body {
+    std::string text{};
+    boost::system::error_code wrong{};
+};
+
 struct outgoing {
     cles::verb verb = verb::pull;
     std::string_view noun;
@@ -100,7 +107,9 @@ struct outgoing {
 /// outlive neither its operations nor its feeds: when it goes, they fail with `stopped`.
 ///
 /// Failures. Operations complete with `(error_code, result)`; the peer's own words go to `call_options::diagnostics`.
-/// With `co_await` (the default token) and `use_future` they throw `cles::error`, which holds code and words.
+/// With `co_await` (the default token) and `use_future`, bound to an executor or not, or begun after `asio::deferred`,
+/// they throw `cles::error`, which holds code and words. A body that cannot be written as JSON completes its operation
+/// with `conversion`.
 ///
 /// Cancellation. All operations honour their cancellation slot (terminal, partial, total): the request is withdrawn at
 /// the peer and completes with `cancelled` at once.
@@ -147,7 +156,7 @@ class service : public registrar {
     /// told. One alone, 100 us or more behind the last, is written in this call; those that come together are written
     /// together, soon after, and what a handler publishes before it first waits behind an answer that it gives then.
     /// \throws cles::error: `invalid_name`, `too_large`, `busy` (too many nouns), `failed` (begins like a
-    /// failure)
+    /// failure), `conversion` (text that is not UTF-8)
     template <class T>
     void update(std::string_view noun, const T& value) {
         publish(noun, [&](json_writer& w) { write_json(w, value); });
@@ -158,11 +167,15 @@ class service : public registrar {
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
-            [this](auto handler, std::string path, std::string json) {
-                auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                publish_when_room(path, json, detail::pending_ptr{operation});
+            [this](auto handler, std::string path, const detail::outgoing_body& json) {
+                detail::pending_ptr operation{make_operation<void, Token>(std::move(handler), nullptr)};
+                if (json.wrong) {
+                    fail_later(std::move(operation), json);
+                } else {
+                    publish_when_room(path, json.text, std::move(operation));
+                }
             },
-            token, std::string{noun}, to_json(value));
+            token, std::string{noun}, converted([&] { return to_json(value); }));
     }
 
     /// Any request, as a command of the language: "PULL car0:localization", "PUSH car0:notice {\"text\":\"hi\"}". The
@@ -208,6 +221,28 @@ class service : public registrar {
         return initiate<T>(verb::delegate, noun, body_text(body), options, std::forward<Token>(token));
     }
 
+#if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 13
+    // Chosen for a temporary aggregate that needs its destructor, in a call that is awaited.
+    template <class T = json_text, detail::fragile_temporary B, class... Rest>
+        requires(detail::awaited_call<Rest...>::value)
+    auto async_push(std::string_view noun, B&& body, Rest&&... rest) {
+        refuse_temporary<B>();
+        return async_push<T>(noun, std::as_const(body), std::forward<Rest>(rest)...);
+    }
+    template <class T = json_text, detail::fragile_temporary B, class... Rest>
+        requires(detail::awaited_call<Rest...>::value)
+    auto async_delegate(std::string_view noun, B&& body, Rest&&... rest) {
+        refuse_temporary<B>();
+        return async_delegate<T>(noun, std::as_const(body), std::forward<Rest>(rest)...);
+    }
+    template <detail::fragile_temporary T, class... Rest>
+        requires(detail::awaited_call<Rest...>::value)
+    auto async_update(std::string_view noun, T&& value, Rest&&... rest) {
+        refuse_temporary<T>();
+        return async_update(noun, std::as_const(value), std::forward<Rest>(rest)...);
+    }
+#endif
+
     /// BIND: a feed of updates. Completes when the publisher has answered.
     template <class T = json_text, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_bind(std::string_view noun, Token&& token = {}) {
@@ -229,18 +264,24 @@ class service : public registrar {
 
   private:
     template <class B>
-    static std::string body_text(const B& body) {
-        if constexpr (detail::comes_wrapped<B> || std::convertible_to<const B&, std::string_view>) {
-            std::string out;
-            json_writer writer{out};
-            writer.begin_object();
-            writer.key("value");
-            write_json(writer, body);
-            writer.end_object();
-            return out;
-        } else {
-            return to_json(body);
+    static void refuse_temporary() {
+        static_assert(!detail::fragile_temporary<B>,
+                      "g++ 12 destroys a temporary aggregate twice where the call is awaited: name it first "
+                      "(const note text{...}; co_await node.async_push(noun, text)), or give its type a constructor");
+    }
+
+    template <class F>
+    static detail::outgoing_body converted(F convert) {
+        try {
+            return {.text = convert()};
+        } catch (const error& e) {
+            return {.text = e.message(), .wrong = e.code()};
         }
+    }
+
+    template <class B>
+    static detail::outgoing_body body_text(const B& body) {
+        return converted([&] { return detail::to_body(body); });
     }
 
     template <class T, class Token, class Handler>
@@ -252,13 +293,18 @@ class service : public registrar {
     // The noun and the options are kept by the operation, which may begin later: the noun without allocation where it
     // is short, the options as they are, or by reference where they are nobody's.
     template <class T, class Token, class Options>
-    auto initiate(cles::verb verb, std::string_view noun, std::string body, const Options& options, Token&& token) {
+    auto initiate(cles::verb verb, std::string_view noun, detail::outgoing_body body, const Options& options,
+                  Token&& token) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token, T>>(
-            [this, verb](auto handler, const detail::short_text& target, const std::string& text,
+            [this, verb](auto handler, const detail::short_text& target, const detail::outgoing_body& content,
                          const call_options& chosen) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                connect_cancellation(slot, send({verb, target.view(), text}, chosen, detail::pending_ptr{operation}));
+                detail::pending_ptr operation{make_operation<T, Token>(std::move(handler), chosen.diagnostics_)};
+                if (content.wrong) {
+                    fail_later(std::move(operation), content);
+                } else {
+                    connect_cancellation(slot, send({verb, target.view(), content.text}, chosen, std::move(operation)));
+                }
             },
             token, detail::short_text{noun}, std::move(body), options);
     }
@@ -303,6 +349,7 @@ class service : public registrar {
             detail::make_operation<operation_type>(std::move(handler), get_executor(), control, options.diagnostics_)});
     }
 
+    void fail_later(detail::pending_ptr operation, const detail::outgoing_body& why);
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
     void publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
     // Both return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -15,7 +14,7 @@ class short_text {
     explicit short_text(std::string_view text) {
         if (text.size() <= inside_.size()) {
             size_ = text.size();
-            std::copy_n(text.data(), size_, inside_.data());
+            text.copy(inside_.data(), size_);
         } else {
             outside_ = text;
         }

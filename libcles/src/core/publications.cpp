@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/publications.hpp"
 
+#include <cles/convert.hpp>
 #include <cles/error.hpp>
 
 #include "core/result_text.hpp"
@@ -80,6 +81,7 @@ void publications::publish(std::string_view path, const std::function<void(json_
     try {
         json_writer writer{line};
         write(writer);
+        cles::detail::require_utf8(writer);
         close_result(line, body);
         end(t, body - start);
     } catch (...) {

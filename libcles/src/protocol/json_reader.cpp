@@ -34,6 +34,15 @@ bool json_reader::fail(std::string_view message) {
     return false;
 }
 
+bool json_reader::fail_as(const json_reader& part) {
+    if (ok()) {
+        message_ = part.message_;
+        path_ = part.path_;
+        failed_at_ = static_cast<std::size_t>(part.text_.data() - text_.data()) + part.failed_at_;
+    }
+    return false;
+}
+
 bool json_reader::expected(std::string_view what) {
     if (!ok()) {
         return false;

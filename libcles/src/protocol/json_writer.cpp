@@ -4,6 +4,7 @@
 #include "protocol/plain_text.hpp"
 #include "protocol/utf8.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
@@ -79,28 +80,6 @@ void append_escape(std::string& out, char c) {
     }
 }
 
-void append_string(std::string& out, std::string_view text) {
-    out.push_back('"');
-    for (std::size_t i = 0; i < text.size();) {
-        const auto run = protocol::plain_end(text, i);
-        out.append(text.substr(i, run - i));
-        i = run;
-        if (i == text.size()) {
-            break;
-        }
-        if (static_cast<unsigned char>(text[i]) < 0x80) {
-            append_escape(out, text[i++]);
-        } else if (const auto length = protocol::utf8_sequence(text, i); length != 0) {
-            out.append(text.substr(i, length));
-            i += length;
-        } else {
-            out += "\xEF\xBF\xBD";
-            ++i;
-        }
-    }
-    out.push_back('"');
-}
-
 } // namespace
 
 void json_writer::open(char bracket) {
@@ -108,9 +87,32 @@ void json_writer::open(char bracket) {
     out_.push_back(bracket);
 }
 
+void json_writer::append_string(std::string_view text) {
+    out_.push_back('"');
+    for (std::size_t i = 0; i < text.size();) {
+        const auto run = protocol::plain_end(text, i);
+        out_.append(text.substr(i, run - i));
+        i = run;
+        if (i == text.size()) {
+            break;
+        }
+        if (static_cast<unsigned char>(text[i]) < 0x80) {
+            append_escape(out_, text[i++]);
+        } else if (const auto length = protocol::utf8_sequence(text, i); length != 0) {
+            out_.append(text.substr(i, length));
+            i += length;
+        } else {
+            broken_ = std::min(broken_, out_.size() - start_);
+            out_ += "\xEF\xBF\xBD";
+            ++i;
+        }
+    }
+    out_.push_back('"');
+}
+
 void json_writer::key(std::string_view name) {
     separate();
-    append_string(out_, name);
+    append_string(name);
     out_.push_back(':');
 }
 
@@ -153,7 +155,7 @@ void json_writer::value(std::uint64_t u) {
 
 void json_writer::value(std::string_view text) {
     separate();
-    append_string(out_, text);
+    append_string(text);
 }
 
 void json_writer::raw(std::string_view json) {

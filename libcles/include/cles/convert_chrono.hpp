@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/convert.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <ratio>
+#include <type_traits>
+#include <utility>
+
+/// Conversion of durations and of points in time of the system clock; comes with `<cles/service.hpp>`
+/// and `<cles/registrar.hpp>`.
+///
+/// Written is ISO 8601: a duration as "PT90.5S", a point in time in UTC as "2026-11-23T07:43:14.25Z", both to the
+/// nanosecond. Read are those, durations in weeks, days, hours and minutes too ("P1DT12H"), other time zones
+/// ("2026-11-23T08:43:14.25+01:00"), and numbers: seconds, for a point in time since 1970. What is finer than the type
+/// is rounded down. Durations in floating point keep every digit. Points in time of other clocks mean nothing to
+/// another node, and do not convert.
+
+namespace cles {
+
+namespace detail {
+
+/// A time in parts that hold any that the protocol's peers may write.
+struct whole_time {
+    std::int64_t seconds = 0;
+    std::int64_t nanoseconds = 0; ///< 0 to 999'999'999, so that a negative time is rounded down
+};
+
+void write_duration(json_writer& w, whole_time value);
+void write_duration(json_writer& w, double seconds);
+bool read_duration(json_reader& r, whole_time& value);
+bool read_duration(json_reader& r, double& seconds);
+void write_time_point(json_writer& w, whole_time since_1970);
+bool read_time_point(json_reader& r, whole_time& since_1970);
+
+/// How many units of num/den seconds a time has, rounded down. False where there are more than can be counted.
+bool count_units(whole_time value, std::int64_t num, std::int64_t den, std::int64_t& count) noexcept;
+[[noreturn]] void throw_time_out_of_range();
+whole_time whole_of(double seconds);
+double seconds_of(whole_time value) noexcept;
+
+template <class Rep, class Period>
+whole_time whole_of(const std::chrono::duration<Rep, Period>& value) {
+    if constexpr (std::is_floating_point_v<Rep>) {
+        return whole_of(std::chrono::duration<double>(value).count());
+    } else {
+        using whole_seconds = std::chrono::duration<std::int64_t>;
+        if constexpr (std::ratio_greater_v<Period, std::ratio<1>>) {
+            constexpr auto most = INT64_MAX / Period::num;
+            if (std::cmp_greater(value.count(), most) || std::cmp_less(value.count(), -most)) {
+                throw_time_out_of_range();
+            }
+        }
+        const auto down = std::chrono::floor<whole_seconds>(value);
+        return {down.count(), std::chrono::floor<std::chrono::duration<std::int64_t, std::nano>>(value - down).count()};
+    }
+}
+
+template <class Rep, class Period>
+bool from_whole(json_reader& r, whole_time from, std::chrono::duration<Rep, Period>& value) {
+    if constexpr (std::is_floating_point_v<Rep>) {
+        value = std::chrono::duration<Rep, Period>(std::chrono::duration<double>(seconds_of(from)));
+        return true;
+    } else {
+        std::int64_t count = 0;
+        if (!count_units(from, Period::num, Period::den, count) || !std::in_range<Rep>(count)) {
+            return r.fail("a time out of range");
+        }
+        value = std::chrono::duration<Rep, Period>(static_cast<Rep>(count));
+        return true;
+    }
+}
+
+} // namespace detail
+
+template <class Rep, class Period>
+struct converter<std::chrono::duration<Rep, Period>> {
+    using duration = std::chrono::duration<Rep, Period>;
+    static constexpr bool is_scalar = true;
+
+    static void write(json_writer& w, const duration& value) {
+        if constexpr (std::is_floating_point_v<Rep>) {
+            detail::write_duration(w, std::chrono::duration<double>(value).count());
+        } else {
+            detail::write_duration(w, detail::whole_of(value));
+        }
+    }
+    static bool read(json_reader& r, duration& value) {
+        if constexpr (std::is_floating_point_v<Rep>) {
+            double seconds = 0;
+            if (!detail::read_duration(r, seconds)) {
+                return false;
+            }
+            value = duration(std::chrono::duration<double>(seconds));
+            return true;
+        } else {
+            detail::whole_time whole;
+            return detail::read_duration(r, whole) && detail::from_whole(r, whole, value);
+        }
+    }
+};
+
+template <class Duration>
+struct converter<std::chrono::time_point<std::chrono::system_clock, Duration>> {
+    using time_point = std::chrono::time_point<std::chrono::system_clock, Duration>;
+    static constexpr bool is_scalar = true;
+
+    static void write(json_writer& w, const time_point& value) {
+        detail::write_time_point(w, detail::whole_of(value.time_since_epoch()));
+    }
+    static bool read(json_reader& r, time_point& value) {
+        detail::whole_time whole;
+        Duration since{};
+        if (!detail::read_time_point(r, whole) || !detail::from_whole(r, whole, since)) {
+            return false;
+        }
+        value = time_point{since};
+        return true;
+    }
+};
+
+} // namespace cles

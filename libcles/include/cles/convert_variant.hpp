@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/convert.hpp>
+
+#include <string>
+#include <string_view>
+#include <utility>
+#include <variant>
+
+/// Conversion of `std::variant`; comes with `<cles/convert.hpp>`.
+///
+/// A variant is written as the value that it holds, with nothing around it, and read as the first of its alternatives
+/// that fits: put the one that asks for more before the one that asks for less. `std::monostate` is null.
+
+namespace cles {
+
+template <>
+struct converter<std::monostate> {
+    static constexpr bool is_scalar = true;
+    static void write(json_writer& w, const std::monostate&) { w.null(); }
+    static bool read(json_reader& r, std::monostate&) { return r.read_null(); }
+};
+
+template <class... T>
+struct converter<std::variant<T...>> {
+    using variant = std::variant<T...>;
+
+    static void write(json_writer& w, const variant& value) {
+        std::visit([&w](const auto& held) { write_json(w, held); }, value);
+    }
+    static bool read(json_reader& r, variant& value) {
+        std::string_view raw;
+        if (!r.read_raw(raw)) {
+            return false;
+        }
+        std::string why;
+        return try_each(raw, value, why, std::index_sequence_for<T...>{}) || r.fail("fits no alternative: " + why);
+    }
+
+  private:
+    template <std::size_t... I>
+    static bool try_each(std::string_view raw, variant& value, std::string& why, std::index_sequence<I...>) {
+        return (try_one<I>(raw, value, why) || ...);
+    }
+    template <std::size_t I>
+    static bool try_one(std::string_view raw, variant& value, std::string& why) {
+        json_reader part{raw, std::string_view::npos}; // it has been checked
+        if (read_json(part, value.template emplace<I>())) {
+            return true;
+        }
+        const auto wrong = part.error();
+        why.append(why.empty() ? "" : "; ").append(wrong, 0, wrong.rfind(" (at byte"));
+        return false;
+    }
+};
+
+} // namespace cles

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/convert.hpp>
+#include <cles/request.hpp>
+#include <cles/responder.hpp>
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/callable_traits/args.hpp>
+#include <boost/callable_traits/return_type.hpp>
+
+#include <cstddef>
+#include <tuple>
+#include <type_traits>
+
+/// What a handler takes and gives, and one readable line where it cannot be one. Not for applications.
+
+namespace cles::detail {
+
+template <class T>
+struct awaited {
+    static constexpr bool is_awaitable = false;
+    static constexpr bool is_ours = true;
+    using type = T;
+};
+template <class T, class E>
+struct awaited<boost::asio::awaitable<T, E>> {
+    static constexpr bool is_awaitable = true;
+    static constexpr bool is_ours = std::is_same_v<E, boost::asio::any_io_executor>;
+    using type = T;
+};
+
+/// How a handler wants its arguments: (), (request), (body), (request, body), (request, responder).
+template <class F>
+struct handler_shape {
+    using arguments = boost::callable_traits::args_t<F, std::tuple>;
+    using result = boost::callable_traits::return_type_t<F>;
+    static constexpr std::size_t arity = std::tuple_size_v<arguments>;
+
+    template <std::size_t I>
+    using argument = std::remove_cvref_t<std::tuple_element_t<I, arguments>>;
+
+    template <std::size_t I, class T>
+    static constexpr bool takes() {
+        if constexpr (I < arity) {
+            return std::is_same_v<argument<I>, T>;
+        } else {
+            return false;
+        }
+    }
+    static constexpr bool takes_request = takes<0, request>();
+    static constexpr bool takes_responder = arity == 2 && takes<1, responder>();
+    static constexpr bool takes_body = arity > (takes_request ? 1 : 0) && !takes_responder;
+    static constexpr bool is_coroutine = awaited<result>::is_awaitable;
+};
+
+template <class F>
+concept one_signature = (std::is_pointer_v<F> && std::is_function_v<std::remove_pointer_t<F>>) || requires {
+    &F::operator();
+};
+
+// A class that inherits two call operators names neither.
+struct a_call_operator {
+    void operator()();
+};
+template <class F>
+struct one_more_call_operator : F, a_call_operator {};
+template <class F>
+concept callable_somehow = std::is_class_v<F> && !std::is_final_v<F> && !requires {
+    &one_more_call_operator<F>::operator();
+};
+
+template <class T>
+inline constexpr bool lends_mutable = std::is_lvalue_reference_v<T> && !std::is_const_v<std::remove_reference_t<T>>;
+
+/// False, with a message for the reader, where the result cannot be an answer.
+template <class Result>
+constexpr bool fits_result() {
+    using value = std::remove_cvref_t<typename awaited<Result>::type>;
+    static_assert(awaited<Result>::is_ours,
+                  "a handler's coroutine is a boost::asio::awaitable of the default executor, any_io_executor");
+    if constexpr (!awaited<Result>::is_ours || std::is_void_v<value>) {
+        return awaited<Result>::is_ours;
+    } else {
+        static_assert(writable<value>, "the handler's result cannot be written as JSON: describe a struct with "
+                                       "BOOST_DESCRIBE_STRUCT, an enum with BOOST_DESCRIBE_ENUM, or specialise "
+                                       "cles::converter (see <cles/convert.hpp>)");
+        return writable<value>;
+    }
+}
+
+template <class F>
+constexpr bool fits_body() {
+    using shape = handler_shape<F>;
+    using argument = std::tuple_element_t<shape::arity - 1, typename shape::arguments>;
+    using body = std::remove_cvref_t<argument>;
+    constexpr bool dangles = shape::is_coroutine && std::is_reference_v<argument>;
+    constexpr bool readable_body = readable<body>;
+    constexpr bool made_first = std::is_default_constructible_v<body>;
+    static_assert(!dangles, "a coroutine takes its body by value: a reference would dangle once it waits");
+    static_assert(readable_body, "the handler's argument cannot be read from JSON: describe a struct with "
+                                 "BOOST_DESCRIBE_STRUCT, an enum with BOOST_DESCRIBE_ENUM, or specialise "
+                                 "cles::converter (see <cles/convert.hpp>)");
+    static_assert(made_first || !readable_body,
+                  "the type of a handler's body needs a default constructor: it is made first, and then read");
+    return !dangles && readable_body && made_first;
+}
+
+/// False, with a message for the reader, where a function object cannot be a handler.
+template <class F>
+constexpr bool fits_handler() {
+    if constexpr (one_signature<F>) {
+        using shape = handler_shape<F>;
+        constexpr bool known =
+            shape::arity <= 2 && (shape::arity < 2 || shape::takes_request) && !shape::template takes<0, responder>();
+        static_assert(known, "a handler takes (), (const cles::request&), (body), (const cles::request&, body) or "
+                             "(const cles::request&, cles::responder)");
+        if constexpr (known) {
+            constexpr bool lends = []<class... A>(std::tuple<A...>*) {
+                return (lends_mutable<A> || ...);
+            }(static_cast<typename shape::arguments*>(nullptr));
+            static_assert(!lends, "a handler takes its arguments by value or by reference to const");
+            if constexpr (lends) {
+                return false;
+            } else if constexpr (shape::takes_responder && shape::is_coroutine) {
+                using result = typename awaited<typename shape::result>::type;
+                using answer = std::tuple_element_t<1, typename shape::arguments>;
+                constexpr bool fits = std::is_void_v<result> && !std::is_reference_v<answer>;
+                static_assert(fits, "a coroutine with a responder answers through it: it is an awaitable<void>, and "
+                                    "takes the responder by value");
+                return fits && fits_result<typename shape::result>();
+            } else if constexpr (shape::takes_responder) {
+                return true;
+            } else if constexpr (shape::takes_body) {
+                return fits_body<F>() && fits_result<typename shape::result>();
+            } else {
+                return fits_result<typename shape::result>();
+            }
+        } else {
+            return false;
+        }
+    } else {
+        constexpr bool many = callable_somehow<F>;
+        constexpr bool member = std::is_member_pointer_v<F>;
+        static_assert(!many, "the handler's arguments are not known, since its call operator is a template (an 'auto' "
+                             "parameter) or overloaded: write the types, as [](const cles::request&, position)");
+        static_assert(!member, "a member function is no handler without its object: use a lambda, as "
+                               "[this](position to) { return steer(to); }");
+        static_assert(many || member, "the handler is not callable: it is a function, a lambda or an object with a "
+                                      "call operator");
+        return false;
+    }
+}
+
+} // namespace cles::detail

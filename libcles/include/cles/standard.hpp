@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+/// Stops a compiler of another language standard at the first line, before it reports every line that it cannot read.
+
+#if __cplusplus < 202002L
+#error CLES needs C++20: compile with -std=c++20 or later (CMake: target_compile_features(... cxx_std_20))
+#define CLES_END_HERE "nothing more is compiled"
+#include CLES_END_HERE
+#endif
