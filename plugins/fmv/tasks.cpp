@@ -74,6 +74,7 @@ found look(kept_stream& at, const frame_message& what, grey frame, shop& counts)
 
 void process(const cles::request& asked, const cles::responder& answer, shop& here) {
     const auto begun = steady::now();
+    const auto left = asked.deadline() - cles::time_point::clock::now();
     try {
         const auto what = asked.as<frame_message>();
         const auto size = checked(what);
@@ -100,7 +101,7 @@ void process(const cles::request& asked, const cles::responder& answer, shop& he
         mine.unlock(); // the next frame may come as soon as this one is answered
         out.node = asked.node();
         const auto whole = milliseconds{static_cast<double>(what.deadline_ms)};
-        out.queue_ms = std::max(0.0, (whole - milliseconds{asked.deadline() - begun}).count());
+        out.queue_ms = std::max(0.0, (whole - milliseconds{left}).count());
         out.run_ms = milliseconds{steady::now() - begun}.count();
         answer.done(out);
     } catch (const error&) {

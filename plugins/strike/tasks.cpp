@@ -61,6 +61,7 @@ void check(const order& what, double age, const aircraft& own) {
 
 void carry_out(const cles::request& asked, const cles::responder& answer, aircraft& own) {
     const auto begun = steady::now();
+    const auto left = asked.deadline() - cles::time_point::clock::now();
     const auto what = asked.as<order>();
     const std::scoped_lock guard{own.lock};
     const double now = utc_now();
@@ -85,7 +86,7 @@ void carry_out(const cles::request& asked, const cles::responder& answer, aircra
                         .impact_utc = now + hit->after_s,
                         .flight_s = hit->after_s,
                         .left = own.weapons.left(),
-                        .queue_ms = std::max(0.0, (whole - milliseconds{asked.deadline() - begun}).count()),
+                        .queue_ms = std::max(0.0, (whole - milliseconds{left}).count()),
                         .run_ms = milliseconds{steady::now() - begun}.count()});
 }
 

@@ -15,7 +15,7 @@
 namespace cles::runtime {
 namespace {
 
-using clock = std::chrono::steady_clock;
+using clock = time_point::clock;
 
 constexpr std::size_t most_workers = 1024;
 constexpr std::int64_t longest_told = 1'000'000'000; // microseconds
@@ -40,7 +40,7 @@ crew::crew(const pool_options& options, result_box& box)
 
 bool crew::wants_worker() const noexcept {
     // Those that are awake and have no job yet are about to take one.
-    return !ended_ && awake_ < watch_.allowed() && queue_.size() > awake_ - at_work_;
+    return !ended_ && !held_ && awake_ < watch_.allowed() && queue_.size() > awake_ - at_work_;
 }
 
 void crew::mirror() noexcept {
@@ -67,16 +67,16 @@ crew::admission crew::push(job_record& job) {
     return wants_worker() ? admission::wants_workers : admission::queued;
 }
 
-void crew::resume(job_record& job, std::function<void()> part) {
+bool crew::resume(job_record& job, std::function<void()> part) {
     bool wanted = false;
     {
         const std::lock_guard lock{mutex_};
         if (ended_) {
-            return;
+            return false;
         }
         job.called_back.push_back(std::move(part));
         if (job.where != job_record::place::nowhere) {
-            return; // it comes to it
+            return true; // it comes to it
         }
         job.add_reference();
         job.where = job_record::place::queued;
@@ -88,6 +88,7 @@ void crew::resume(job_record& job, std::function<void()> part) {
     if (wanted) {
         enlist();
     }
+    return true;
 }
 
 bool crew::take_back(job_record& job) {
@@ -99,6 +100,19 @@ bool crew::take_back(job_record& job) {
     job.where = job_record::place::nowhere;
     mirror();
     return true;
+}
+
+void crew::hold() noexcept {
+    const std::lock_guard lock{mutex_};
+    held_ = !closed_;
+}
+
+void crew::release() {
+    {
+        const std::lock_guard lock{mutex_};
+        held_ = false;
+    }
+    wake();
 }
 
 void crew::hurry(const job_record& job, time_point now) {
@@ -113,6 +127,7 @@ void crew::close(const std::function<void(job_record&)>& dropped) {
     {
         const std::lock_guard lock{mutex_};
         closed_ = true;
+        held_ = false;
         std::vector<job_record*> begun;
         while (auto* next = queue_.pop()) {
             auto& job = static_cast<job_record&>(*next);
@@ -134,7 +149,7 @@ void crew::close(const std::function<void(job_record&)>& dropped) {
 }
 
 std::size_t crew::join(std::chrono::milliseconds limit) {
-    const auto end = clock::now() + limit;
+    const auto end = std::chrono::steady_clock::now() + limit;
     wake();
     {
         std::unique_lock lock{mutex_};
@@ -142,8 +157,8 @@ std::size_t crew::join(std::chrono::milliseconds limit) {
         at_rest_.wait_for(lock, last_turn, [this] { return queue_.empty() || at_work_ >= watch_.allowed(); });
         ended_ = true;
     }
-    const auto left =
-        threads_.stop(std::max(std::chrono::ceil<std::chrono::milliseconds>(end - clock::now()), {}), running());
+    const auto time_left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+    const auto left = threads_.stop(std::max(time_left, {}), running());
     if (left == 0) {
         drop_called_back();
     }
@@ -206,6 +221,14 @@ void crew::part_with(job_record* job, bool may_keep, streak& so_far, time_point 
     }
 }
 
+// With the lock: a job that the worker has taken, but must not begin.
+void crew::put_back(job_record& job) {
+    job.begun = false;
+    job.where = job_record::place::queued;
+    queue_.push_begun(job); // the next one of its requester, as it was
+    held_ = !closed_;
+}
+
 void crew::work() {
     std::vector<std::function<void()>> parts;
     job_record* done = nullptr;
@@ -215,7 +238,8 @@ void crew::work() {
     std::unique_lock lock{mutex_};
     const auto place = watch_.enter();
     auto now = clock::now();
-    while (awake_ <= watch_.allowed()) {
+    bool missed = false;
+    while (awake_ <= watch_.allowed() && !held_) {
         auto* next = queue_.pop();
         if (next == nullptr) {
             break;
@@ -237,23 +261,30 @@ void crew::work() {
 
         part_with(done, may_keep_last, so_far, now, parts);
         here.may_keep = so_far.begin(job.task(), more_wait, usual, now);
-        if (begins) {
-            job.run();
+        missed = begins && !job.begin(executor_due_.load(std::memory_order_relaxed));
+        if (!missed) {
+            for (const auto& part : now_due) {
+                job.run(part);
+            }
+            parts.swap(now_due);
         }
-        for (const auto& part : now_due) {
-            job.run(part);
-        }
-        parts.swap(now_due);
 
         const auto ended = clock::now();
         if (here.kept) {
             so_far.keep(ended);
         }
         lock.lock();
-        service_time_.add(ended - now);
-        now = ended;
         --at_work_;
         figures_.revived += watch_.end(place) ? 1 : 0;
+        if (missed) {
+            done = nullptr;
+            put_back(job);
+            missed = held_;
+            mirror();
+            continue;
+        }
+        service_time_.add(ended - now);
+        now = ended;
         done = &job;
         job.where = job_record::place::nowhere;
         if (!job.called_back.empty()) {
@@ -271,6 +302,9 @@ void crew::work() {
     lock.unlock();
     part_with(done, false, so_far, now, parts);
     job_record::set_at_work(nullptr);
+    if (missed) {
+        missed_();
+    }
 }
 
 void crew::watch(time_point now, const std::function<void(const worker_watch::finding&, const job_record&)>& found) {

@@ -36,8 +36,12 @@ class crew {
     crew& operator=(const crew&) = delete;
     ~crew() = default;
 
-    /// To be called first, with what keeps this alive while a worker is in it.
-    void start(std::weak_ptr<crew> self) { self_ = std::move(self); }
+    /// To be called first, with what keeps this alive while a worker is in it. \param missed called on a worker which
+    /// has found that the executor is late (`expect_executor`) and that no job begins until `release`
+    void start(std::weak_ptr<crew> self, std::function<void()> missed) {
+        self_ = std::move(self);
+        missed_ = std::move(missed);
+    }
 
     // From the service's executor:
     enum class admission : std::uint8_t {
@@ -52,6 +56,15 @@ class crew {
     void wake();
     /// Takes out a job that has not begun. False where it has.
     bool take_back(job_record& job);
+    /// The executor will have been back by then. Where it has not, the process was stopped, or the executor held up:
+    /// then workers know of no withdrawal that came meanwhile, and begin no job.
+    void expect_executor(time_point until) noexcept { executor_due_.store(until, std::memory_order_relaxed); }
+    [[nodiscard]] bool executor_is_late(time_point now) const noexcept {
+        return now > executor_due_.load(std::memory_order_relaxed);
+    }
+    /// No job begins, and nothing is called back, until `release`.
+    void hold() noexcept;
+    void release();
     /// A job that is to stop had better end soon.
     void hurry(const job_record& job, time_point now);
     /// Calls `found` for each worker that has become stuck, once replacements are at work.
@@ -64,8 +77,8 @@ class crew {
     std::size_t join(std::chrono::milliseconds limit);
 
     // From anywhere:
-    /// Has a part of a job that has begun run when it is its turn; dropped after `join`.
-    void resume(job_record& job, std::function<void()> part);
+    /// Has a part of a job that has begun run when it is its turn. False after `join`: it is dropped.
+    bool resume(job_record& job, std::function<void()> part);
 
     [[nodiscard]] std::uint32_t queued() const noexcept { return queued_.load(std::memory_order_relaxed); }
     [[nodiscard]] std::uint32_t running() const noexcept { return running_.load(std::memory_order_relaxed); }
@@ -86,6 +99,7 @@ class crew {
     void part_with(job_record* job, bool may_keep, streak& so_far, time_point now,
                    std::vector<std::function<void()>>& dropped);
     void enlist();
+    void put_back(job_record& job);
     void drop_called_back();
     [[nodiscard]] bool wants_worker() const noexcept;
     void mirror() noexcept;
@@ -93,6 +107,8 @@ class crew {
     result_box& box_;
     worker_threads threads_;
     std::weak_ptr<crew> self_;
+    std::function<void()> missed_;
+    std::atomic<time_point> executor_due_{time_point::max()};
     mutable brief_mutex mutex_; // of all that follows
     job_queue queue_;
     worker_watch watch_;
@@ -100,6 +116,7 @@ class crew {
     std::uint32_t at_work_ = 0;
     service_time service_time_;
     figures figures_;
+    bool held_ = false;   // nothing does, for now
     bool closed_ = false; // no job begins
     bool ended_ = false;  // nothing is called back
     std::condition_variable_any at_rest_;

@@ -41,6 +41,7 @@ pool_options pool_options_of(const config& setup, const daemon_log& log) {
     options.queue = setup.queue;
     options.replacements = setup.replacements;
     options.grace = std::chrono::ceil<milliseconds>(setup.stuck_after);
+    options.look_in = 250ms;
     options.log = log.sink();
     return options;
 }

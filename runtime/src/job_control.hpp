@@ -26,6 +26,7 @@ class job_control final : public detail::call_control {
     }
     void log(log_level level, std::string_view text) override { job_.log(level, text); }
     [[nodiscard]] boost::asio::any_io_executor executor() const override { return job_.executor(); }
+    [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
 
   private:
     job_context job_;

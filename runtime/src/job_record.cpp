@@ -28,6 +28,7 @@ void job_record::open(std::shared_ptr<pool_state> pool) {
     answered_.store(false, std::memory_order_relaxed);
     stopped_.store(false, std::memory_order_relaxed);
     unheard_.store(false, std::memory_order_relaxed);
+    listens_.store(false, std::memory_order_relaxed);
     written_ = begun = awaited_ = false;
 }
 
@@ -85,7 +86,18 @@ bool job_record::claim() noexcept {
         pool_->counts().answered_twice.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
+    if (listens_.load(std::memory_order_acquire)) {
+        forget_on_stop();
+    }
     return true;
+}
+
+// A job that has answered is not told any more, and what it left for that goes here, where the job is at home, rather
+// than on the executor.
+void job_record::forget_on_stop() noexcept {
+    std::function<void()> dropped;
+    const std::lock_guard lock{mutex_};
+    dropped.swap(on_stop_);
 }
 
 void job_record::publish() noexcept {
@@ -177,6 +189,7 @@ void job_record::on_stop(std::function<void()> callback) {
         const std::lock_guard lock{mutex_};
         if (!stopped()) {
             on_stop_.swap(callback);
+            listens_.store(true, std::memory_order_release);
             return;
         }
     }
@@ -199,11 +212,19 @@ boost::asio::any_io_executor job_record::executor() const { return pool_->execut
 
 // -- work ----------------------------------------------------------------------------------------------------------
 
-void job_record::run() noexcept {
+bool job_record::begin(time_point listening_until) noexcept {
     try {
+        const auto now = time_point::clock::now();
         if (stopped()) { // while its worker took it
             fail(errc::cancelled, "nobody waits for it any more");
-            return;
+            return true;
+        }
+        if (const auto due = request().deadline(); due != time_point{} && due <= now) {
+            fail(errc::deadline, "its time was over before it began");
+            return true;
+        }
+        if (now > listening_until) {
+            return false;
         }
         // It borrows the worker's reference.
         struct lent {
@@ -216,6 +237,7 @@ void job_record::run() noexcept {
         pool_->counts().threw.fetch_add(1, std::memory_order_relaxed);
         fail(std::current_exception());
     }
+    return true;
 }
 
 void job_record::run(const std::function<void()>& part) noexcept {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/error.hpp>
+#include <cles/limits.hpp>
 #include <cles/responder.hpp>
 
 #include "brief_mutex.hpp"
@@ -57,8 +58,10 @@ class job_record final : public job_queue::item {
     /// It has written it, and will settle.
     void set_written() noexcept { written_ = true; }
 
-    /// Runs the job's beginning, or a part of it that was called back, on a worker.
-    void run() noexcept;
+    /// Runs the job's beginning on a worker, unless nobody waits for it any more or its time is over. False where the
+    /// executor, which would know of a withdrawal, was to be back by a time that has passed: then nothing has been done.
+    [[nodiscard]] bool begin(time_point listening_until) noexcept;
+    /// Runs a part of it that was called back, on a worker.
     void run(const std::function<void()>& part) noexcept;
     /// The worker has let go of everything else: it answers where it has written, and lets go of the job. True where
     /// there was a result, which `may_keep` has fetched when the executor comes by.
@@ -98,6 +101,7 @@ class job_record final : public job_queue::item {
     };
 
     [[nodiscard]] bool claim() noexcept;
+    void forget_on_stop() noexcept;
     void publish() noexcept;
 
     // -- everybody's -----------------------------------------------------------------------------------------------
@@ -105,6 +109,7 @@ class job_record final : public job_queue::item {
     std::atomic<bool> answered_{false}; // whoever sets it writes the result
     std::atomic<bool> stopped_{false};
     std::atomic<bool> unheard_{false}; // nobody wants its progress
+    std::atomic<bool> listens_{false}; // to be told that it is stopped
     brief_mutex mutex_;                // of the next two
     std::vector<report> reports_;
     std::function<void()> on_stop_;

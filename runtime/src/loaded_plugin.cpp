@@ -10,6 +10,7 @@
 #include <chrono>
 #include <exception>
 #include <memory>
+#include <thread>
 #include <utility>
 
 namespace cles::runtime {
@@ -143,9 +144,10 @@ struct loaded_plugin::from_plugin {
     }
 };
 
-loaded_plugin::loaded_plugin(const cles_plugin& description, std::string node, plugin_jobs& jobs, plugin_log log)
+loaded_plugin::loaded_plugin(const cles_plugin& description, std::string node, plugin_jobs& jobs,
+                             stop_notifier& notifier, plugin_log log)
     : description_(description), name_(view_of(description.name)), version_(view_of(description.version)),
-      node_(std::move(node)), jobs_(jobs), log_(std::move(log)), host_{.face = {.size = sizeof(cles_host),
+      node_(std::move(node)), jobs_(jobs), notifier_(notifier), log_(std::move(log)), host_{.face = {.size = sizeof(cles_host),
                                                                                 .abi_minor = CLES_PLUGIN_ABI_MINOR,
                                                                                 .node = abi_text(node_),
                                                                                 .add_task = &from_plugin::add_task,
@@ -290,7 +292,13 @@ void loaded_plugin::run(const task& t, const request& what, const responder& ans
     if (job == 0) {
         refuse_job();
     }
-    answer.on_stop([jobs = &jobs_, job] { jobs->stop(job); });
+    if (!answer.is_thread_safe()) { // others are told by their pool
+        answer.on_stop([this, job] {
+            if (const auto wanted = jobs_.stop(job)) {
+                call_elsewhere(wanted);
+            }
+        });
+    }
     call_start(t, what, job);
     jobs_.started(job);
 }
@@ -331,7 +339,8 @@ void loaded_plugin::call_start(const task& t, const request& what, plugin_jobs::
 }
 
 void loaded_plugin::delegate(plugin_jobs::id job, std::string_view command, const cles_ask& ask) {
-    const auto question = std::make_shared<plugin_question>(ask);
+    const auto question = std::make_shared<plugin_question>(
+        ask, [this](std::function<void()> answer) { call_elsewhere(std::move(answer)); });
     auto options = call_options{}.urgent(ask.urgent != 0).at(view_of(ask.at));
     if (ask.deadline_ms > 0) {
         options.deadline(std::chrono::milliseconds{ask.deadline_ms});
@@ -347,6 +356,18 @@ void loaded_plugin::delegate(plugin_jobs::id job, std::string_view command, cons
     });
     if (!sent) {
         question->answer(errc::cancelled, "{}", "nobody waits for the job that asks");
+    } else if (question.use_count() == 1) { // nobody is left who could answer
+        question->answer(errc::unavailable, "{}", "the node has stopped");
+    }
+    question->asked();
+}
+
+// The plugin's code may take its time, or hold a lock that this thread has.
+void loaded_plugin::call_elsewhere(std::function<void()> callback) {
+    const auto shared = std::make_shared<const std::function<void()>>(std::move(callback));
+    if (!notifier_.notify({.callback = [shared] { (*shared)(); },
+                           .log = [this](log_level level, const std::string& text) { say(level, text); }})) {
+        std::thread{[shared] { (*shared)(); }}.detach(); // the host has stopped
     }
 }
 

@@ -7,6 +7,7 @@
 #include <cles/registrar.hpp>
 
 #include "plugin_jobs.hpp"
+#include "stop_notifier.hpp"
 
 #include <atomic>
 #include <cstdint>
@@ -30,7 +31,8 @@ using plugin_log = std::function<void(log_level, std::string_view plugin, std::s
 class loaded_plugin {
   public:
     /// The description has been checked.
-    loaded_plugin(const cles_plugin& description, std::string node, plugin_jobs& jobs, plugin_log log);
+    loaded_plugin(const cles_plugin& description, std::string node, plugin_jobs& jobs, stop_notifier& notifier,
+                  plugin_log log);
     loaded_plugin(const loaded_plugin&) = delete;
     loaded_plugin& operator=(const loaded_plugin&) = delete;
     ~loaded_plugin() = default;
@@ -73,6 +75,7 @@ class loaded_plugin {
     void run(const task& t, const request& what, const responder& answer);
     void call_start(const task& t, const request& what, plugin_jobs::id job) const;
     void delegate(plugin_jobs::id job, std::string_view command, const cles_ask& ask);
+    void call_elsewhere(std::function<void()> callback);
     void say(log_level level, std::string_view text) const;
     void note_unknown();
 
@@ -81,6 +84,7 @@ class loaded_plugin {
     const std::string version_;
     const std::string node_;
     plugin_jobs& jobs_;
+    stop_notifier& notifier_;
     mutable std::mutex log_mutex_;
     plugin_log log_;
     host_functions host_;

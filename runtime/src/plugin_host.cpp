@@ -96,6 +96,7 @@ void check(const std::string& path, const cles_plugin& described) {
 
 struct plugin_host::state {
     plugin_jobs jobs;
+    stop_notifier notifier; ///< for jobs in line; a pool has its own
     std::vector<std::unique_ptr<loaded_plugin>> plugins;
     std::vector<boost::dll::shared_library> libraries;
     std::vector<const cles_plugin*> descriptions; ///< of those that were loaded, to know one again
@@ -127,7 +128,8 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
         throw plugin_error(path, "it is loaded already");
     }
     auto owned =
-        std::make_unique<loaded_plugin>(detail::known_part(&described), options_.node, state_->jobs, options_.log);
+        std::make_unique<loaded_plugin>(detail::known_part(&described), options_.node, state_->jobs, state_->notifier,
+                                        options_.log);
     auto& plugin = *owned;
     state_->libraries.push_back(std::move(library));
     state_->plugins.push_back(std::move(owned));
@@ -173,12 +175,14 @@ std::vector<std::string> plugin_host::stop(std::chrono::milliseconds limit) {
     }
     auto told =
         state_->jobs.close([&](const responder& to) { to.fail(errc::unavailable, options_.node + " has stopped"); });
-    // A plugin's code may take its time, or never return: it runs where nobody has to wait for it.
-    std::thread{[state = state_, told = std::move(told)]() mutable {
-        for (auto& callback : told) {
-            callback();
+    for (auto& callback : told) {
+        if (callback) {
+            state_->notifier.notify({.callback = std::move(callback)});
         }
-        told.clear();
+    }
+    // A plugin's code may take its time, or never return: it runs where nobody has to wait for it.
+    std::thread{[state = state_, limit] {
+        state->notifier.end(limit / 2); // one that blocks does not keep the plugins from stopping
         for (auto left = state->plugins.size(); left > 0; --left) {
             state->plugins[left - 1]->stop();
         }

@@ -66,6 +66,7 @@ plugin_jobs::id plugin_jobs::open(responder answer) {
         s.generation = 1; // 0 would make the handle 0 in the first slot
     }
     s.stopped = false;
+    s.anywhere = answer.is_thread_safe();
     s.starter = std::this_thread::get_id();
     s.answer.emplace(std::move(answer));
     ++open_;
@@ -140,10 +141,13 @@ bool plugin_jobs::use(id job, std::function<void(const responder&)> use) {
 bool plugin_jobs::stopped(id job) const {
     const std::scoped_lock lock{mutex_};
     const auto* s = find(job);
-    return s == nullptr || s->stopped;
+    return s == nullptr || s->stopped || (s->anywhere && s->answer->stopped());
 }
 
 void plugin_jobs::on_stop(id job, plugin_callback callback) {
+    shared_callback wanted{std::move(callback)};
+    shared_callback replaced; // goes without the lock
+    std::optional<responder> by;
     {
         const std::scoped_lock lock{mutex_};
         auto* s = find(job);
@@ -151,30 +155,35 @@ void plugin_jobs::on_stop(id job, plugin_callback callback) {
             return;
         }
         if (!s->stopped) {
-            std::swap(s->on_stop, callback); // what was there goes without the lock
-            return;
+            if (s->anywhere) {
+                by = s->answer;
+            }
+            replaced = std::exchange(s->on_stop, wanted);
+            if (!by) {
+                wanted = {}; // `stop` hands it out
+            }
         }
     }
-    callback();
+    if (by) {
+        by->on_stop([wanted] { wanted(); });
+    } else {
+        wanted();
+    }
 }
 
-void plugin_jobs::stop(id job) {
-    plugin_callback told;
-    {
-        const std::scoped_lock lock{mutex_};
-        auto* s = find(job);
-        if (s == nullptr) {
-            return;
-        }
-        s->stopped = true;
-        told = std::move(s->on_stop);
+shared_callback plugin_jobs::stop(id job) {
+    const std::scoped_lock lock{mutex_};
+    auto* s = find(job);
+    if (s == nullptr) {
+        return {};
     }
-    told();
+    s->stopped = true;
+    return std::exchange(s->on_stop, {});
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------
 
-std::vector<plugin_callback> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
+std::vector<shared_callback> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
     std::vector<slot> gone;
     {
         const std::scoped_lock lock{mutex_};
@@ -185,7 +194,7 @@ std::vector<plugin_callback> plugin_jobs::close(const std::function<void(const r
             }
         }
     }
-    std::vector<plugin_callback> told;
+    std::vector<shared_callback> told;
     for (auto& s : gone) {
         answer(*s.answer);
         told.push_back(std::move(s.on_stop));

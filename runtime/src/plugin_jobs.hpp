@@ -4,9 +4,11 @@
 #include <cles/error.hpp>
 #include <cles/responder.hpp>
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string_view>
@@ -41,14 +43,38 @@ class plugin_callback {
     void* user_ = nullptr;
 };
 
+/// A callback that several may call, of whom the first does.
+class shared_callback {
+  public:
+    shared_callback() = default;
+    explicit shared_callback(plugin_callback what) : inside_(std::make_shared<inside>(std::move(what))) {}
+
+    void operator()() const {
+        if (inside_ && !inside_->called.exchange(true)) {
+            inside_->what();
+        }
+    }
+    [[nodiscard]] explicit operator bool() const noexcept { return inside_ != nullptr; }
+
+  private:
+    struct inside {
+        explicit inside(plugin_callback w) : what(std::move(w)) {}
+        plugin_callback what;
+        std::atomic<bool> called{false};
+    };
+    std::shared_ptr<inside> inside_;
+};
+
 /// The jobs of plugins that have not been answered, by their handles.
 ///
 /// What a plugin holds is a number, never a pointer: where it answers twice, or what never was, the number names
 /// nothing, which is counted.
 ///
-/// A responder belongs to an executor, a plugin answers from any thread. While a task's `start` runs, its own thread
-/// may use the responder, as whoever called it does; from elsewhere, what a plugin says is posted. All functions may be
-/// called from any thread, but for `close`, which belongs on the executor of all the responders.
+/// A plugin answers from any thread. The responder of a job on a pool of workers is used right there; it knows by itself
+/// whether it is stopped, and has its callback called. That of a job in line belongs to an executor: while a task's
+/// `start` runs, its own thread may use it, as whoever called it does; from elsewhere, what a plugin says is posted, and
+/// whoever registers the job calls `stop`. All functions may be called from any thread, but for `close`, which belongs on
+/// the executor of all the responders.
 class plugin_jobs {
   public:
     using id = std::uint64_t;
@@ -72,12 +98,13 @@ class plugin_jobs {
     [[nodiscard]] bool stopped(id job) const;
     /// Has it called when nobody waits any more; at once where that is so.
     void on_stop(id job, plugin_callback callback);
-    /// Nobody waits for it any more.
-    void stop(id job);
+    /// Nobody waits any more for this job, which is one in line. What it wanted to be called then is returned: call it
+    /// where it may take its time.
+    [[nodiscard]] shared_callback stop(id job);
 
     /// Ends all jobs, by `answer`, and has no further ones. What the plugins wanted to be told then is returned: call
     /// it where it may take its time. After it, nothing is posted.
-    std::vector<plugin_callback> close(const std::function<void(const responder&)>& answer);
+    std::vector<shared_callback> close(const std::function<void(const responder&)>& answer);
 
     [[nodiscard]] std::size_t size() const;
     /// How often a job was answered that was not there.
@@ -87,13 +114,16 @@ class plugin_jobs {
     struct slot {
         std::uint32_t generation = 0;
         bool stopped = false;
+        bool anywhere = false; ///< any thread may use the responder
         std::thread::id starter{};
         std::optional<responder> answer{};
-        plugin_callback on_stop{};
+        shared_callback on_stop{};
     };
     [[nodiscard]] slot* find(id job) noexcept;
     [[nodiscard]] const slot* find(id job) const noexcept;
-    [[nodiscard]] static bool is_direct(const slot& s) noexcept { return s.starter == std::this_thread::get_id(); }
+    [[nodiscard]] static bool is_direct(const slot& s) noexcept {
+        return s.anywhere || s.starter == std::this_thread::get_id();
+    }
     /// Empties the slot; what it held is to be destroyed without the lock.
     slot release(id job);
 

@@ -14,13 +14,18 @@
 namespace cles::runtime {
 
 namespace asio = boost::asio;
-using clock = std::chrono::steady_clock;
+using clock = time_point::clock;
 using namespace std::chrono_literals;
 
 namespace {
 
 // Jobs of one burst past which further workers are woken at once, instead of when the burst has been read.
 constexpr std::size_t most_unwoken = 32;
+
+// When all is read that came during a pause: so many rounds of the executor have brought no job and no withdrawal, or
+// this has taken so long.
+constexpr unsigned most_quiet_rounds = 16;
+constexpr std::chrono::milliseconds longest_reading{250};
 
 std::string seconds(std::chrono::nanoseconds span) {
     const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(span).count() / 100;
@@ -48,7 +53,15 @@ asio::any_io_executor pool_state::executor() const {
     return executor_;
 }
 
-void pool_state::start() { crew_.start(std::shared_ptr<crew>{shared_from_this(), &crew_}); }
+void pool_state::start() {
+    crew_.start(std::shared_ptr<crew>{shared_from_this(), &crew_}, [this] {
+        // Where this fails, the next tick notices.
+        static_cast<void>(box_.put([this] { notice_pause(); }));
+    });
+    if (options_.look_in.count() > 0) {
+        arm_tick();
+    }
+}
 
 void pool_state::say(log_level level, const log_entry& what) const {
     if (options_.log) {
@@ -92,6 +105,8 @@ void pool_state::submit(job what) {
         refuse(what.answer, crew::admission::no_workers);
         return;
     }
+    notice_pause();
+    ++changes_;
     auto& r = take_record();
     r.requester = reinterpret_cast<std::uintptr_t>(&what.what.peer());
     r.request_.keep(what.what, peers_.copy_of(what.what.peer()));
@@ -176,6 +191,7 @@ void pool_state::let_go(job_record& r) {
 // -- stopping ------------------------------------------------------------------------------------------------------
 
 void pool_state::stop(job_record& r) {
+    ++changes_;
     std::function<void()> callback;
     {
         const std::lock_guard lock{r.mutex_};
@@ -193,7 +209,12 @@ void pool_state::stop(job_record& r) {
     crew_.hurry(r, clock::now());
     if (callback) {
         r.add_reference();
-        stop_teller_.tell(job_context{r}, std::move(callback));
+        stop_notifier_.notify({.callback = std::move(callback),
+                               .log = [job = job_context{r}](log_level level, const std::string& text) {
+                                   const auto& what = job.request();
+                                   job.log(level, std::string{to_string(what.verb())} + " '" +
+                                                      std::string{what.task()} + "': " + text);
+                               }});
     }
 }
 
@@ -201,13 +222,20 @@ void pool_state::stop(job_record& r) {
 
 void pool_state::delegate(job_context asks, std::string command, call_options options, answer_callback answered) {
     const auto asked = std::make_shared<answer_callback>(std::move(answered));
-    const auto put = box_.put([this, asks = std::move(asks), command = std::move(command), options, asked] {
+    const auto put = box_.put([this, asks, command = std::move(command), options, asked] {
         const auto& by = asks.record_->answer_;
         onward_.send(asks, by ? &*by : nullptr, command, options, *asked);
     });
-    if (!put) {
-        draining_ ? (*asked)(errc::unavailable, "{}", "the node is stopping")
-                  : (*asked)(errc::busy, "{}", "too much is asked at once");
+    if (put) {
+        return;
+    }
+    // As any other answer: later, and as a part of the job.
+    const auto refuse = [asked, ending = draining_.load()] {
+        ending ? (*asked)(errc::unavailable, "{}", "the node is stopping")
+               : (*asked)(errc::busy, "{}", "too much is asked at once");
+    };
+    if (!crew_.resume(*asks.record_, refuse)) {
+        refuse(); // no worker is left
     }
 }
 
@@ -274,11 +302,15 @@ void pool_state::note_inline(std::string_view task, std::chrono::nanoseconds too
 // -- watching ------------------------------------------------------------------------------------------------------
 
 void pool_state::arm_tick() {
-    if (ticking_ || closed_) {
+    const bool at_work = records_.size() != 0;
+    if (closed_ || (ticking_ && !(idle_tick_ && at_work))) {
         return;
     }
     ticking_ = true;
-    tick_->expires_after(std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms));
+    idle_tick_ = !at_work;
+    tick_span_ = at_work ? std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms) : options_.look_in;
+    expect_tick(clock::now());
+    tick_->expires_after(tick_span_);
     tick_->async_wait([weak = weak_from_this()](boost::system::error_code code) {
         if (const auto self = weak.lock(); self && !code) {
             self->tick();
@@ -291,11 +323,63 @@ void pool_state::tick() {
     if (closed_) {
         return;
     }
+    notice_pause();
     report_stuck();
     collect(); // what went without a word
-    if (records_.size() != 0) {
+    if (records_.size() != 0 || options_.look_in.count() > 0) {
         arm_tick();
     }
+}
+
+// -- pauses --------------------------------------------------------------------------------------------------------
+
+void pool_state::expect_tick(time_point now) {
+    if (options_.look_in.count() > 0) {
+        crew_.expect_executor(now + tick_span_ + options_.late_executor);
+    }
+}
+
+// The process was stopped, or the machine suspended, or a handler held up the executor: whoever asked may have
+// withdrawn meanwhile, which stands in what has not been read.
+void pool_state::notice_pause() {
+    const auto now = clock::now();
+    if (closed_ || !crew_.executor_is_late(now)) {
+        return;
+    }
+    expect_tick(now);
+    if (std::exchange(reading_, true)) {
+        return;
+    }
+    crew_.hold();
+    reading_since_ = now;
+    quiet_rounds_ = 0;
+    changes_before_ = changes_;
+    say(log_level::warning, "this node was stopped or held up for more than " +
+                                seconds(tick_span_ + options_.late_executor) +
+                                ": what came meanwhile is read before a job begins");
+    read_on();
+}
+
+// What is posted comes after what is ready, and after a look for what has become ready.
+void pool_state::read_on() {
+    asio::post(executor_, [weak = weak_from_this()] {
+        if (const auto self = weak.lock(); self && !self->closed_) {
+            self->begin_again();
+        }
+    });
+}
+
+void pool_state::begin_again() {
+    quiet_rounds_ = changes_ == changes_before_ ? quiet_rounds_ + 1 : 0;
+    changes_before_ = changes_;
+    const auto now = clock::now();
+    if (quiet_rounds_ < most_quiet_rounds && now - reading_since_ < longest_reading) {
+        read_on();
+        return;
+    }
+    reading_ = false;
+    expect_tick(now);
+    crew_.release();
 }
 
 void pool_state::report_stuck() {
@@ -396,7 +480,7 @@ void pool_state::close() {
         const std::lock_guard lock{executor_mutex_};
         executor_ = {};
     }
-    const auto left = crew_.join(patience_) + stop_teller_.end(patience_);
+    const auto left = crew_.join(patience_) + stop_notifier_.end(patience_);
     if (left != 0) {
         say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(left));
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/limits.hpp>
 #include <cles/peer.hpp>
 
 #include "crew.hpp"
@@ -15,7 +16,7 @@
 #include "pool_figures.hpp"
 #include "pool_options.hpp"
 #include "result_box.hpp"
-#include "stop_teller.hpp"
+#include "stop_notifier.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -80,6 +81,10 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
 
     void tick();
     void arm_tick();
+    void expect_tick(time_point now);
+    void notice_pause();
+    void read_on();
+    void begin_again();
     void report_stuck();
     void abandon(drain_report& report);
     void follow_drain(bool over);
@@ -92,7 +97,7 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     result_box box_;
     crew crew_;
     onward_requests onward_;
-    stop_teller stop_teller_;
+    stop_notifier stop_notifier_;
 
     job_records records_;
     open_answers answers_;
@@ -107,6 +112,16 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     std::optional<boost::asio::steady_timer> tick_;
     draining drain_;
     bool ticking_ = false;
+    bool idle_tick_ = false; // set while there was no job
+    std::chrono::milliseconds tick_span_{0};
+
+    // While what came during a pause is read.
+    bool reading_ = false;
+    time_point reading_since_;
+    unsigned quiet_rounds_ = 0;
+    std::uint64_t changes_ = 0; // jobs that came and were stopped, so far
+    std::uint64_t changes_before_ = 0;
+
     std::atomic<bool> draining_{false};
     bool closed_ = false;
     std::chrono::milliseconds patience_;

@@ -116,8 +116,8 @@ BOOST_AUTO_TEST_CASE(a_job_is_stopped_once_and_told) {
     const auto job = open();
     BOOST_TEST(!jobs.stopped(job));
     jobs.on_stop(job, c.callback());
-    jobs.stop(job);
-    jobs.stop(job);
+    jobs.stop(job)();
+    jobs.stop(job)();
     BOOST_TEST(jobs.stopped(job));
     BOOST_TEST(c.calls == 1);
     BOOST_TEST(c.drops == 1);
@@ -142,6 +142,43 @@ BOOST_AUTO_TEST_CASE(a_callback_is_dropped_uncalled_when_its_job_is_answered_or_
         BOOST_TEST(c->calls == 0);
         BOOST_TEST(c->drops == 1);
     }
+}
+
+// A job on a pool, whose responder any thread may use.
+class pooled_recorder final : public cles::detail::call_control {
+  public:
+    void done(std::string_view) override { ++answers; }
+    void fail(cles::errc, std::string_view) override { ++answers; }
+    bool progress(double, std::string_view) override { return true; }
+    void on_stop(std::function<void()> callback) override { wanted = std::move(callback); }
+    [[nodiscard]] bool stopped() const noexcept override { return is_stopped; }
+    void delegate(std::string_view, const cles::call_options&, cles::answer_callback) override {}
+    void log(cles::log_level, std::string_view) override {}
+    [[nodiscard]] boost::asio::any_io_executor executor() const override { return {}; }
+    [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
+
+    std::function<void()> wanted;
+    bool is_stopped = false;
+    int answers = 0;
+};
+
+BOOST_AUTO_TEST_CASE(a_job_on_a_pool_is_answered_where_it_answers_and_stops_when_the_pool_says_so) {
+    const auto pooled = std::make_shared<pooled_recorder>();
+    counted c;
+    const auto job = jobs.open(responder{pooled});
+    jobs.started(job);
+    jobs.on_stop(job, c.callback());
+    pooled->is_stopped = true;
+    BOOST_TEST(jobs.stopped(job));
+    // It answers before it is told; it is told all the same, once, though the end would tell it too.
+    elsewhere([&] { BOOST_TEST(jobs.finish(job, done)); });
+    BOOST_TEST(pooled->answers == 1);
+    BOOST_TEST(c.drops == 0);
+    pooled->wanted();
+    pooled->wanted();
+    BOOST_TEST(c.calls == 1);
+    pooled->wanted = nullptr;
+    BOOST_TEST(c.drops == 1);
 }
 
 BOOST_AUTO_TEST_CASE(there_are_so_many_jobs_and_no_more) {

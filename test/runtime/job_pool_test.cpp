@@ -43,7 +43,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_runs_on_a_worker_and_sees_what_was_asked, fixture)
         const auto& r = job.request();
         seen.add(std::string{r.node()} + " " + std::string{r.task()} + " " + std::string{r.parameter(0)} + " " +
                  std::string{r.body()} + " " + r.peer().transport);
-        seen.add(job.deadline() > std::chrono::steady_clock::now() ? "in time" : "late");
+        seen.add(job.deadline() > cles::time_point::clock::now() ? "in time" : "late");
         job.done(R"({"km":3})");
     });
     BOOST_TEST(ask(R"(DELEGATE self:route/fast {"to":"x"})") == R"({"km":3})");

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/boottime_clock.hpp>
+
 #include <chrono>
 #include <cstddef>
 
 namespace cles {
 
-/// Points in time are steady: no clock of the day moves a deadline.
-using time_point = std::chrono::steady_clock::time_point;
+/// Points in time are steady: no clock of the day moves a deadline, and none waits for a machine that is suspended.
+using time_point = boottime_clock::time_point;
 
 /// The bounds within which a service stays, whatever its peers do (docs/protocol.md, "Limits"). Past a count, requests
 /// are answered `busy`; past a size, `too_large`. Behind each is what it may be; a service whose limits are outside of

@@ -125,7 +125,7 @@ typedef struct cles_ask {
     int64_t deadline_ms; /* 0, and at most: what is left of the job's own */
     cles_text at;        /* a link's URL, instead of asking the directory; may be empty */
     /*
-     * Called once, from a thread of the host: also where the job was withdrawn meanwhile ("cancelled") or the node
+     * Called once, from a thread of the host, and never before `delegate` returns: also where the job was withdrawn meanwhile ("cancelled") or the node
      * stops ("unavailable", also after the plugin's `stop`). The job's own code alone can keep it from being called:
      * it comes after `start` of its job, and after callbacks that came first, once these have returned. `code` is
      * empty on success; otherwise the error's name on the wire ("busy", "deadline", "no_task" ...), `json` is {} then,

@@ -85,6 +85,7 @@ class plugin_call final : public call_control {
     [[nodiscard]] boost::asio::any_io_executor executor() const override {
         throw error(errc::failed, "a plugin has no executor");
     }
+    [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
 
   private:
     // A request of this job on its way.

@@ -37,6 +37,8 @@ class call_control {
     virtual void delegate(std::string_view command, const call_options& options, answer_callback answered) = 0;
     virtual void log(log_level level, std::string_view text) = 0;
     [[nodiscard]] virtual boost::asio::any_io_executor executor() const = 0;
+    /// Whether any thread may use it.
+    [[nodiscard]] virtual bool is_thread_safe() const noexcept { return false; }
 };
 
 /// Answers with what the exception says: a `cles::error` with its code, anything else with `failed` and a message that
@@ -84,13 +86,13 @@ class responder {
     }
 
     /// Called once when the requester withdraws, its link is lost or the deadline passes; at once where that has
-    /// happened.
+    /// happened. Where the job waits for others (`delegate`), this comes before what it asked is withdrawn.
     void on_stop(std::function<void()> callback) const { call_->on_stop(std::move(callback)); }
     [[nodiscard]] bool stopped() const noexcept { return call_->stopped(); }
 
     /// Asks others on behalf of this job: any command of the language but BIND, as "PULL car0:speed" or
-    /// "DELEGATE any:route {...}". Returns at once, and calls back once, so that the job holds no thread while it
-    /// waits: keep a copy of the responder in the callback and answer from there.
+    /// "DELEGATE any:route {...}". Returns at once, and calls back once, always later, so that the job holds no thread
+    /// while it waits: keep a copy of the responder in the callback and answer from there.
     ///
     /// The request has what is left of the job's own time, or less where `options` say so, and is withdrawn when the
     /// job is; it then ends with `cancelled`, and so does one of a job that has been answered. Of the options,
@@ -108,6 +110,9 @@ class responder {
     /// The service's executor. There is none in a plugin.
     /// \throws cles::error with `failed` in a plugin
     [[nodiscard]] boost::asio::any_io_executor get_executor() const { return call_->executor(); }
+
+    /// Whether it may be used, and let go of, on any thread: that of a job on a pool of workers, or in a plugin.
+    [[nodiscard]] bool is_thread_safe() const noexcept { return call_->is_thread_safe(); }
 
   private:
     std::shared_ptr<detail::call_control> call_;

@@ -16,12 +16,25 @@ void deadline_timer::follow(const core::deadline_queue& deadlines) {
     }
     set_for_ = next;
     absence_.expect(*next, time_.now());
-    timer_.expires_at(*next);
+    timer_.set(*next);
+    wait();
+}
+
+void deadline_timer::wait() {
+    if (std::exchange(waiting_, true)) {
+        return;
+    }
     timer_.async_wait([self = shared_from_this()](boost::system::error_code code) {
-        if (!code && self->due_) {
-            self->set_for_.reset();
-            self->due_(self->absence_.ended(self->time_.now()));
+        self->waiting_ = false;
+        if (code || !self->due_) {
+            return;
         }
+        if (!self->timer_.take()) { // it was set anew while this was on its way
+            self->wait();
+            return;
+        }
+        self->set_for_.reset();
+        self->due_(self->absence_.ended(self->time_.now()));
     });
 }
 

@@ -4,9 +4,9 @@
 #include "core/absence.hpp"
 #include "core/clock.hpp"
 #include "core/deadlines.hpp"
+#include "shell/boottime_timer.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
-#include <boost/asio/steady_timer.hpp>
 
 #include <functional>
 #include <memory>
@@ -27,11 +27,14 @@ class deadline_timer : public std::enable_shared_from_this<deadline_timer> {
     void stop();
 
   private:
-    boost::asio::steady_timer timer_;
+    void wait();
+
+    boottime_timer timer_;
     const core::clock& time_;
     std::function<void(bool)> due_;
     core::absence absence_;
     std::optional<time_point> set_for_;
+    bool waiting_ = false;
 };
 
 } // namespace cles::shell

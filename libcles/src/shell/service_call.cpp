@@ -6,6 +6,8 @@
 #include "shell/command.hpp"
 #include "shell/engine.hpp"
 
+#include <boost/asio/post.hpp>
+
 #include <algorithm>
 
 namespace cles::shell {
@@ -41,16 +43,30 @@ void service_call::log(log_level level, std::string_view text) {
 
 void service_call::delegate(std::string_view command, const call_options& options, answer_callback answered) {
     const auto by = service_.lock();
+    const auto refuse = [&](errc why, const char* words) { answer_later(std::move(answered), why, words); };
     if (!by || by->stopped()) {
-        answered(errc::stopped, "{}", "the service has been stopped");
+        refuse(errc::stopped, "the service has been stopped");
     } else if (call_->ended()) {
-        answered(errc::cancelled, "{}", "nobody waits for the job that asks");
+        refuse(errc::cancelled, "nobody waits for the job that asks");
     } else if (const auto left = std::chrono::floor<std::chrono::milliseconds>(call_->due() - by->now());
                left.count() <= 0) {
-        answered(errc::deadline, "{}", "the job that asks has no time left");
+        refuse(errc::deadline, "the job that asks has no time left");
     } else {
         send(*by, command, options, std::move(answered), left);
     }
+}
+
+// Not from inside the call that asks: whoever asks may hold a lock, or not have written down yet that it has asked.
+void service_call::answer_later(answer_callback answered, errc why, const char* words) {
+    boost::asio::post(executor_, [weak = weak_from_this(), answered = std::move(answered), why, words] {
+        try {
+            answered(why, "{}", words);
+        } catch (...) {
+            if (const auto self = weak.lock()) {
+                detail::fail_with(*self, std::current_exception());
+            }
+        }
+    });
 }
 
 void service_call::send(detail::engine& by, std::string_view command, const call_options& options,
@@ -98,14 +114,23 @@ void service_call::withdraw_asked() {
     const auto by = service_.lock();
     const auto then = std::exchange(asked_->then, nullptr);
     const auto tickets = std::exchange(asked_->tickets, {});
-    if (by) {
+    const auto withdraw = [&] {
         for (const auto& [key, ticket] : tickets) {
-            by->cancel(ticket);
+            if (by) {
+                by->cancel(ticket);
+            }
         }
+    };
+    // First the job's own: it is to know that it was stopped when what it asked ends for that reason.
+    try {
+        if (then) {
+            then();
+        }
+    } catch (...) {
+        withdraw();
+        throw;
     }
-    if (then) {
-        then();
-    }
+    withdraw();
 }
 
 } // namespace cles::shell

@@ -50,6 +50,7 @@ class service_call final : public detail::call_control, public std::enable_share
     };
     void send(detail::engine& by, std::string_view command, const call_options& options, answer_callback answered,
               std::chrono::milliseconds left);
+    void answer_later(answer_callback answered, errc why, const char* words);
     void follow_stop();
     void withdraw_asked();
 

@@ -2,6 +2,7 @@
 // A plugin whose jobs do what they must not, written against the bare C entry point.
 #include <cles/plugin_abi.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <cstring>
 #include <mutex>
@@ -38,11 +39,18 @@ void invented(void*, cles_job job, const cles_request*) {
     the_host->job_log(the_host, 12345, 99, text("of no job"));
     const cles_callback callback{[](void*) {}, [](void* user) { ++*static_cast<int*>(user); }, new int{0}};
     the_host->on_stop(the_host, 12345, &callback);
-    static int answers = 0;
+    static std::atomic<int> answers{0};
+    static std::thread::id here;
+    here = std::this_thread::get_id();
     cles_ask ask{};
     ask.size = sizeof ask;
-    ask.answered = [](void*, cles_text code, cles_text, cles_text) { answers += string(code) == "cancelled" ? 1 : 0; };
+    ask.answered = [](void*, cles_text code, cles_text, cles_text) {
+        answers += string(code) == "cancelled" && std::this_thread::get_id() != here ? 1 : 2;
+    };
     the_host->delegate(the_host, 12345, text("PULL self:cles"), &ask);
+    while (answers == 0) { // later, and on another thread, also where there is nothing to ask
+        std::this_thread::yield();
+    }
     const int drops = *static_cast<int*>(callback.user);
     delete static_cast<int*>(callback.user);
     const bool all = drops == 1 && answers == 1 && the_host->stopped(the_host, 12345) == 1;

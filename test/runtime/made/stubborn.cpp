@@ -2,11 +2,16 @@
 // A plugin whose tasks do what no task should, and one that is as it should be.
 #include <cles/plugin.hpp>
 
+#include <boost/system/error_code.hpp>
+
 #include <chrono>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
+
+#include <fcntl.h>
+#include <unistd.h>
 
 namespace {
 
@@ -18,7 +23,46 @@ using namespace std::chrono_literals;
     }
 }
 
+// Writes down when it was called, by the clock that Python calls `time.monotonic_ns`; in one piece, whoever else writes.
+void mark(const std::string& file, const std::string& what) {
+    const auto now = std::chrono::steady_clock::now().time_since_epoch();
+    const auto line = what + " " + std::to_string(std::chrono::nanoseconds{now}.count()) + "\n";
+    const int out = ::open(file.c_str(), O_WRONLY | O_APPEND | O_CREAT, 0600);
+    if (out < 0 || ::write(out, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
+        throw std::runtime_error{"there is no file for marks"};
+    }
+    ::close(out);
+}
+
+// What jobs do when they are stopped. Noun: task/file of marks/name.
+void register_stops(cles::registrar& to) {
+    to.on_delegate("listens", [](const cles::request& asked, cles::responder answer) {
+        const std::string file{asked.parameter(0)};
+        const std::string name{asked.parameter(1)};
+        answer.on_stop([answer, file, name] {
+            mark(file, name);
+            answer.fail(cles::errc::cancelled, "stopped");
+        });
+        mark(file, "begun");
+    });
+    to.on_delegate("asks_and_listens", [](const cles::request& asked, cles::responder answer) {
+        const std::string file{asked.parameter(0)};
+        const std::string name{asked.parameter(1)};
+        answer.on_stop([file, name] { mark(file, name); });
+        answer.delegate("DELEGATE self:waits/nothing", [answer, file](boost::system::error_code, auto, auto) {
+            mark(file, answer.stopped() ? "ended" : "ended_and_not_stopped");
+            answer.fail(cles::errc::cancelled, "what was asked has ended");
+        });
+        mark(file, "begun");
+    });
+    to.on_delegate("blocks_when_stopped", [](const cles::request& asked, const cles::responder& answer) {
+        answer.on_stop([answer] { hang(); });
+        mark(std::string{asked.parameter(0)}, "begun");
+    });
+}
+
 void register_tasks(cles::registrar& to) {
+    register_stops(to);
     to.on_pull("quick", [] { return 42; });
     to.on_pull("hangs", [] { hang(); });
     to.on_pull("lingers", [] { std::this_thread::sleep_for(50ms); }, {.inline_ok = true});
