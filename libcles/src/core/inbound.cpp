@@ -319,6 +319,10 @@ std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call:
 }
 
 std::shared_ptr<call> inbound::open_call(const protocol::request_line& r, time_point due, time_point now) {
+    if (const auto why = no_room_to_run(*node_)) {
+        replies_.fail(r, *why);
+        return nullptr;
+    }
     return begin_call(r,
                       {.verb = r.verb,
                        .id = r.id,
@@ -350,10 +354,6 @@ void inbound::answer(call& c, std::string_view json) {
     }
     replies_.done({wanted.id, wanted.wants_reply, wanted.urgent}, json, c.head());
     detach(c);
-    if (const auto why = no_room_to_run(*node_)) {
-        replies_.fail(r, *why);
-        return nullptr;
-    }
 }
 
 void inbound::refuse(call& c, const protocol::failure& why) {
