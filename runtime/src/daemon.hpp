@@ -47,7 +47,9 @@ class daemon {
     void stop(int signal);
     void give_way(std::string_view where);
     void drain();
-    void finish(const drain_report& how);
+    void close(const drain_report& how);
+    void finish();
+    [[nodiscard]] std::chrono::milliseconds time_left() const;
     void reload();
 
     boost::asio::io_context& io_;

@@ -241,9 +241,9 @@ class awaitable_async_op<Signature, cles::detail::deferred_operation<cles::detai
                          Executor> : public awaitable<typename cles::detail::only<T...>::type, Executor> {
   public:
     template <typename Operation, typename... More>
-    awaitable_async_op(Operation&& operation, awaitable_frame_base<Executor>*, const More&...)
+    awaitable_async_op(Operation&& op, awaitable_frame_base<Executor>*, const More&...)
         : awaitable<typename cles::detail::only<T...>::type, Executor>(
-              std::forward<Operation>(operation)(use_awaitable_t<Executor>{})) {}
+              std::forward<Operation>(op)(use_awaitable_t<Executor>{})) {}
 };
 } // namespace detail
 #endif

@@ -4,6 +4,7 @@
 #include <cles/error.hpp>
 #include <cles/limits.hpp>
 #include <cles/pending.hpp>
+#include <cles/update_mark.hpp>
 
 #include "core/backoff.hpp"
 #include "core/deadlines.hpp"
@@ -12,8 +13,10 @@
 #include "core/subscription.hpp"
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -52,7 +55,8 @@ class feed_machine final : public subscription, private deadline, private renewa
 
     /// Binds for the first time. The operation ends with the answer; where it fails, the feed is closed.
     void start(detail::pending_ptr bound);
-    void on_bound(std::string_view last);
+    /// `mark`: which update the last value is, where the publisher says so. Where it is news it is told as one too.
+    void on_bound(std::string_view last, const std::optional<update_mark>& mark = {});
     /// Bound by datagram: for a lease that counts from when the BIND was sent, and is renewed from now on.
     void on_leased(time_point asked, std::chrono::milliseconds lease);
     void on_renewed(time_point asked);
@@ -67,7 +71,6 @@ class feed_machine final : public subscription, private deadline, private renewa
 
     /// The publisher may be bound again: a pause ends.
     void hurry(time_point now);
-    [[nodiscard]] bool is_bound() const noexcept { return state_ == state::bound; }
 
     /// Where its events are fetched.
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
@@ -82,6 +85,7 @@ class feed_machine final : public subscription, private deadline, private renewa
     /// Closes it and leaves telling those who wait to the caller.
     [[nodiscard]] waiting abandon();
     [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
+    [[nodiscard]] bool is_bound() const noexcept override { return state_ == state::bound; }
 
   private:
     enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
@@ -90,9 +94,11 @@ class feed_machine final : public subscription, private deadline, private renewa
     void on_deadline(time_point now) override;
     void renew(time_point until) override { host_.renew(*this, until); }
     void pause(time_point now);
+    void take_marked(const std::string& body, const update_mark& mark);
 
     feed_host& host_;
     deadline_queue& deadlines_;
+    std::size_t longest_; // line that may be passed on
     feed_mailbox mail_;
     backoff backoff_;
     renewal renewal_;

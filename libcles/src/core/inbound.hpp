@@ -24,6 +24,8 @@
 
 namespace cles::core {
 
+class execution;
+
 /// Serves the requests that one link brings (docs/protocol.md, "Order" and "Ends").
 ///
 /// Requests with an id start at once. Those without wait for each other. Plain handlers are run in line and answered
@@ -45,6 +47,10 @@ class inbound final : private call_owner, private call_opener {
     void end(time_point now);
     /// The link is gone.
     void lose();
+    /// Nothing is begun any more: what comes, and what waits for its turn, is `busy`. What runs is still answered.
+    void begin_nothing() noexcept { begins_nothing_ = true; }
+    /// Answers what still runs with `unavailable`, and tells it to stop.
+    void cut_short();
 
     /// Whether requests wait whose turn has come, but which are too many for one turn.
     [[nodiscard]] bool has_more() const noexcept { return anonymous_ == nullptr && !waiting_.empty(); }
@@ -66,8 +72,8 @@ class inbound final : private call_owner, private call_opener {
     void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
     void serve_here(const protocol::request_line& request, time_point arrived, time_point now);
     void serve_task(const protocol::request_line& request, time_point arrived, time_point now);
-    void run_plain(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
-    void run_later(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
+    std::optional<protocol::failure> run_plain(const protocol::request_line& request, execution& task);
+    void refuse(const protocol::request_line& request, const protocol::failure& why, time_point due, time_point now);
 
     std::shared_ptr<call> begin_call(const protocol::request_line& request, call::terms wanted, time_point due,
                                      time_point now);
@@ -75,6 +81,7 @@ class inbound final : private call_owner, private call_opener {
 
     [[nodiscard]] bool must_wait() const noexcept { return anonymous_ != nullptr || !waiting_.empty(); }
     void answer_in_turn(std::string answer, time_point now);
+    void refuse_in_turn(const protocol::request_line& request, const protocol::failure& why, time_point now);
     void follow_waiting();
     void serve_waiting(time_point now);
     void withdraw_all();
@@ -96,14 +103,13 @@ class inbound final : private call_owner, private call_opener {
     reply_writer replies_;
     std::optional<datagram_requests> datagrams_; // where it is no stream
     bind_requests bound_;
-    std::string path_;    // of the noun being served, where it had to be rebuilt
-    std::string decoded_; // its parameters, where they held escapes
+    std::string decoded_; // room for the parameters of the noun being served
     bool serving_waiting_ = false;
     bool paused_ = false;
     bool ending_ = false;  // the peer sends no more, or what it sends is no longer read
     bool closing_ = false; // the link ends whatever is bound
     bool finished_ = false;
-    unsigned sample_ = 0;
+    bool begins_nothing_ = false; // this node leaves
 };
 
 } // namespace cles::core

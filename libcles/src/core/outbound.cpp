@@ -2,6 +2,7 @@
 #include "core/outbound.hpp"
 
 #include "core/ignored_reply.hpp"
+#include "core/refusals.hpp"
 
 #include <algorithm>
 #include <string>
@@ -155,7 +156,8 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         }
     } else {
         auto* operation = e->operation.release();
-        ended = operation->offer(reply.body) == detail::pending::verdict::completed;
+        ended = (reply.mark ? operation->offer_marked(reply.body, *reply.mark) : operation->offer(reply.body)) ==
+                detail::pending::verdict::completed;
         if (!ended) {
             e->operation.reset(operation);
         }

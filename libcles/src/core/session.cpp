@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/session.hpp"
 
+#include "core/refusals.hpp"
 #include "core/request_checks.hpp"
 #include "protocol/line.hpp"
 
@@ -65,6 +66,8 @@ void session::on_line(std::string_view line, time_point now) {
         inbound_.on_malformed(line, malformed, now);
     } else if (request.is_update()) {
         on_update(subscriptions_.find(line, request));
+    } else if (!is_datagram() && says_that_it_leaves(request)) {
+        on_leaving();
     } else {
         inbound_.on_request(line, request, now);
     }
@@ -102,10 +105,26 @@ void session::on_reply(std::string_view line) {
 
 void session::on_update(const subscriptions::match& found) {
     const auto& update = *found.update;
-    if (found.whose == nullptr || protocol::begins_with_error(update.body) || !found.whose->take(update)) {
+    if (found.whose == nullptr || protocol::begins_with_error(update.body) || !subscriptions_.deliver(found)) {
         ++node_->counts.updates_dropped;
     } else {
         ++node_->counts.updates_received;
+    }
+}
+
+void session::on_leaving() {
+    ++node_->counts.requests[static_cast<std::size_t>(verb::push)];
+    out_.retire();
+    outbound_.refuse(failure_text({.code = errc::busy,
+                                   .message = "the node at " + peer_.address + " is leaving, and has not begun this",
+                                   .retry_ms = 1000}));
+}
+
+void session::say_that_it_leaves() {
+    if (!is_datagram() && !std::exchange(closed_, true)) {
+        protocol::append_request(out_.output(),
+                                 {.verb = verb::push, .noun = "self:cles/leaving", .wants_reply = false});
+        out_.finish();
     }
 }
 

@@ -35,6 +35,9 @@ class session {
     [[nodiscard]] bool at_rest() const noexcept {
         return inbound_.at_rest() && outbound_.in_flight() == 0 && subscriptions_.empty();
     }
+    /// The last line of this node, which leaves: all that it has begun for the peer has been answered. Ends the link;
+    /// nothing by datagram, where there is none to end.
+    void say_that_it_leaves();
     /// Answers a line with `busy` and nothing else.
     void turn_away(std::string_view line);
     /// Tells the peer that there is no room for its link, in answer to nothing.
@@ -51,6 +54,7 @@ class session {
     void on_reply(std::string_view line);
     void note_refusal(std::string_view line);
     void lose_requests(std::string_view why);
+    void on_leaving();
     void on_update(const subscriptions::match& found);
 
     std::shared_ptr<node> node_;

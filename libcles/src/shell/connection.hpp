@@ -62,6 +62,9 @@ class connection final : public link_events,
     void bind(core::feed_machine& feed, protocol::request_text request, time_point deadline,
               detail::pending_ptr operation);
     void unbind(core::feed_machine& feed);
+    /// Whether the peer says which update it answers BIND with; nothing as long as it has not been asked.
+    [[nodiscard]] std::optional<bool> marks() const noexcept { return marks_; }
+    void set_marks(bool does) noexcept { marks_ = does; }
 
     // link_events
     void on_line(std::string_view line) override;
@@ -87,6 +90,7 @@ class connection final : public link_events,
     void pause(bool stop) override;
     void finish() override;
     void close() override;
+    void retire() override { usable_ = false; }
 
     // binder
     [[nodiscard]] bool takes_updates() const override;
@@ -134,6 +138,7 @@ class connection final : public link_events,
     std::optional<core::source_life> life_;     // of a source of datagrams
     std::optional<core::link_monitor> monitor_; // of a stream
     std::vector<core::feed_machine*> feeds_;
+    std::optional<bool> marks_;
     std::optional<time_point> now_; // while a batch is handed over
     unsigned lines_ = 0;            // of this batch
     bool usable_ = true;
