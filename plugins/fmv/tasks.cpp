@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "tasks.hpp"
 
+#include <cles/setting_error.hpp>
+
 #include "base64.hpp"
 #include "messages.hpp"
 #include "streams.hpp"
@@ -112,13 +114,17 @@ void process(const cles::request& asked, const cles::responder& answer, shop& he
 
 } // namespace
 
+void settings::check() const {
+    if (const auto n = streams.value_or(8); n < 1 || n > 64) {
+        throw cles::setting_error("streams", "streams: 1 to 64");
+    }
+    if (const auto s = idle_s.value_or(10); s < 1 || s > 3600) {
+        throw cles::setting_error("idle_s", "idle_s: 1 to 3600");
+    }
+}
+
 void register_tasks(cles::registrar& to, const settings& wanted) {
-    if (const auto n = wanted.streams.value_or(8); n < 1 || n > 64) {
-        throw error(errc::bad_request, "streams: 1 to 64");
-    }
-    if (const auto s = wanted.idle_s.value_or(10); s < 1 || s > 3600) {
-        throw error(errc::bad_request, "idle_s: 1 to 3600");
-    }
+    wanted.check();
     const auto here = std::make_shared<shop>(wanted);
     to.on_pull("FMV_Processing",
                [here] {

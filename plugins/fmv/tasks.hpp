@@ -13,6 +13,9 @@ namespace fmv {
 struct settings {
     std::optional<std::uint64_t> streams{}; ///< 1 to 64, 8 unless set: each takes some megabytes while it begins
     std::optional<std::uint64_t> idle_s{};  ///< 1 to 3600, 10 unless set: after which a stream is forgotten
+
+    /// \throws cles::setting_error
+    void check() const;
 };
 BOOST_DESCRIBE_STRUCT(settings, (), (streams, idle_s))
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "primes.hpp"
 
+#include <cles/setting_error.hpp>
+
 #include "prime_counter.hpp"
 
 #include <boost/describe/class.hpp>
@@ -126,11 +128,15 @@ void divide(const cles::request& asked, const cles::responder& answer, std::uint
 
 } // namespace
 
-void register_tasks(cles::registrar& to, const settings& wanted) {
-    const auto limit = wanted.limit.value_or(default_limit);
-    if (limit > most) {
-        throw error(errc::bad_request, "the limit is at most " + std::to_string(most));
+void settings::check() const {
+    if (limit.value_or(default_limit) > most) {
+        throw cles::setting_error("limit", "the limit is at most " + std::to_string(most));
     }
+}
+
+void register_tasks(cles::registrar& to, const settings& wanted) {
+    wanted.check();
+    const auto limit = wanted.limit.value_or(default_limit);
     to.on_pull("prime",
                [limit](const cles::request& asked) {
                    const auto number = asked.parameter<std::uint64_t>(0);

@@ -14,6 +14,9 @@ namespace primes {
 struct settings {
     std::optional<std::uint64_t> limit;    ///< up to where primes are looked for; 10^9 unless set, at most 10^12
     std::optional<std::string> parts_by{}; ///< whom `primes_in_parts` asks: `any` unless set, or a node's name
+
+    /// \throws cles::setting_error
+    void check() const;
 };
 BOOST_DESCRIBE_STRUCT(settings, (), (limit, parts_by))
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "tasks.hpp"
 
+#include <cles/setting_error.hpp>
+
 #include "intercept.hpp"
 #include "magazine.hpp"
 #include "order.hpp"
@@ -90,19 +92,24 @@ void carry_out(const cles::request& asked, const cles::responder& answer, aircra
                         .run_ms = milliseconds{steady::now() - begun}.count()});
 }
 
-void require(bool fits, const char* what) {
+void require(bool fits, const char* key, const char* what) {
     if (!fits) {
-        throw error(errc::bad_request, what);
+        throw cles::setting_error(key, what);
     }
 }
 
 } // namespace
 
+void settings::check() const {
+    require(weapons.value_or(4) <= 1000, "weapons", "weapons: 1000 at most");
+    require(std::isfinite(x.value_or(0)), "x", "x and y: numbers");
+    require(std::isfinite(y.value_or(0)), "y", "x and y: numbers");
+    require(speed.value_or(400) > 0 && std::isfinite(speed.value_or(400)), "speed", "speed: more than 0");
+    require(oldest_s.value_or(2) > 0 && std::isfinite(oldest_s.value_or(2)), "oldest_s", "oldest_s: more than 0");
+}
+
 void register_tasks(cles::registrar& to, const settings& wanted) {
-    require(wanted.weapons.value_or(4) <= 1000, "weapons: 1000 at most");
-    require(std::isfinite(wanted.x.value_or(0)) && std::isfinite(wanted.y.value_or(0)), "x and y: numbers");
-    require(wanted.speed.value_or(400) > 0 && std::isfinite(wanted.speed.value_or(400)), "speed: more than 0");
-    require(wanted.oldest_s.value_or(2) > 0 && std::isfinite(wanted.oldest_s.value_or(2)), "oldest_s: more than 0");
+    wanted.check();
     const auto own = std::make_shared<aircraft>(wanted);
     to.on_pull("strike",
                [own] {

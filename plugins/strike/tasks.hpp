@@ -15,6 +15,9 @@ struct settings {
     std::optional<double> x{}, y{};         ///< where the aircraft is, in pixels of the ground; -100, 120 unless set
     std::optional<double> speed{};          ///< of what it releases, in pixels a second; 400 unless set
     std::optional<double> oldest_s{};       ///< a track that is older is refused; 2 unless set
+
+    /// \throws cles::setting_error
+    void check() const;
 };
 BOOST_DESCRIBE_STRUCT(settings, (), (weapons, x, y, speed, oldest_s))
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "system.hpp"
 
+#include <cles/setting_error.hpp>
+
 #include "cpu_use.hpp"
 #include "disk.hpp"
 #include "kernel_file.hpp"
@@ -44,13 +46,11 @@ class load_meter {
     cpu_use use_;
 };
 
-std::uint32_t within(std::uint32_t value, std::uint32_t least, std::uint32_t most, const char* what) {
+void require_within(std::uint32_t value, std::uint32_t least, std::uint32_t most, const char* what) {
     if (value < least || value > most) {
-        throw cles::error(cles::errc::bad_request, std::string{what} + ": " + std::to_string(value) +
-                                                       " is not within " + std::to_string(least) + " and " +
-                                                       std::to_string(most));
+        throw cles::setting_error(what, std::string{what} + ": " + std::to_string(value) + " is not within " +
+                                            std::to_string(least) + " and " + std::to_string(most));
     }
-    return value;
 }
 
 // PULL reads now; BIND has the sampler publish.
@@ -74,10 +74,15 @@ void offer(cles::registrar& to, const std::shared_ptr<sampler>& samples, const s
 
 } // namespace
 
+void settings::check() const {
+    require_within(interval_ms.value_or(default_interval_ms), shortest_interval_ms, longest_interval_ms, "interval_ms");
+    require_within(processes.value_or(default_listed), 0, most_listed, "processes");
+}
+
 void register_tasks(cles::registrar& to, const settings& wanted) {
-    const auto interval = within(wanted.interval_ms.value_or(default_interval_ms), shortest_interval_ms,
-                                 longest_interval_ms, "interval_ms");
-    const std::size_t listed = within(wanted.processes.value_or(default_listed), 0, most_listed, "processes");
+    wanted.check();
+    const auto interval = wanted.interval_ms.value_or(default_interval_ms);
+    const std::size_t listed = wanted.processes.value_or(default_listed);
 
     const auto samples = std::make_shared<sampler>(std::chrono::milliseconds{interval});
     const auto meter = std::make_shared<load_meter>();

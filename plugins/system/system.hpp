@@ -14,6 +14,9 @@ struct settings {
     std::optional<std::uint32_t>
         interval_ms; ///< between updates to those that are bound, 10 to 86400000; 1000 unless set
     std::optional<std::uint32_t> processes; ///< how many are listed, at most 1000; 10 unless set
+
+    /// \throws cles::setting_error
+    void check() const;
 };
 BOOST_DESCRIBE_STRUCT(settings, (), (interval_ms, processes))
 

@@ -12,8 +12,7 @@
 #include "daemon_log.hpp"
 #include "notify.hpp"
 #include "options.hpp"
-#include "plugin_places.hpp"
-#include "plugin_search.hpp"
+#include "plugin_setup.hpp"
 
 #include <boost/asio/io_context.hpp>
 
@@ -61,17 +60,12 @@ config_sources sources_of(const options& wanted) {
             .cores = std::thread::hardware_concurrency()};
 }
 
-// Plugins are looked for, not loaded: that would run their code.
-int check_plugins(const config& setup) {
-    for (std::size_t i = 0; i < setup.plugins.size(); ++i) {
-        try {
-            find_plugin(plugin_file(setup, setup.plugins[i]), plugin_folders(setup));
-        } catch (const plugin_error& missing) {
-            const auto text = setup.place_of("plugins[" + std::to_string(i) + "].path") + ": " + missing.what();
-            if (setup.plugins[i].required) {
-                return complain(text, wrong_usage);
-            }
-            complain(text + " (it is not required)", success);
+// Plugins are tried, each in a process of its own, and not started: a daemon that runs may have their devices.
+int check_plugins(config setup) {
+    try_plugins(setup);
+    for (const auto& plugin : setup.plugins) {
+        if (!plugin.unusable.empty()) {
+            complain(plugin.unusable + " (it is not required)", success);
         }
     }
     print(stdout, (setup.file.empty() ? "without a file: " : setup.file + ": ") + "can be used\n");
@@ -104,13 +98,15 @@ std::unique_ptr<const wake_bound> bound_waking(const config& setup) {
 }
 
 int run(config setup, config_sources sources) {
+    auto notify_socket = take_notify_socket();
+    try_plugins(setup); // while there are no threads
     const auto node = setup.node;
     const run_options how{.busy_poll = setup.busy_poll,
                           .fifo_priority = static_cast<int>(setup.real_time),
                           .lock_memory = setup.real_time != 0};
     daemon_log log{node, setup.log};
     const auto awake = bound_waking(setup); // before anybody is told that it runs
-    const notifier tell{take_notify_socket()};
+    const notifier tell{std::move(notify_socket)};
     boost::asio::io_context io{1};
     daemon running{io, std::move(setup), std::move(sources), log, tell};
     for (const auto& endpoint : running.endpoints()) {

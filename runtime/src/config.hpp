@@ -28,6 +28,7 @@ struct plugin_config {
     std::string path;          ///< as it stands in the configuration
     std::string config = "{}"; ///< JSON, handed to the plugin as it is
     bool required = true;      ///< the daemon does not start without it
+    std::string unusable{};    ///< what a trial found (`plugin_setup`); empty: nothing, or there was none
 
     bool operator==(const plugin_config&) const = default;
 };

@@ -7,6 +7,8 @@
 
 #include <cerrno>
 #include <fstream>
+#include <sstream>
+#include <string_view>
 #include <system_error>
 #include <vector>
 
@@ -129,6 +131,44 @@ void read_all(const config_node& from, config& over) {
               {"wake_within", [&](const config_node& v) { over.wake_within = v.as(to_wake_bound); }}});
 }
 
+// Calls `each(line, number)` for the lines that hold more than blanks and a comment.
+template <class F>
+void for_lines(const std::string& text, F&& each) {
+    constexpr std::string_view byte_order_mark{"\xEF\xBB\xBF"};
+    std::istringstream in{text.starts_with(byte_order_mark) ? text.substr(byte_order_mark.size()) : text};
+    std::string line;
+    for (std::size_t number = 1; std::getline(in, line); ++number) {
+        const auto begin = line.find_first_not_of(" \t\r");
+        if (begin != std::string::npos && line[begin] != '#') {
+            each(line, number);
+        }
+    }
+}
+
+// Directives before and after a document, which the parser passes over in silence, whatever they say.
+void check_directives(const std::string& text, const std::string& name) {
+    bool outside = true; // of a document
+    for_lines(text, [&](const std::string& line, std::size_t number) {
+        if (outside && line.starts_with('%')) {
+            if (!line.starts_with("%YAML ") && !line.starts_with("%TAG ")) {
+                throw config_error(name + ":" + std::to_string(number),
+                                   "is no YAML: unknown directive: " + line.substr(0, 40));
+            }
+            return;
+        }
+        outside = line.starts_with("...");
+    });
+}
+
+// A file without settings holds comments, and the marks of a document at most.
+void check_empty(const std::string& text, const std::string& name) {
+    for_lines(text, [&](const std::string& line, std::size_t number) {
+        if (!line.starts_with("---") && !line.starts_with("...") && !line.starts_with('%')) {
+            throw config_error(name + ":" + std::to_string(number), "holds no setting: " + line.substr(0, 40));
+        }
+    });
+}
+
 YAML::Node parse(const std::string& text, const std::string& name) {
     try {
         const auto documents = YAML::LoadAll(text);
@@ -145,8 +185,10 @@ YAML::Node parse(const std::string& text, const std::string& name) {
 } // namespace
 
 void read_config(const std::string& text, const std::string& name, config& over) {
+    check_directives(text, name);
     const auto whole = parse(text, name);
-    if (whole.IsNull()) { // nothing but comments
+    if (whole.IsNull()) {
+        check_empty(text, name);
         return;
     }
     read_all({whole, "", name, over.origins}, over);

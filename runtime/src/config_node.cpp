@@ -60,9 +60,31 @@ void config_node::list(const reader& each) const {
 
 std::string config_node::json() const {
     try {
-        return json_of(value_);
+        auto text = json_of(value_); // which refuses what nests without end
+        keep_places(value_, key_);
+        return text;
     } catch (const bad_value& wrong) {
         refuse(wrong.what());
+    }
+}
+
+void config_node::keep_places(const YAML::Node& value, const std::string& key) const {
+    constexpr std::size_t most = 10'000; // anchors may multiply what is there
+    const auto keep = [&](const YAML::Node& inner, int line, const std::string& inner_key) {
+        if (origins_.size() < most) {
+            origins_[inner_key] = file_ + ":" + std::to_string(line + 1);
+            keep_places(inner, inner_key);
+        }
+    };
+    if (value.IsMap()) {
+        for (const auto& pair : value) {
+            keep(pair.second, pair.first.Mark().line, key + "." + pair.first.Scalar());
+        }
+    } else if (value.IsSequence()) {
+        std::size_t at = 0;
+        for (const auto& item : value) {
+            keep(item, item.Mark().line, key + "[" + std::to_string(at++) + "]");
+        }
     }
 }
 

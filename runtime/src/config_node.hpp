@@ -42,7 +42,7 @@ class config_node {
     /// The same for a map whose keys are names.
     void names(const std::function<void(const std::string&, const config_node&)>& each) const;
     void list(const reader& each) const;
-    /// As JSON.
+    /// As JSON. The places of what it holds are kept too.
     [[nodiscard]] std::string json() const;
 
     [[noreturn]] void refuse(const std::string& why) const;
@@ -50,6 +50,7 @@ class config_node {
   private:
     void each_pair(const std::function<void(const std::string&, const config_node&)>& each) const;
     [[nodiscard]] std::string place() const;
+    void keep_places(const YAML::Node& value, const std::string& key) const;
 
     YAML::Node value_;
     std::string key_;

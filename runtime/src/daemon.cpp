@@ -5,6 +5,8 @@
 #include "config_text.hpp"
 #include "config_values.hpp"
 #include "plugin_places.hpp"
+#include "plugin_setup.hpp"
+#include "plugin_start_guard.hpp"
 #include "pooled_registrar.hpp"
 
 #include <boost/asio/post.hpp>
@@ -19,6 +21,9 @@ namespace {
 using namespace std::chrono_literals;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
+
+constexpr int wrong_configuration = 2; // the exit code
+constexpr std::chrono::seconds start_limit{10};
 
 service_options options_of(const config& setup, const daemon_log& log) {
     service_options options{.name = setup.node};
@@ -49,6 +54,7 @@ pool_options pool_options_of(const config& setup, const daemon_log& log) {
 plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
     plugin_host_options options{.node = setup.node};
     options.folders = plugin_folders(setup);
+    options.trial = 0ms; // they were tried before there were threads
     options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
         log.write(level, std::string{plugin} + ": " + std::string{text});
     };
@@ -99,14 +105,22 @@ void daemon::load_plugins() {
     pooled_registrar tasks{service_, pool_};
     for (std::size_t i = 0; i < setup_.plugins.size(); ++i) {
         const auto& wanted = setup_.plugins[i];
+        if (!wanted.unusable.empty()) {
+            log_.warning(wanted.unusable + " (goes on without it)");
+            continue;
+        }
         try {
-            plugins_.load(plugin_file(setup_, wanted), wanted.config, tasks);
+            const auto path = plugin_file(setup_, wanted);
+            const plugin_start_guard guard{"clesd: " + setup_.place_of("plugins[" + std::to_string(i) + "].path") +
+                                               ": " + path,
+                                           wrong_configuration, start_limit};
+            plugins_.load(path, wanted.config, tasks);
         } catch (const plugin_error& wrong) {
-            const auto place = setup_.place_of("plugins[" + std::to_string(i) + "].path");
+            const auto complaint = complaint_about(setup_, i, wrong);
             if (wanted.required) {
-                throw config_error(place, wrong.what());
+                throw config_error(complaint);
             }
-            log_.warning(place + ": goes on without it: " + wrong.what());
+            log_.warning(complaint + " (goes on without it)");
             continue;
         }
         const auto& loaded = plugins_.plugins().back();

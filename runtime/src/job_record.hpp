@@ -59,7 +59,8 @@ class job_record final : public job_queue::item {
     void set_written() noexcept { written_ = true; }
 
     /// Runs the job's beginning on a worker, unless nobody waits for it any more or its time is over. False where the
-    /// executor, which would know of a withdrawal, was to be back by a time that has passed: then nothing has been done.
+    /// executor, which would know of a withdrawal, was to be back by a time that has passed: then nothing has been
+    /// done.
     [[nodiscard]] bool begin(time_point listening_until) noexcept;
     /// Runs a part of it that was called back, on a worker.
     void run(const std::function<void()>& part) noexcept;

@@ -72,8 +72,15 @@ struct loaded_plugin::from_plugin {
     }
     static void refuse(const cles_host* host, cles_text why) noexcept {
         auto& plugin = self(host);
-        if (plugin.taken_ != nullptr && plugin.refusal_.empty()) {
+        if (plugin.may_refuse_ && plugin.refusal_.empty()) {
             plugin.refusal_ = view_of(why);
+        }
+    }
+    static void refuse_setting(const cles_host* host, cles_text key, cles_text why) noexcept {
+        auto& plugin = self(host);
+        if (plugin.may_refuse_ && plugin.refusal_.empty()) {
+            plugin.refusal_ = view_of(why);
+            plugin.refused_setting_ = view_of(key);
         }
     }
     static void publish(const cles_host* host, cles_text noun, cles_text json) noexcept {
@@ -147,22 +154,24 @@ struct loaded_plugin::from_plugin {
 loaded_plugin::loaded_plugin(const cles_plugin& description, std::string node, plugin_jobs& jobs,
                              stop_notifier& notifier, plugin_log log)
     : description_(description), name_(view_of(description.name)), version_(view_of(description.version)),
-      node_(std::move(node)), jobs_(jobs), notifier_(notifier), log_(std::move(log)), host_{.face = {.size = sizeof(cles_host),
-                                                                                .abi_minor = CLES_PLUGIN_ABI_MINOR,
-                                                                                .node = abi_text(node_),
-                                                                                .add_task = &from_plugin::add_task,
-                                                                                .refuse = &from_plugin::refuse,
-                                                                                .publish = &from_plugin::publish,
-                                                                                .log = &from_plugin::log,
-                                                                                .done = &from_plugin::done,
-                                                                                .fail = &from_plugin::fail,
-                                                                                .busy = &from_plugin::busy,
-                                                                                .progress = &from_plugin::progress,
-                                                                                .stopped = &from_plugin::stopped,
-                                                                                .on_stop = &from_plugin::on_stop,
-                                                                                .delegate = &from_plugin::delegate,
-                                                                                .job_log = &from_plugin::job_log},
-                                                                       .of = this} {}
+      node_(std::move(node)), jobs_(jobs), notifier_(notifier),
+      log_(std::move(log)), host_{.face = {.size = sizeof(cles_host),
+                                           .abi_minor = CLES_PLUGIN_ABI_MINOR,
+                                           .node = abi_text(node_),
+                                           .add_task = &from_plugin::add_task,
+                                           .refuse = &from_plugin::refuse,
+                                           .publish = &from_plugin::publish,
+                                           .log = &from_plugin::log,
+                                           .done = &from_plugin::done,
+                                           .fail = &from_plugin::fail,
+                                           .busy = &from_plugin::busy,
+                                           .progress = &from_plugin::progress,
+                                           .stopped = &from_plugin::stopped,
+                                           .on_stop = &from_plugin::on_stop,
+                                           .delegate = &from_plugin::delegate,
+                                           .job_log = &from_plugin::job_log,
+                                           .refuse_setting = &from_plugin::refuse_setting},
+                                  .of = this} {}
 
 void loaded_plugin::say(log_level level, std::string_view text) const {
     const std::scoped_lock lock{log_mutex_};
@@ -184,31 +193,52 @@ void loaded_plugin::note_unknown() {
 
 // -- its beginning and end -----------------------------------------------------------------------------------------
 
-std::string loaded_plugin::start(const std::string& config, publisher updates, const taken& by_other) {
-    updates_ = std::move(updates);
-    taken_ = &by_other;
-    bool started = false;
+// Calls a function of the plugin that returns 0, or something else after it has said why not.
+template <class F>
+std::optional<loaded_plugin::refusal> loaded_plugin::guarded(const char* what, F&& call) {
+    may_refuse_ = true;
+    bool fine = false;
     std::string thrown;
     try {
-        started = description_.start(&host_.face, abi_text(config)) == 0;
+        fine = call() == 0;
     } catch (const std::exception& e) {
-        thrown = std::string{"its start threw: "} + e.what();
+        thrown = std::string{what} + " threw: " + e.what();
     } catch (...) {
-        thrown = "its start threw something that is no exception";
+        thrown = std::string{what} + " threw something that is no exception";
     }
-    taken_ = nullptr;
-    if (started) {
-        stopped_ = false;
-        if (!refusal_.empty()) {
-            say(log_level::warning, "goes without a task: " + refusal_);
-        }
-        return {};
+    may_refuse_ = false;
+    if (fine) {
+        return std::nullopt;
     }
-    closed_ = true;
     if (!thrown.empty()) {
-        return thrown;
+        return refusal{.why = std::move(thrown), .setting = std::nullopt};
     }
-    return refusal_.empty() ? "it refuses to start and does not say why" : refusal_;
+    return refusal{.why = refusal_.empty() ? "it refuses to start and does not say why" : refusal_,
+                   .setting = refused_setting_};
+}
+
+std::optional<loaded_plugin::refusal> loaded_plugin::check(const std::string& config) {
+    if (description_.check == nullptr) {
+        return std::nullopt;
+    }
+    return guarded("its check of its settings", [&] { return description_.check(&host_.face, abi_text(config)); });
+}
+
+std::optional<loaded_plugin::refusal> loaded_plugin::start(const std::string& config, publisher updates,
+                                                           const taken& by_other) {
+    updates_ = std::move(updates);
+    taken_ = &by_other;
+    auto refused = guarded("its start", [&] { return description_.start(&host_.face, abi_text(config)); });
+    taken_ = nullptr;
+    if (refused) {
+        closed_ = true;
+        return refused;
+    }
+    stopped_ = false;
+    if (!refusal_.empty()) {
+        say(log_level::warning, "goes without a task: " + refusal_);
+    }
+    return std::nullopt;
 }
 
 std::int32_t loaded_plugin::add_task(const cles_task& added) {

@@ -42,8 +42,14 @@ class loaded_plugin {
 
     /// Whether another plugin has this task; to be asked for each that this one adds.
     using taken = std::function<std::optional<std::string>(cles::verb, std::string_view task)>;
-    /// Has it add its tasks. Empty, or why it cannot be used.
-    std::string start(const std::string& config, publisher updates, const taken& by_other);
+    struct refusal {
+        std::string why;
+        std::optional<std::string> setting; ///< the key of the one that is to blame; empty: all of them together
+    };
+    /// Has it look whether it could do with these settings, which it does by its own code, and no more.
+    std::optional<refusal> check(const std::string& config);
+    /// Has it add its tasks. Nothing, or why it cannot be used.
+    std::optional<refusal> start(const std::string& config, publisher updates, const taken& by_other);
     /// What it added, to be registered. Requests for them are refused from `close` on.
     [[nodiscard]] std::vector<registration> tasks() const;
     /// No further job is started.
@@ -71,6 +77,8 @@ class loaded_plugin {
     struct from_plugin; // the functions themselves
 
     std::int32_t add_task(const cles_task& added);
+    template <class F>
+    std::optional<refusal> guarded(const char* what, F&& call);
     [[noreturn]] void refuse_job() const;
     void run(const task& t, const request& what, const responder& answer);
     void call_start(const task& t, const request& what, plugin_jobs::id job) const;
@@ -91,7 +99,9 @@ class loaded_plugin {
     std::optional<publisher> updates_;
     std::vector<std::unique_ptr<task>> tasks_;
     const taken* taken_ = nullptr; ///< while it starts
+    bool may_refuse_ = false;      ///< while it starts or checks its settings
     std::string refusal_;          ///< why a task was refused, or the plugin's own words
+    std::optional<std::string> refused_setting_;
     std::atomic<bool> closed_{false};
     std::atomic<bool> stopped_{true};
     std::atomic<bool> noted_unknown_{false};

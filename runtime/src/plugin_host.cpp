@@ -5,27 +5,19 @@
 #include <cles/plugin_abi.h>
 #include <cles/plugin_text.hpp>
 
+#include "plugin_host_library.hpp"
 #include "plugin_search.hpp"
 #include "plugin_trial.hpp"
 
-// The standard library's file system, so that no further library of Boost is linked.
-#define BOOST_DLL_USE_STD_FS
-#include <boost/dll/shared_library.hpp>
-
 #include <algorithm>
 #include <condition_variable>
-#include <cstddef>
 #include <mutex>
 #include <optional>
 #include <thread>
 #include <utility>
 
-#include <dlfcn.h>
-
 namespace cles::runtime {
 namespace {
-
-using entry_function = const cles_plugin*();
 
 // All hosts' plugins, kept until the process ends, whoever goes first. A host's destructor cannot know whether a plugin
 // is at rest.
@@ -35,61 +27,6 @@ void keep_for_ever(T kept) {
     static auto* const all = new std::vector<T>;
     const std::scoped_lock lock{mutex};
     all->push_back(std::move(kept));
-}
-
-boost::dll::shared_library open_library(const std::string& path, const std::filesystem::path& file) {
-    boost::dll::shared_library library;
-    std::error_code failed;
-    library.load(file, failed, boost::dll::load_mode::rtld_now);
-    if (failed) {
-        const char* why = ::dlerror();
-        throw plugin_error(path, std::string{"it cannot be loaded: "} + (why == nullptr ? "" : why));
-    }
-    return library;
-}
-
-std::string other_version(const boost::dll::shared_library& library) {
-    constexpr unsigned newest_imaginable = 16;
-    for (unsigned version = 2; version <= newest_imaginable; ++version) {
-        if (library.has("cles_plugin_v" + std::to_string(version))) {
-            return "it was made for version " + std::to_string(version) + " of the plugin ABI, this host has version " +
-                   std::to_string(CLES_PLUGIN_ABI_MAJOR);
-        }
-    }
-    return std::string{"it is no plugin: it has no function '"} + CLES_PLUGIN_ENTRY + "'";
-}
-
-const cles_plugin& describe(const std::string& path, const boost::dll::shared_library& library) {
-    if (!library.has(CLES_PLUGIN_ENTRY)) {
-        throw plugin_error(path, other_version(library));
-    }
-    const cles_plugin* described = nullptr;
-    try {
-        described = library.get<entry_function>(CLES_PLUGIN_ENTRY)();
-    } catch (const std::exception& e) {
-        throw plugin_error(path, std::string{"its entry threw: "} + e.what());
-    } catch (...) {
-        throw plugin_error(path, "its entry threw something that is no exception");
-    }
-    if (described == nullptr) {
-        throw plugin_error(path, "its entry describes nothing");
-    }
-    return *described;
-}
-
-void check(const std::string& path, const cles_plugin& described) {
-    if (described.size < offsetof(cles_plugin, name)) {
-        throw plugin_error(path, "its description is too short to be one");
-    }
-    const auto wanted = std::to_string(described.abi_major) + "." + std::to_string(described.abi_minor);
-    if (described.abi_major != CLES_PLUGIN_ABI_MAJOR || described.abi_minor > CLES_PLUGIN_ABI_MINOR) {
-        throw plugin_error(path, "it needs version " + wanted + " of the plugin ABI, this host has " +
-                                     std::to_string(CLES_PLUGIN_ABI_MAJOR) + "." +
-                                     std::to_string(CLES_PLUGIN_ABI_MINOR));
-    }
-    if (described.size < sizeof(cles_plugin) || described.start == nullptr) {
-        throw plugin_error(path, "its description lacks what version " + wanted + " of the plugin ABI has");
-    }
 }
 
 } // namespace
@@ -117,19 +54,15 @@ plugin_host::~plugin_host() { stop(std::chrono::seconds{2}); }
 void plugin_host::load(const std::string& path, const std::string& config, registrar& into) {
     const auto file = find_plugin(path, options_.folders);
     if (options_.trial.count() > 0) {
-        if (const auto why = try_library(file, options_.trial); !why.empty()) {
-            throw plugin_error(path, why);
-        }
+        try_plugin(path, file, options_.node, config, options_.trial);
     }
     auto library = open_library(path, file);
-    const auto& described = describe(path, library);
-    check(path, described);
+    const auto& described = describe_plugin(path, library);
     if (std::find(state_->descriptions.begin(), state_->descriptions.end(), &described) != state_->descriptions.end()) {
         throw plugin_error(path, "it is loaded already");
     }
-    auto owned =
-        std::make_unique<loaded_plugin>(detail::known_part(&described), options_.node, state_->jobs, state_->notifier,
-                                        options_.log);
+    auto owned = std::make_unique<loaded_plugin>(detail::known_part(&described), options_.node, state_->jobs,
+                                                 state_->notifier, options_.log);
     auto& plugin = *owned;
     state_->libraries.push_back(std::move(library));
     state_->plugins.push_back(std::move(owned));
@@ -144,8 +77,8 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
         }
         return std::nullopt;
     };
-    if (const auto why = plugin.start(config, into.make_publisher(), taken); !why.empty()) {
-        throw plugin_error(path, why);
+    if (const auto refused = plugin.start(config, into.make_publisher(), taken)) {
+        throw plugin_error(path, refused->why, refused->setting);
     }
     plugin_info info{.path = path, .name = plugin.name(), .version = plugin.version()};
     try {

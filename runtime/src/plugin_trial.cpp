@@ -1,18 +1,25 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "plugin_trial.hpp"
 
+#include <cles/plugin_text.hpp>
+
+#include "loaded_plugin.hpp"
+#include "plugin_error.hpp"
+#include "plugin_host_library.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstring>
+#include <exception>
 #include <string_view>
 #include <system_error>
 #include <utility>
 
-#include <dlfcn.h>
 #include <fcntl.h>
 #include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -20,9 +27,28 @@ namespace cles::runtime {
 namespace {
 
 // How the child ends. No usual numbers: a library that ends the process may choose any, 0 too.
-constexpr int loaded = 123;
-constexpr int cannot_load = 124;
+constexpr int usable = 123;
+constexpr int refused = 124;
 constexpr std::size_t most_words = 2000;
+// The system keeps a report in one piece, and takes it though nobody reads yet.
+constexpr std::size_t longest_report = 2000;
+
+// What the child is at, which it writes when it begins with it; then, where the plugin is refused, a line with the key
+// of the setting that is to blame, and why.
+constexpr char loading = 'l';
+constexpr char describing = 'd';
+constexpr char checking = 'c';
+constexpr char blames_setting = 's';
+constexpr char blames_plugin = 'p';
+constexpr std::string_view verdicts{"sp"};
+
+std::string_view words_for(char step) {
+    switch (step) {
+    case describing: return "its entry point";
+    case checking: return "its check of its settings";
+    default: return "what it runs when it is loaded";
+    }
+}
 
 class descriptor {
   public:
@@ -41,17 +67,57 @@ class descriptor {
     int fd_;
 };
 
-// In the child. Ends it without what a program does at its end, which is the parent's business.
-[[noreturn]] void load_and_end(const char* file, int words) {
+void write_all(int to, std::string_view text) {
+    [[maybe_unused]] const auto written = ::write(to, text.data(), std::min(text.size(), longest_report));
+}
+
+// As in a process that begins: nothing of what the parent does about signals, and no memory image where it crashes.
+void become_a_child(int words) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL); // it may hang for ever, and who gives it up may be killed
+    for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGTERM, SIGINT, SIGHUP, SIGPIPE}) {
+        ::signal(number, SIG_DFL);
+    }
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    const rlimit no_core{};
+    ::setrlimit(RLIMIT_CORE, &no_core);
     ::dup2(words, STDOUT_FILENO);
     ::dup2(words, STDERR_FILENO);
-    ::signal(SIGABRT, SIG_DFL);
-    if (::dlopen(file, RTLD_NOW | RTLD_LOCAL) == nullptr) {
-        const char* why = ::dlerror();
-        [[maybe_unused]] const auto told = why == nullptr ? 0 : ::write(words, why, std::strlen(why));
-        ::_exit(cannot_load);
+}
+
+// In the child. Ends it without what a program does at its end, which is the parent's business.
+[[noreturn]] void try_and_end(const std::filesystem::path& file, const std::string& node, const std::string& config,
+                              int words, int report) {
+    become_a_child(words);
+    char step = loading;
+    const auto at = [&](char next) {
+        step = next;
+        write_all(report, {&step, 1});
+    };
+    try {
+        at(loading);
+        // Never unloaded, as in the daemon: what it runs then is of no interest.
+        const auto* library = new boost::dll::shared_library{open_library("", file)};
+        at(describing);
+        const auto& described = describe_plugin("", *library);
+        at(checking);
+        plugin_jobs jobs;
+        stop_notifier notifier;
+        loaded_plugin plugin{detail::known_part(&described), node, jobs, notifier, {}};
+        if (const auto why = plugin.check(config)) {
+            throw plugin_error("", why->why, why->setting);
+        }
+        ::_exit(usable);
+    } catch (const plugin_error& wrong) {
+        const std::string why{std::string_view{wrong.what()}.substr(2)}; // after the path, which is the parent's
+        write_all(report,
+                  (wrong.setting() ? blames_setting + *wrong.setting() : std::string{blames_plugin}) + "\n" + why);
+    } catch (const std::exception& failed) {
+        const std::string what{words_for(step)};
+        write_all(report, blames_plugin + ("\n" + what) + " threw: " + failed.what());
     }
-    ::_exit(loaded);
+    ::_exit(refused);
 }
 
 // What the child writes until it ends or the time is up. True: it ended.
@@ -68,6 +134,9 @@ bool read_words(int from, std::string& words, std::chrono::steady_clock::time_po
         }
         std::array<char, 512> some{};
         const auto size = ::read(from, some.data(), some.size());
+        if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
+            continue;
+        }
         if (size <= 0) {
             return true;
         }
@@ -86,24 +155,58 @@ std::string on_one_line(std::string text) {
     return text;
 }
 
-} // namespace
+std::string with_words(std::string text, const std::string& words) {
+    return words.empty() ? text : text + ": " + words;
+}
 
-std::string try_library(const std::filesystem::path& file, std::chrono::milliseconds limit) {
-    const auto end = std::chrono::steady_clock::now() + limit;
+// What is there, now that the child has ended.
+std::string read_report(int from) {
+    std::array<char, 2 * longest_report> all{};
+    const auto size = ::read(from, all.data(), all.size());
+    return {all.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+}
+
+[[noreturn]] void refuse(const std::string& path, std::string_view report) {
+    const auto begin = report.find_first_of(verdicts);
+    const auto end = report.find('\n');
+    if (begin == std::string_view::npos || end == std::string_view::npos || end < begin) {
+        throw plugin_error(path, "its trial failed without a word");
+    }
+    const auto why = on_one_line(std::string{report.substr(end + 1)});
+    if (report[begin] == blames_setting) {
+        throw plugin_error(path, why, on_one_line(std::string{report.substr(begin + 1, end - begin - 1)}));
+    }
+    throw plugin_error(path, why);
+}
+
+std::array<int, 2> make_pipe() {
     std::array<int, 2> ends{};
-    if (::pipe2(ends.data(), O_CLOEXEC) != 0) {
+    if (::pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0) {
         throw std::system_error(errno, std::generic_category(), "cannot make a pipe");
     }
-    descriptor from{ends[0]};
-    descriptor into{ends[1]};
+    return ends;
+}
+
+} // namespace
+
+void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
+                const std::string& config, std::chrono::milliseconds limit) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    const auto words_ends = make_pipe();
+    descriptor from{words_ends[0]};
+    descriptor into{words_ends[1]};
+    const auto report_ends = make_pipe();
+    const descriptor report_from{report_ends[0]};
+    descriptor report_into{report_ends[1]};
     const auto child = ::fork();
     if (child < 0) {
         throw std::system_error(errno, std::generic_category(), "cannot start a process");
     }
     if (child == 0) {
-        load_and_end(file.c_str(), into.get());
+        try_and_end(file, node, config, into.get(), report_into.get());
     }
     into.close();
+    report_into.close();
     std::string words;
     const bool ended = read_words(from.get(), words, end);
     if (!ended) {
@@ -113,20 +216,22 @@ std::string try_library(const std::filesystem::path& file, std::chrono::millisec
     while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
     }
     words = on_one_line(std::move(words));
+    const auto report = read_report(report_from.get());
+    const auto steps = report.substr(0, report.find_first_of(verdicts));
+    const std::string what{words_for(steps.empty() ? loading : steps.back())};
     if (!ended) {
-        return "what it runs when it is loaded does not end" + (words.empty() ? "" : ": " + words);
+        throw plugin_error(path, with_words(what + " does not end", words));
     }
     if (WIFSIGNALED(status)) {
-        return "what it runs when it is loaded ends the process by signal " + std::to_string(WTERMSIG(status)) +
-               (words.empty() ? "" : ": " + words);
+        throw plugin_error(path,
+                           with_words(what + " ends the process by signal " + std::to_string(WTERMSIG(status)), words));
     }
-    if (WEXITSTATUS(status) == cannot_load) {
-        return "it cannot be loaded: " + (words.empty() ? "the system does not say why" : words);
+    if (WEXITSTATUS(status) == refused) {
+        refuse(path, report);
     }
-    if (WEXITSTATUS(status) != loaded) {
-        return "what it runs when it is loaded ends the process" + (words.empty() ? "" : ": " + words);
+    if (WEXITSTATUS(status) != usable) {
+        throw plugin_error(path, with_words(what + " ends the process", words));
     }
-    return {};
 }
 
 } // namespace cles::runtime

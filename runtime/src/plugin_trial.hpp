@@ -7,12 +7,17 @@
 
 namespace cles::runtime {
 
-/// Loads a library in a child process, and says what went wrong; empty where nothing did.
+/// Loads a plugin in a child process, calls its entry point, and has it check its settings; its tasks are not
+/// registered.
 ///
-/// What a library runs when it is loaded cannot be guarded against in the process that loads it: an exception out of a
-/// constructor of a global object ends the process, and so does a crash there, and one that never returns holds it. The
-/// child's last words are part of what is returned. Costs a few milliseconds. To be called before the process has
-/// other threads, or at least before those matter: the child is a copy of this thread alone.
-std::string try_library(const std::filesystem::path& file, std::chrono::milliseconds limit);
+/// What a library runs then cannot be guarded against in the process that runs it: an exception out of a constructor of
+/// a global object ends the process, and so does a crash, and what never returns holds it. The child's last words are
+/// part of what is thrown. Costs a few milliseconds. To be called before the process has other threads: the child is a
+/// copy of this thread alone, in which a lock that another one holds is never released.
+///
+/// \param path as the configuration names it \param file where it is \param config its settings, a JSON object
+/// \throws plugin_error where it cannot be used
+void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
+                const std::string& config, std::chrono::milliseconds limit);
 
 } // namespace cles::runtime

@@ -59,7 +59,12 @@ void pool_state::start() {
         static_cast<void>(box_.put([this] { notice_pause(); }));
     });
     if (options_.look_in.count() > 0) {
-        arm_tick();
+        // From when the executor runs, which may take a while.
+        asio::post(executor_, [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->arm_tick();
+            }
+        });
     }
 }
 
@@ -209,12 +214,11 @@ void pool_state::stop(job_record& r) {
     crew_.hurry(r, clock::now());
     if (callback) {
         r.add_reference();
-        stop_notifier_.notify({.callback = std::move(callback),
-                               .log = [job = job_context{r}](log_level level, const std::string& text) {
-                                   const auto& what = job.request();
-                                   job.log(level, std::string{to_string(what.verb())} + " '" +
-                                                      std::string{what.task()} + "': " + text);
-                               }});
+        stop_notifier_.notify(
+            {.callback = std::move(callback), .log = [job = job_context{r}](log_level level, const std::string& text) {
+                 const auto& what = job.request();
+                 job.log(level, std::string{to_string(what.verb())} + " '" + std::string{what.task()} + "': " + text);
+             }});
     }
 }
 

@@ -118,8 +118,7 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
         const auto blocked_threads = blocked;
         const bool last = blocked + 1 >= most_threads && !std::exchange(exhausted, true);
         lock.unlock();
-        log(*slow, log_level::warning,
-            "its on_stop callback does not return; another thread notifies the other jobs");
+        log(*slow, log_level::warning, "its on_stop callback does not return; another thread notifies the other jobs");
         if (last) {
             log(*slow, log_level::error,
                 std::to_string(blocked_threads) + " on_stop callbacks do not return: one more delays all that follow");

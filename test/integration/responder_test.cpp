@@ -137,7 +137,8 @@ BOOST_AUTO_TEST_CASE(what_it_asked_is_withdrawn_when_it_is_itself) {
     BOOST_TEST(told_before == 1);
     // Afterwards it may not ask any more.
     job->delegate("PULL tower:wind", heard());
-    BOOST_TEST(answers == 3);
+    BOOST_TEST(answers == 2); // it is told so later, never from inside the call
+    until([&] { return answers == 3; });
     BOOST_TEST(heard_code == cles::make_error_code(errc::cancelled));
 }
 
@@ -227,7 +228,8 @@ BOOST_AUTO_TEST_CASE(a_service_that_goes_ends_what_its_jobs_asked) {
     car.reset();
     until([&] { return answers == 1; });
     job->delegate("PULL tower:wind", heard());
-    BOOST_TEST(answers == 2);
+    BOOST_TEST(answers == 1); // as above
+    until([&] { return answers == 2; });
     BOOST_TEST(heard_code == cles::make_error_code(errc::stopped));
     job.reset();
 }

@@ -34,20 +34,23 @@ std::ostream& operator<<(std::ostream& out, const fault& f) { return out << f.li
 // What is said, without the path before it.
 constexpr std::array faults{
     fault{"bad_tasks", "PULL 'nothing' has no handler"},
+    fault{"crashes_in_check", "its check of its settings ends the process by signal 6"},
+    fault{"crashes_in_entry", "its entry point ends the process by signal 11"},
     fault{"describes_nothing", "its entry describes nothing"},
     fault{"exits_when_loaded", "what it runs when it is loaded ends the process"},
-    fault{"lacks_start", "its description lacks what version 1.0 of the plugin ABI has"},
-    fault{"newer_minor", "it needs version 1.7 of the plugin ABI, this host has 1.0"},
+    fault{"lacks_start", "its description lacks what version 1.1 of the plugin ABI has"},
+    fault{"newer_minor", "it needs version 1.8 of the plugin ABI, this host has 1.1"},
     fault{"no_entry", "it is no plugin: it has no function 'cles_plugin_v1'"},
     fault{"other_version", "it was made for version 2 of the plugin ABI, this host has version 1"},
     fault{"refuses", "the device is on fire"},
+    fault{"refuses_setting", "60 at most"},
     fault{"refuses_silently", "it refuses to start and does not say why"},
     fault{"throws_in_entry", "its entry threw: not today"},
     fault{"throws_in_start", "its start threw: no such device"},
     fault{"throws_when_loaded", "thrown by a global object"},
     fault{"too_short", "its description is too short to be one"},
     fault{"undefined_symbol", "cles_test_nobody_has_this"},
-    fault{"wrong_major", "it needs version 2.0 of the plugin ABI, this host has 1.0"},
+    fault{"wrong_major", "it needs version 2.1 of the plugin ABI, this host has 1.1"},
 };
 
 struct fixture {
@@ -96,6 +99,33 @@ BOOST_AUTO_TEST_CASE(a_library_that_never_ends_loading_is_given_up) {
     BOOST_CHECK_EXCEPTION(hasty.load("hangs_when_loaded.so", "{}", node), plugin_error, [](const plugin_error& e) {
         return std::string{e.what()} == "hangs_when_loaded.so: what it runs when it is loaded does not end";
     });
+}
+
+BOOST_AUTO_TEST_CASE(an_entry_point_that_never_returns_is_given_up) {
+    plugin_host hasty{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
+    BOOST_CHECK_EXCEPTION(hasty.load("hangs_in_entry.so", "{}", node), plugin_error, [](const plugin_error& e) {
+        return std::string{e.what()} == "hangs_in_entry.so: its entry point does not end";
+    });
+}
+
+BOOST_AUTO_TEST_CASE(the_setting_that_is_to_blame_is_named) {
+    const auto blamed = [](const std::string& library, const std::string& config, std::chrono::milliseconds trial) {
+        fixture f;
+        plugin_host other{{.node = "node", .folders = {MADE_PLUGINS}, .trial = trial}};
+        try {
+            other.load(library, config, f.node);
+        } catch (const plugin_error& e) {
+            return e.setting().value_or("none");
+        }
+        return std::string{"loaded"};
+    };
+    for (const auto trial : {10'000ms, 0ms}) { // by the check in a process of its own, and by the start
+        BOOST_TEST(blamed("sound.so", R"({"number":"many"})", trial) == "number");
+        BOOST_TEST(blamed("sound.so", R"({"numer":7})", trial) == "numer");
+        BOOST_TEST(blamed("sound.so", R"({"number":1001})", trial) == "number");
+        BOOST_TEST(blamed("sound.so", R"({"refuse":"error"})", trial) == "none");
+    }
+    BOOST_TEST(blamed("refuses_setting.so", "{}", 10'000ms) == "cameras[1].rate");
 }
 
 BOOST_AUTO_TEST_CASE(what_is_no_library_is_told) {

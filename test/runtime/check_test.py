@@ -3,9 +3,31 @@
 """clesd --check, --print-config, and where the configuration comes from."""
 
 import os
+import shutil
+import signal
+import subprocess
+import time
 import unittest
 
-from daemon import FAULTY, Folder, clean_environment, clesd
+from daemon import CLESD, FAULTY, STUBBORN, Folder, clean_environment, clesd
+from support import PATIENCE, wait_until
+
+SLOWNESS = max(PATIENCE / 30, 1)  # of sanitizers
+
+
+def children_of(pid):
+    with open(f"/proc/{pid}/task/{pid}/children", encoding="utf-8") as children:
+        return children.read().split()
+
+
+def has_ended(pid):
+    """Whether it runs no more, though nobody may have asked for its exit code."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf-8") as stat:
+            return stat.read().rpartition(")")[2].split()[0] in "ZX"
+    except FileNotFoundError:
+        return True
+
 
 ROOT = os.path.join(os.path.dirname(__file__), "..", "..")
 
@@ -47,6 +69,7 @@ class Check(unittest.TestCase):
     def test_a_plugin_lies_where_the_file_says_wherever_the_daemon_runs(self):
         with Folder() as f:
             f.write("", "plugins/mine.so")
+            shutil.copy(STUBBORN, f.file("plugins/mine.so"))
             file = f.write("plugins: [plugins/mine.so]\n")
             self.assertEqual(clesd("--config", file, "--check", cwd="/")[0], 0)
             file = f.write("plugin_path: plugins\nplugins: [mine.so]\n")
@@ -54,10 +77,89 @@ class Check(unittest.TestCase):
             file = f.write("plugins: [mine.so]\n")
             self.assertEqual(clesd("--config", file, "--check", cwd="/")[0], 2)
 
-    def test_plugins_are_not_run_by_a_check(self):
+    def refused(self, text, line, key, words, within=1.0):
+        """By a check, and by the daemon itself: the same words."""
         with Folder() as f:
-            file = f.write(f"plugins:\n  - path: {FAULTY}/hangs_when_loaded.so\n")
-            self.assertEqual(clesd("--config", file, "--check")[0], 0)
+            file = f.write(text)
+            begun = time.monotonic()
+            code, out, err = clesd("--config", file, "--check")
+            took = time.monotonic() - begun
+            self.assertEqual((code, out), (2, ""), err)
+            self.assertTrue(err.startswith(f"clesd: {file}:{line}: {key}: "), err)
+            self.assertIn(words, err)
+            self.assertEqual(err.count("\n"), 1, err)
+            self.assertLess(took, within * SLOWNESS)
+            self.assertEqual(clesd("--config", file, "--node", "a", "--listen", "tcp://127.0.0.1:0"), (2, "", err))
+
+    def test_a_plugin_that_cannot_be_used(self):
+        for name, words in (("crashes_in_entry", "its entry point ends the process by signal 11"),
+                            ("exits_when_loaded", "ends the process"),
+                            ("wrong_major", "this host has 1.1"),
+                            ("newer_minor", "this host has 1.1"),
+                            ("no_entry", "it is no plugin"),
+                            ("undefined_symbol", "cannot be loaded"),
+                            ("crashes_in_check", "its check of its settings ends the process by signal 6")):
+            with self.subTest(name):
+                self.refused(f"node: a\nplugins:\n  - path: {FAULTY}/{name}.so\n", 3, "plugins[0].path", words)
+
+    def test_a_plugin_of_another_machine(self):
+        with Folder() as f, open(STUBBORN, "rb") as library:
+            image = bytearray(library.read())
+            image[18] = 243  # e_machine: RISC-V
+            path = f.file("mine.so")
+            with open(path, "wb") as out:
+                out.write(image)
+            self.refused(f"plugins: [{path}]\n", 1, "plugins[0].path", "it cannot be loaded: ")
+
+    def test_plugins_are_not_started_by_a_check(self):
+        with Folder() as f:
+            for name in ("crashes_in_start", "hangs_in_start", "refuses"):
+                file = f.write(f"plugins:\n  - path: {FAULTY}/{name}.so\n")
+                self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used\n", ""))
+
+    def test_a_plugin_that_hangs_while_it_is_loaded_is_given_up_and_can_be_stopped(self):
+        for name in ("hangs_when_loaded", "hangs_in_entry"):
+            with Folder() as f:
+                file = f.write(f"plugins:\n  - path: {FAULTY}/{name}.so\n")
+                process = subprocess.Popen([CLESD, "--config", file], env=clean_environment(),
+                                           stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                try:
+                    wait_until(lambda: children_of(process.pid), "it tries the plugin")
+                    child = children_of(process.pid)[0]
+                    process.send_signal(signal.SIGTERM)
+                    self.assertEqual(process.wait(timeout=5), -signal.SIGTERM)
+                    wait_until(lambda: has_ended(child), "the child has gone")
+                finally:
+                    process.kill()
+                    process.wait()
+
+    def test_a_plugin_that_hangs_while_it_is_loaded_is_given_up(self):
+        self.refused(f"plugins: [{FAULTY}/hangs_when_loaded.so]\n", 1, "plugins[0].path", "does not end", within=15)
+
+    def test_settings_are_checked_by_the_plugin_and_the_right_key_is_blamed(self):
+        plugin = f"plugins:\n  - path: {FAULTY}/sound.so\n    required: true\n    config:\n"
+        self.refused(plugin + "      number: many\n", 5, "plugins[0].config.number", "expected")
+        self.refused(plugin + "      refuse: no\n      number: 1001\n", 6, "plugins[0].config.number", "1000 at most")
+        self.refused(plugin + "      numer: 7\n", 5, "plugins[0].config.numer", "it has no setting 'numer'")
+        self.refused(f"plugins:\n  - path: {STUBBORN}\n    config: {{a: 1}}\n", 3, "plugins[0].config.a",
+                     "it has no settings")
+        # As far as the file knows the key that the plugin names.
+        self.refused(f"plugins:\n  - path: {FAULTY}/refuses_setting.so\n    config:\n      cameras:\n"
+                     "        - rate: 30\n        - name: left\n          rate: 90\n", 7,
+                     "plugins[0].config.cameras[1].rate", "60 at most")
+
+    def test_a_file_that_is_no_configuration(self):
+        for text, line in (("%%%\n", 1), ("# a comment\n%%%\n", 2), ("%%%\n---\nnode: a\n", 1), ("~\n", 1),
+                           ("hello\n", 1), ("&a\n", 1), ("\ufeff%%%\n", 1), ("node: a\n...\n%%%\n", 3)):
+            with self.subTest(text), Folder() as f:
+                file = f.write(text)
+                for more in (["--check"], []):
+                    code, out, err = clesd("--config", file, *more)
+                    self.assertEqual((code, out), (2, ""), err)
+                    self.assertTrue(err.startswith(f"clesd: {file}:{line}: "), err)
+        for text in ("", "# nothing\n", "---\n# nothing\n...\n", "%YAML 1.2\n---\nnode: a\n", "\ufeff# nothing\n"):
+            with self.subTest(text), Folder() as f:
+                self.assertEqual(clesd("--config", f.write(text), "--check")[0], 0)
 
     def test_the_configuration_that_comes_along_can_be_used_and_says_the_defaults(self):
         file = os.path.join(ROOT, "config", "clesd.yaml")

@@ -52,6 +52,10 @@ class Folder:
             out.write(text)
         return self.file(name)
 
+    def read(self, name):
+        with open(self.file(name), encoding="utf-8") as file:
+            return file.read()
+
     def __enter__(self):
         return self
 

@@ -3,16 +3,20 @@
 """clesd and its plugins: those that cannot be used, and those whose tasks do what they must not."""
 
 import json
+import signal
 import statistics
+import subprocess
 import time
 import unittest
 
-from daemon import DEFAULTS, FAULTY, STUBBORN, Daemon, Folder, body, clesd, wait_until_running
+from daemon import (CLESD, DEFAULTS, FAULTY, STUBBORN, Daemon, Folder, body, clean_environment, clesd,
+                    wait_until_running)
 from support import wait_until
 
 # The plugin, and what is said of it.
 FAULTS = {
     "bad_tasks": "",
+    "crashes_in_entry": "by signal 11",
     "describes_nothing": "describes nothing",
     "exits_when_loaded": "",
     "lacks_start": "lacks what",
@@ -53,6 +57,33 @@ class Unusable(unittest.TestCase):
         for name, words in FAULTS.items():
             with self.subTest(name):
                 self.refused(f"{FAULTY}/{name}.so", words)
+
+    def test_one_that_ends_or_holds_the_process_while_it_starts(self):
+        for name, words in (("crashes_in_start", "its start ends the process by signal 11"),
+                            ("overflows_in_start", "its start ends the process by signal 11"),
+                            ("exits_in_start", "its start ends the process"),
+                            ("hangs_in_start", "its start does not end")):
+            with self.subTest(name), Folder() as f:
+                path = f"{FAULTY}/{name}.so"
+                file = f.write(DEFAULTS + f"plugins:\n  - path: {STUBBORN}\n  - path: {path}\n")
+                code, out, err = clesd("--config", file)
+                self.assertEqual((code, out), (2, ""), err)
+                self.assertEqual(err.splitlines()[-1], f"clesd: {file}:8: plugins[1].path: {path}: {words}")
+
+    def test_one_that_hangs_while_it_starts_does_not_keep_the_daemon_from_being_stopped(self):
+        with Folder() as f:
+            file = f.write(DEFAULTS + f"plugins:\n  - path: {STUBBORN}\n  - path: {FAULTY}/hangs_in_start.so\n")
+            with open(f.file("log"), "w", encoding="utf-8") as log:
+                process = subprocess.Popen([CLESD, "--config", file], env=clean_environment(),
+                                           stdout=subprocess.DEVNULL, stderr=log)
+            try:
+                wait_until(lambda: "plugin stubborn" in f.read("log"), "it starts them")
+                time.sleep(0.2)  # the next one hangs by then; where it does not, the signal ends the daemon too
+                process.send_signal(signal.SIGTERM)
+                self.assertEqual(process.wait(timeout=5), -signal.SIGTERM)
+            finally:
+                process.kill()
+                process.wait()
 
     def test_a_file_that_is_not_there(self):
         self.refused("/nowhere/plugin.so", "there is no such file")

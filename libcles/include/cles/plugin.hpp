@@ -5,13 +5,16 @@
 #include <cles/plugin_config.hpp>
 #include <cles/plugin_registrar.hpp>
 #include <cles/registrar.hpp>
+#include <cles/setting_error.hpp>
 
 #include <boost/callable_traits/args.hpp>
 
+#include <cstddef>
 #include <exception>
 #include <string_view>
 #include <tuple>
 #include <type_traits>
+#include <utility>
 
 /// A plugin for `clesd` in C++ (paper, section 3.6): a function that registers tasks, and one line.
 ///
@@ -22,7 +25,9 @@
 ///
 /// The same function serves an application's service and a test. It may take settings as a second argument, of any type
 /// that `<cles/convert.hpp>` reads; they are what the daemon's configuration says of the plugin under `config`. With a
-/// described struct whose members are `std::optional`, all may be left out, and one of another name is refused.
+/// described struct whose members are `std::optional`, all may be left out, and one of another name is refused. A
+/// struct with a `void check() const` says more about what it takes, by throwing a `cles::setting_error`; `clesd
+/// --check` calls that, and not the function.
 ///
 ///     void register_tasks(cles::registrar& to, const settings& wanted);
 ///
@@ -55,12 +60,13 @@ class plugin_entry {
     static const cles_plugin* describe(std::string_view name, std::string_view version) noexcept {
         static const cles_plugin description{.size = sizeof(cles_plugin),
                                              .abi_major = CLES_PLUGIN_ABI_MAJOR,
-                                             .abi_minor = CLES_PLUGIN_ABI_MINOR,
+                                             .abi_minor = 0, // it does without what came later
                                              .reserved = 0,
                                              .name = abi_text(name),
                                              .version = abi_text(version),
                                              .start = &start,
-                                             .stop = &stop};
+                                             .stop = &stop,
+                                             .check = &check};
         return &description;
     }
 
@@ -71,24 +77,54 @@ class plugin_entry {
         return *list;
     }
 
-    static int32_t start(const cles_host* host, cles_text config) noexcept {
+    // Hands what the settings say to `use`.
+    template <class F>
+    static void with_settings(cles_text config, F&& use) {
+        using arguments = boost::callable_traits::args_t<decltype(Register), std::tuple>;
+        if constexpr (std::tuple_size_v<arguments> == 1) {
+            expect_no_config(view_of(config));
+            use();
+        } else {
+            using settings = std::remove_cvref_t<std::tuple_element_t<1, arguments>>;
+            use(plugin_config<settings>(view_of(config)));
+        }
+    }
+
+    // True where it does not throw; otherwise the host has been told why.
+    template <class F>
+    static bool succeeds(const cles_host& host, F&& what) noexcept {
         try {
-            plugin_registrar to{*host, tasks()};
-            using arguments = boost::callable_traits::args_t<decltype(Register), std::tuple>;
-            if constexpr (std::tuple_size_v<arguments> == 1) {
-                expect_no_config(view_of(config));
-                Register(to);
+            std::forward<F>(what)();
+            return true;
+        } catch (const setting_error& e) {
+            constexpr auto end = offsetof(cles_host, refuse_setting) + sizeof(cles_host::refuse_setting);
+            if (host.size >= end) {
+                host.refuse_setting(&host, abi_text(e.key()), abi_text(e.message()));
             } else {
-                using settings = std::remove_cvref_t<std::tuple_element_t<1, arguments>>;
-                Register(to, plugin_config<settings>(view_of(config)));
+                host.refuse(&host, abi_text(e.message()));
             }
-            return 0;
         } catch (const error& e) {
-            host->refuse(host, abi_text(e.message()));
+            host.refuse(&host, abi_text(e.message()));
         } catch (const std::exception& e) {
-            host->refuse(host, abi_text(e.what()));
+            host.refuse(&host, abi_text(e.what()));
         } catch (...) {
-            host->refuse(host, abi_text("it threw something that is no exception"));
+            host.refuse(&host, abi_text("it threw something that is no exception"));
+        }
+        return false;
+    }
+
+    static int32_t check(const cles_host* host, cles_text config) noexcept {
+        return succeeds(*host, [&] { with_settings(config, [](const auto&...) {}); }) ? 0 : 1;
+    }
+
+    static int32_t start(const cles_host* host, cles_text config) noexcept {
+        const bool started = succeeds(*host, [&] {
+            plugin_registrar to{*host, tasks()};
+            with_settings(config,
+                          [&](auto&&... settings) { Register(to, std::forward<decltype(settings)>(settings)...); });
+        });
+        if (started) {
+            return 0;
         }
         stop();
         return 1;

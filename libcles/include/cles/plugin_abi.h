@@ -15,7 +15,8 @@
  *
  * - Text is UTF-8, a pointer and a length, not ended by a zero. JSON is text that holds one value. What is handed to a
  *   function is borrowed until that function returns; whoever wants to keep it copies it. That holds both ways.
- * - Functions of the host may be called from any thread, but for `add_task` and `refuse`, which are for `start` alone.
+ * - Functions of the host may be called from any thread, but for `add_task`, which is for `start` alone, and `refuse` and
+ *   `refuse_setting`, which are for `start` and `check`.
  *   The host and its functions stay valid until the process ends, and so does the loaded library.
  * - A handle of a job that has been answered, or never was, is harmless: the call does nothing and is counted.
  * - No exception may leave a function of the plugin. (One that does is caught where the compilers allow it.)
@@ -32,7 +33,7 @@ extern "C" {
 #endif
 
 #define CLES_PLUGIN_ABI_MAJOR 1u
-#define CLES_PLUGIN_ABI_MINOR 0u
+#define CLES_PLUGIN_ABI_MINOR 1u
 /* The name of the entry point, as text. */
 #define CLES_PLUGIN_ENTRY "cles_plugin_v1"
 
@@ -146,7 +147,7 @@ typedef struct cles_host {
     /* Adds a task: CLES_ADDED, or why not. The plugin may do without it; where `start` fails then, the host tells why.
      */
     int32_t (*add_task)(const struct cles_host* host, const cles_task* task);
-    /* Says why `start` is about to fail. */
+    /* Says why `start`, or `check`, is about to fail. */
     void (*refuse)(const struct cles_host* host, cles_text why);
 
     /* Publishes an update of "task" or "task/parameter/...", to all that are bound. Never blocks; where updates come
@@ -174,6 +175,11 @@ typedef struct cles_host {
     void (*delegate)(const struct cles_host* host, cles_job job, cles_text command, const cles_ask* ask);
     /* A line for the log that belongs to this job. */
     void (*job_log)(const struct cles_host* host, cles_job job, uint32_t level, cles_text text);
+
+    /* Since 1.1; a plugin that may meet an older host looks at `size`. */
+    /* Says why `start`, or `check`, is about to fail: for this setting, as "limit" or "cameras[2].rate" (empty: for all
+     * of them together). The host tells in which line it stands. */
+    void (*refuse_setting)(const struct cles_host* host, cles_text key, cles_text why);
 } cles_host;
 
 /* What the entry point returns: a structure that stays valid. */
@@ -194,6 +200,14 @@ typedef struct cles_plugin {
      * plugin holds (threads, files, devices) is let go of here. May be null. Not called where `start` failed.
      */
     void (*stop)(void);
+
+    /* Since 1.1. */
+    /*
+     * Looks whether `start` could do with this configuration, and does nothing else: it opens nothing and adds no task.
+     * 0; or not 0, after `refuse_setting` or `refuse`. May be null. Called in a process of its own, before `start` and by
+     * `clesd --check`; of the host's functions it may call those two and `log`.
+     */
+    int32_t (*check)(const cles_host* host, cles_text config);
 } cles_plugin;
 
 /* The entry point. It is called once. */

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <cles/convert.hpp>
-#include <cles/error.hpp>
+#include <cles/setting_error.hpp>
 
 #include <boost/describe/members.hpp>
 #include <boost/mp11/algorithm.hpp>
@@ -34,29 +34,45 @@ std::string unknown_setting(std::string_view json) {
     return unknown;
 }
 
+/// Settings that can say themselves whether they do, beyond their types.
+template <class C>
+concept checked_settings = requires(const C& settings) {
+    settings.check();
+};
+
+/// The path before the words of a failed conversion: "limit" of "limit: expected a number".
+inline std::string setting_named_in(std::string_view why) {
+    const auto end = why.find(": ");
+    const auto key = why.substr(0, end == std::string_view::npos ? 0 : end);
+    return std::string{key.find(' ') == std::string_view::npos ? key : std::string_view{}};
+}
+
 /// Reads it as a C. A slip of the pen in a setting's name is an error, lest it be taken for the default.
-/// \throws cles::error with `conversion`
+/// \throws cles::setting_error, and what the settings' own `check()` throws
 template <class C>
 C plugin_config(std::string_view json) {
     C config{};
     std::string why;
     if (!from_json(json, config, &why)) {
-        throw error(errc::conversion, "its configuration does not fit: " + why);
+        throw setting_error(setting_named_in(why), "its configuration does not fit: " + why);
     }
     if constexpr (described_struct<C>) {
         if (const auto unknown = unknown_setting<C>(json); !unknown.empty()) {
-            throw error(errc::conversion, "it has no setting '" + unknown + "'");
+            throw setting_error(unknown, "it has no setting '" + unknown + "'");
         }
+    }
+    if constexpr (checked_settings<C>) {
+        config.check();
     }
     return config;
 }
 
-/// For a plugin that has no settings. \throws cles::error with `conversion`
+/// For a plugin that has no settings. \throws cles::setting_error
 inline void expect_no_config(std::string_view json) {
     json_reader reader{json};
     std::string_view key;
     if (!reader.begin_object() || reader.next_key(key)) {
-        throw error(errc::conversion, "it has no settings, but was given some");
+        throw setting_error(std::string{key}, "it has no settings, but was given some");
     }
 }
 

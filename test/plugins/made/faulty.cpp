@@ -2,6 +2,8 @@
 // Plugins that are wrong in one way each, which FAULT_... names, written against the bare C entry point.
 #include <cles/plugin_abi.h>
 
+#include <csignal>
+#include <cstdlib>
 #include <stdexcept>
 
 #include <unistd.h>
@@ -10,10 +12,49 @@ namespace {
 
 constexpr cles_text text_of(const char* text, size_t size) { return {text, size}; }
 
+[[noreturn, maybe_unused]] void hang() {
+    for (;;) {
+        pause();
+    }
+}
+
+// Uses more of the stack than there is.
+[[maybe_unused]] int deeper(int depth) { // NOLINT(misc-no-recursion)
+    volatile char room[4096] = {};
+    room[depth % 4096] = 1;
+    return depth < 0 ? 0 : deeper(depth + 1) + room[0];
+}
+
+[[maybe_unused]] int32_t check(const cles_host* host, cles_text) {
+#if defined(FAULT_CRASHES_IN_CHECK)
+    (void)host;
+    std::abort();
+#elif defined(FAULT_REFUSES_SETTING)
+    host->refuse_setting(host, text_of("cameras[1].rate", 15), text_of("60 at most", 10));
+    return 1;
+#else
+    (void)host;
+    return 0;
+#endif
+}
+
 [[maybe_unused]] int32_t start(const cles_host* host, cles_text) {
 #if defined(FAULT_THROWS_IN_START)
     (void)host;
     throw std::runtime_error{"no such device"};
+#elif defined(FAULT_CRASHES_IN_START)
+    (void)host;
+    std::raise(SIGSEGV);
+    return 0;
+#elif defined(FAULT_OVERFLOWS_IN_START)
+    (void)host;
+    return deeper(1) == 7 ? 1 : 0;
+#elif defined(FAULT_EXITS_IN_START)
+    (void)host;
+    std::exit(0);
+#elif defined(FAULT_HANGS_IN_START)
+    (void)host;
+    hang();
 #elif defined(FAULT_REFUSES)
     host->refuse(host, text_of("the device is on fire", 21));
     return 1;
@@ -69,7 +110,8 @@ constexpr uint32_t size = sizeof(cles_plugin);
                                                .name = text_of("faulty", 6),
                                                .version = text_of("0", 1),
                                                .start = &start,
-                                               .stop = nullptr};
+                                               .stop = nullptr,
+                                               .check = &check};
 
 #if defined(FAULT_THROWS_WHEN_LOADED)
 struct at_load {
@@ -105,6 +147,11 @@ extern "C" CLES_PLUGIN_EXPORT const cles_plugin* cles_plugin_v1() {
     return nullptr;
 #elif defined(FAULT_THROWS_IN_ENTRY)
     throw std::runtime_error{"not today"};
+#elif defined(FAULT_CRASHES_IN_ENTRY)
+    std::raise(SIGSEGV);
+    return &description;
+#elif defined(FAULT_HANGS_IN_ENTRY)
+    hang();
 #elif defined(FAULT_UNDEFINED_SYMBOL)
     return cles_test_nobody_has_this() != 0 ? &description : nullptr;
 #else

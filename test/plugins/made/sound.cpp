@@ -16,6 +16,12 @@
 struct sound_settings {
     std::optional<int> number;
     std::optional<std::string> refuse;
+
+    void check() const {
+        if (number.value_or(0) > 1000) {
+            throw cles::setting_error("number", "number: 1000 at most");
+        }
+    }
 };
 BOOST_DESCRIBE_STRUCT(sound_settings, (), (number, refuse))
 

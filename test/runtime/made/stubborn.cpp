@@ -23,7 +23,8 @@ using namespace std::chrono_literals;
     }
 }
 
-// Writes down when it was called, by the clock that Python calls `time.monotonic_ns`; in one piece, whoever else writes.
+// Writes down when it was called, by the clock that Python calls `time.monotonic_ns`; in one piece, whoever else
+// writes.
 void mark(const std::string& file, const std::string& what) {
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
     const auto line = what + " " + std::to_string(std::chrono::nanoseconds{now}.count()) + "\n";
@@ -62,7 +63,6 @@ void register_stops(cles::registrar& to) {
 }
 
 void register_tasks(cles::registrar& to) {
-    register_stops(to);
     to.on_pull("quick", [] { return 42; });
     to.on_pull("hangs", [] { hang(); });
     to.on_pull("lingers", [] { std::this_thread::sleep_for(50ms); }, {.inline_ok = true});
@@ -90,6 +90,7 @@ void register_tasks(cles::registrar& to) {
         }
         answer.done("found");
     });
+    register_stops(to);
 }
 
 } // namespace

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <chrono>
+#include <string>
+
+namespace cles::runtime {
+
+/// While a plugin starts in this process, what ends or holds the process is said by one line on stderr, and ends it
+/// with a code of our choice: a crash, an `exit`, a start that takes longer than the limit. SIGTERM and SIGINT end the
+/// process as they do where nobody listens to them, since whoever would listen waits for the plugin.
+///
+/// One at a time, on the main thread.
+class plugin_start_guard {
+  public:
+    /// \param who the beginning of the line: "clesd: clesd.yaml:7: plugins[0].path: mine.so"
+    plugin_start_guard(const std::string& who, int exit_code, std::chrono::seconds limit);
+    plugin_start_guard(const plugin_start_guard&) = delete;
+    plugin_start_guard& operator=(const plugin_start_guard&) = delete;
+    ~plugin_start_guard();
+};
+
+} // namespace cles::runtime
