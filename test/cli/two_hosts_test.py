@@ -27,8 +27,8 @@ class TwoHosts(unittest.TestCase):
         self.addCleanup(process.kill)
         return process
 
-    def serve(self, host, name, *listen):
-        process = self.start(host, "serve", "--name", name, "--insecure", *[f"--listen={url}" for url in listen])
+    def serve(self, host, name, *listen, more=()):
+        process = self.start(host, "serve", "--name", name, "--insecure", *more, *[f"--listen={url}" for url in listen])
         said = [read_line(process) for _ in listen]
         return process, [re.search(r":(\d+)$", line).group(1) for line in said if "tcp" in line]
 
@@ -81,8 +81,8 @@ class TwoHosts(unittest.TestCase):
         self.assertEqual(json.loads(out)["endpoints"], [f"tcp://0.0.0.0:{port}"])
 
     def test_two_of_one_name_on_two_hosts_are_reported(self):
-        near, _ = self.serve(self.hosts.near, "car5", "tcp://0.0.0.0:0")
-        far, _ = self.serve(self.hosts.far, "car5", "tcp://0.0.0.0:0")
+        near, _ = self.serve(self.hosts.near, "car5", "tcp://0.0.0.0:0", more=["--allow-clash"])
+        far, _ = self.serve(self.hosts.far, "car5", "tcp://0.0.0.0:0", more=["--allow-clash"])
         for process, other in ((near, "10.77.0.2"), (far, "10.77.0.1")):
             while line := read_line(process, process.stderr):
                 if f"another node calls itself 'car5' too, on {other}" in line:

@@ -141,8 +141,9 @@ void presence::on_namesake_probed(const probe_outcome& found, time_point now) {
 void presence::confirm_clash(rival& second) {
     second.check.confirmed = true;
     if (!std::exchange(second.clashes, true)) {
-        const auto name = second.of.said.node;
-        tell(name, change::clash, std::string{second.of.where()});
+        const auto& r = second.of;
+        const auto name = r.said.node;
+        tell(name, change::clash, r.from == group_source{} ? std::string{r.where()} : host_text(r.from));
     }
 }
 
