@@ -277,6 +277,32 @@ BOOST_AUTO_TEST_CASE(a_withdrawal_reaches_whoever_does_it) {
     link.ask("PUSH self:cles/cancel/8 reply=no");
     BOOST_TEST(node.started.at(0)->stopped);
     node.started.clear();
+BOOST_AUTO_TEST_CASE(this_node_is_passed_over_where_its_handler_in_line_is_busy) {
+    node.on(verb::delegate, "work",
+            [](const cles::request&, cles::json_writer&) { throw cles::error(errc::busy, "not now"); });
+    offer("car2", task("DELEGATE", "work"), {.queued = 100});
+    for (const std::string id : {" id=7", ""}) {
+        link.ask("DELEGATE any:work" + id + " [1]");
+        BOOST_TEST(ways.open().node == "car2");
+        BOOST_TEST(ways.open().text.ends_with("[1]"));
+        ways.open().answers("[2]");
+        BOOST_TEST(link.take() == (id.empty() ? "[2]\n" : "id=7 [2]\n"));
+        node.pass(1s);
+    }
+    link.ask("DELEGATE any:work id=8");
+    ways.open().refuses(full);
+    BOOST_TEST(link.sent() == "id=8 busy");
+    BOOST_TEST(link.kind("DELEGATE car1:work id=9") == "id=9 busy"); // who names it means it
+}
+
+BOOST_AUTO_TEST_CASE(where_nobody_else_offers_it_its_own_busy_is_the_answer) {
+    node.on(verb::pull, "speed",
+            [](const cles::request&, cles::json_writer&) { throw cles::error(errc::busy, "not now"); });
+    const auto reply = link.reply("PULL any:speed id=7");
+    BOOST_TEST(reply.error == "busy");
+    BOOST_TEST(reply.message == "car1: not now");
+}
+
     BOOST_TEST(node.counts().handlers_running == 0U);
 }
 

@@ -68,8 +68,28 @@ BOOST_FIXTURE_TEST_CASE(a_later_answer_is_told_and_how_far_it_is, fixture) {
 
 BOOST_FIXTURE_TEST_CASE(what_a_handler_throws_is_its_failure, fixture) {
     node.on(verb::pull, "speed",
+            [](const cles::request&, cles::json_writer&) { throw cles::error(errc::denied, "never"); });
+    BOOST_TEST(run("PULL any:speed") == "denied begun: car1: never");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_busy_at_once_is_a_refusal_as_a_later_one_is, fixture) {
+    node.on(verb::pull, "speed",
             [](const cles::request&, cles::json_writer&) { throw cles::error(errc::busy, "later"); });
-    BOOST_TEST(run("PULL any:speed") == "busy begun: car1: later");
+    BOOST_TEST(run("PULL any:speed") == "busy: car1: later");
+}
+
+BOOST_FIXTURE_TEST_CASE(as_many_handlers_run_as_may, fixture) {
+    cles::test::test_node full{{.running = 1}};
+    full.on_later(verb::delegate, "work");
+    cles::test::test_link link{full};
+    link.ask("DELEGATE self:work id=1");
+    cles::protocol::request_line r;
+    cles::protocol::malformed_request wrong;
+    BOOST_REQUIRE(cles::protocol::parse_request("DELEGATE any:work", r, wrong));
+    cles::core::local_request second{full.host, errand, 0};
+    second.run(r, peer, full.clock.now() + 1s, full.clock.now());
+    BOOST_TEST(last() == "busy: car1 runs as many handlers as it may");
+    BOOST_TEST(link.reply("DELEGATE self:work id=2").message == "car1 runs as many handlers as it may");
 }
 
 BOOST_FIXTURE_TEST_CASE(a_later_busy_is_a_refusal, fixture) {

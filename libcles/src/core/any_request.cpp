@@ -47,11 +47,7 @@ void any_request::ask(const chooser::chosen& chosen, time_point now) {
     idempotent_ = chosen.idempotent || request_->verb == verb::pull;
     known_ = chosen.other != nullptr;
     if (asked_.empty()) {
-        call_->on_stop([weak = weak_from_this()] {
-            if (const auto self = weak.lock()) {
-                self->stop();
-            }
-        });
+        follow_stop();
     }
     if (known_) {
         auto& other = *chosen.other;
@@ -64,6 +60,20 @@ void any_request::ask(const chooser::chosen& chosen, time_point now) {
     asked_.push_back(routing_->host().name);
     here_ = std::make_unique<local_request>(routing_->shared_host(), shared_from_this(), 0);
     here_->run(*request_, peer_, due_, now);
+}
+
+void any_request::go_on_from_here(const protocol::failure& why) {
+    follow_stop();
+    asked_.push_back(routing_->host().name);
+    on_failure(0, {.told = why, .begun = false, .unreachable = false});
+}
+
+void any_request::follow_stop() {
+    call_->on_stop([weak = weak_from_this()] {
+        if (const auto self = weak.lock()) {
+            self->stop();
+        }
+    });
 }
 
 void any_request::stop() {

@@ -31,6 +31,8 @@ class any_request final : public routing::errand, public leg_events, public std:
     /// Asks whom `chosen` says.
     void ask(const chooser::chosen& chosen, time_point now);
     /// Chooses. False where it has to wait for others to be heard of.
+    /// Goes on after this node, which has refused it before it began.
+    void go_on_from_here(const protocol::failure& why);
     bool begin(time_point now) override;
     [[nodiscard]] bool over() const override { return call_->ended(); }
 
@@ -42,6 +44,7 @@ class any_request final : public routing::errand, public leg_events, public std:
     void go_on(leg_failure why, time_point now);
     [[nodiscard]] bool may_repeat(const leg_failure& why) const noexcept;
     void stop();
+    void follow_stop();
     void note_end(const leg_failure* why, time_point now);
 
     std::shared_ptr<routing> routing_;

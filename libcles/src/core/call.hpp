@@ -73,6 +73,9 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
     [[nodiscard]] const terms& wanted() const noexcept { return terms_; }
+    /// Adverbs that stand before its result, as they stand on the wire.
+    void set_head(std::string adverbs) { head_ = std::move(adverbs); }
+    [[nodiscard]] const std::string& head() const noexcept { return head_; }
     [[nodiscard]] time_point started() const noexcept { return started_; }
 
     // For its owner.
@@ -89,6 +92,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     terms terms_;
     time_point started_;
     double reported_ = 0;
+    std::string head_;
     std::function<void()> on_stop_;
     bool stopped_ = false;
 };

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/inbound.hpp"
 
-#include <cles/json_reader.hpp>
-
+#include "core/execution.hpp"
 #include "core/handler_failure.hpp"
 #include "core/progress_line.hpp"
 #include "core/raised.hpp"
@@ -18,7 +17,6 @@
 namespace cles::core {
 namespace {
 
-constexpr unsigned sample_every = 16;
 // What one turn may take of the requests that waited for each other, so that other links have theirs.
 constexpr int requests_per_turn = 256;
 constexpr std::size_t bytes_per_turn = 65536;
@@ -58,8 +56,6 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
         if (in_flight() < node_->bounds.in_flight) {
             waiting_.push_line(line, now);
             follow_waiting();
-        } else if (r.wants_reply) {
-            answer_in_turn(failure_text(busy(node_->name + ": too many requests wait on this link")), now);
         } else {
             ++node_->counts.errors_unsent;
         }
@@ -243,80 +239,39 @@ void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, ti
 }
 
 void inbound::serve_task(const protocol::request_line& r, time_point arrived, time_point now) {
-    const auto* h = node_->tasks.find(r.verb, r.noun.task);
-    if (h == nullptr) {
-        replies_.fail(r, no_such_task(*node_, r));
-        return;
-    }
-    if (r.verb == verb::update && !node_->published.can_open(protocol::canonical_path(r.noun, path_))) {
-        replies_.fail(r, busy(node_->name + ": '" + std::string{r.noun.task} + "' has as many nouns as it may"));
-        return;
-    }
+    const auto due = arrived + std::chrono::milliseconds{r.deadline_ms};
     auto storage = std::exchange(decoded_, {}); // the handler may have other requests served meanwhile
-    const auto parameters = decode(r.noun, storage);
-    const cles::detail::request_data data{.verb = r.verb,
-                                          .node = node_->name,
-                                          .task = r.noun.task,
-                                          .parameters = {parameters.data(), parameters.size()},
-                                          .body = r.body.empty() ? std::string_view{"{}"} : r.body,
-                                          .peer = &peer_,
-                                          .deadline = arrived + std::chrono::milliseconds{r.deadline_ms}};
-    if (h->plain) {
-        run_plain(r, *h, cles::request{data}, now);
-    } else {
-        run_later(r, *h, cles::request{data}, now);
+    execution task{*node_, r, peer_, due, storage};
+    if (const auto why = task.refusal()) {
+        refuse(r, *why, due, now);
+    } else if (!task.is_plain()) {
+        task.start(begin_call(r, task.terms(), due, now));
+    } else if (const auto failed = run_plain(r, task)) {
+        refuse(r, *failed, due, now);
     }
     decoded_ = std::move(storage);
 }
 
-void inbound::run_plain(const protocol::request_line& r, const handler& h, const cles::request& request, time_point) {
-    const bool timed = sample_++ % sample_every == 0;
-    const auto before = timed ? node_->time.now() : time_point{};
+std::optional<protocol::failure> inbound::run_plain(const protocol::request_line& r, execution& task) {
     try {
-        replies_.write(r, [&](json_writer& w) {
-            h.plain(request, w);
-            if (r.verb == verb::update) {
-                std::string body;
-                append_compact_json(request.body(), body);
-                node_->published.publish_body(protocol::canonical_path(r.noun, path_), body);
-            }
-        });
+        replies_.write(r, [&](json_writer& w) { task.run(w); });
+        return std::nullopt;
     } catch (...) {
-        replies_.fail(r, after_run(describe(std::current_exception())));
-    }
-    if (timed) {
-        node_->handler_time.record(node_->time.now() - before);
+        return after_run(describe(std::current_exception()));
     }
 }
 
-void inbound::run_later(const protocol::request_line& r, const handler& h, const cles::request& request,
-                        time_point now) {
-    call::terms wanted{.verb = r.verb,
-                       .id = r.id,
-                       .wants_reply = r.wants_reply,
-                       .wants_progress = r.wants_progress,
-                       .urgent = r.urgent};
-    if (r.verb == verb::update) {
-        wanted.publish_path = protocol::canonical_path(r.noun, path_);
-        append_compact_json(request.body(), wanted.publish_body);
-    }
-    const auto c = begin_call(r, std::move(wanted), request.deadline(), now);
-    if (!c) {
-        return;
-    }
-    try {
-        h.start(request, c);
-    } catch (...) {
-        c->fail(describe(std::current_exception()));
+// What came for `any` and was not begun here may be done by another node.
+void inbound::refuse(const protocol::request_line& r, const protocol::failure& why, time_point due, time_point now) {
+    if (has_begun(why) || node_->way == nullptr || is_for(*node_, r)) {
+        replies_.fail(r, why);
+    } else {
+        node_->way->go_on(r, peer_, why, due, now, *this);
     }
 }
 
 std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call::terms wanted, time_point due,
                                           time_point now) {
-    if (node_->counts.handlers_running >= node_->bounds.running) {
-        replies_.fail(r, busy(node_->name + " runs as many handlers as it may"));
-        return nullptr;
-    }
     auto c = std::make_shared<call>(node_, static_cast<call_owner&>(*this), std::move(wanted), now);
     if (r.id != 0) {
         if (datagrams_ && (r.verb == verb::pull || r.verb == verb::bind)) {
@@ -331,6 +286,10 @@ std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call:
 }
 
 std::shared_ptr<call> inbound::open_call(const protocol::request_line& r, time_point due, time_point now) {
+    if (const auto why = no_room_to_run(*node_)) {
+        replies_.fail(r, *why);
+        return nullptr;
+    }
     return begin_call(r,
                       {.verb = r.verb,
                        .id = r.id,
@@ -354,15 +313,13 @@ void inbound::withdraw(std::uint64_t id) {
 
 void inbound::answer(call& c, std::string_view json) {
     const auto& wanted = c.wanted();
-    if (!wanted.publish_path.empty()) {
-        try {
-            node_->published.publish_body(wanted.publish_path, wanted.publish_body);
-        } catch (...) {
-            refuse(c, describe(std::current_exception()));
-            return;
-        }
+    try {
+        publish_for(*node_, wanted);
+    } catch (...) {
+        refuse(c, describe(std::current_exception()));
+        return;
     }
-    replies_.done({wanted.id, wanted.wants_reply, wanted.urgent}, json);
+    replies_.done({wanted.id, wanted.wants_reply, wanted.urgent}, json, c.head());
     detach(c);
 }
 

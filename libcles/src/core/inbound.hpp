@@ -24,6 +24,8 @@
 
 namespace cles::core {
 
+class execution;
+
 /// Serves the requests that one link brings (docs/protocol.md, "Order" and "Ends").
 ///
 /// Requests with an id start at once. Those without wait for each other. Plain handlers are run in line and answered
@@ -66,8 +68,8 @@ class inbound final : private call_owner, private call_opener {
     void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
     void serve_here(const protocol::request_line& request, time_point arrived, time_point now);
     void serve_task(const protocol::request_line& request, time_point arrived, time_point now);
-    void run_plain(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
-    void run_later(const protocol::request_line& request, const handler& h, const cles::request& r, time_point now);
+    std::optional<protocol::failure> run_plain(const protocol::request_line& request, execution& task);
+    void refuse(const protocol::request_line& request, const protocol::failure& why, time_point due, time_point now);
 
     std::shared_ptr<call> begin_call(const protocol::request_line& request, call::terms wanted, time_point due,
                                      time_point now);
@@ -96,8 +98,7 @@ class inbound final : private call_owner, private call_opener {
     reply_writer replies_;
     std::optional<datagram_requests> datagrams_; // where it is no stream
     bind_requests bound_;
-    std::string path_;    // of the noun being served, where it had to be rebuilt
-    std::string decoded_; // its parameters, where they held escapes
+    std::string decoded_; // room for the parameters of the noun being served
     bool serving_waiting_ = false;
     bool paused_ = false;
     bool ending_ = false;  // the peer sends no more, or what it sends is no longer read

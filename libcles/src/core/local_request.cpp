@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/local_request.hpp"
 
-#include <cles/json_reader.hpp>
-
+#include "core/execution.hpp"
 #include "core/handler_failure.hpp"
 #include "core/refusals.hpp"
-#include "core/request_checks.hpp"
 #include "core/result_text.hpp"
 #include "protocol/message.hpp"
 
@@ -28,36 +26,14 @@ void local_request::run(const protocol::request_line& r, const identity& peer, t
         run_reserved(r);
         return;
     }
-    const auto* h = node_->tasks.find(r.verb, r.noun.task);
-    if (h == nullptr) {
-        fail(no_such_task(*node_, r), false);
-        return;
-    }
     std::string decoded;
-    const auto parameters = decode(r.noun, decoded);
-    const cles::detail::request_data data{.verb = r.verb,
-                                          .node = node_->name,
-                                          .task = r.noun.task,
-                                          .parameters = {parameters.data(), parameters.size()},
-                                          .body = r.body.empty() ? std::string_view{"{}"} : r.body,
-                                          .peer = &peer,
-                                          .deadline = due};
-    if (r.verb == verb::update) {
-        std::string scratch;
-        publish_path_ = protocol::canonical_path(r.noun, scratch);
-        append_compact_json(data.body, publish_body_);
-        if (!node_->published.can_open(publish_path_)) {
-            fail({.code = errc::busy,
-                  .message = node_->name + ": '" + std::string{r.noun.task} + "' has as many nouns as it may"},
-                 false);
-            return;
-        }
-    }
-    const cles::request request{data};
-    if (h->plain) {
-        run_plain(*h, request);
+    execution task{*node_, r, peer, due, decoded};
+    if (auto why = task.refusal()) {
+        fail(std::move(*why), false);
+    } else if (task.is_plain()) {
+        run_plain(task);
     } else {
-        run_later(*h, request, r.wants_progress, now);
+        run_later(task, due, now);
     }
 }
 
@@ -75,50 +51,54 @@ void local_request::run_reserved(const protocol::request_line& r) {
     finish(std::move(text));
 }
 
-void local_request::run_plain(const handler& h, const cles::request& request) {
+void local_request::run_plain(execution& task) {
     std::string text;
     try {
         json_writer w{text};
-        h.plain(request, w);
+        task.run(w);
     } catch (...) {
-        fail(describe(std::current_exception()), true);
+        auto why = describe(std::current_exception());
+        const bool begun = has_begun(why);
+        fail(std::move(why), begun);
         return;
     }
     finish(std::move(text));
 }
 
-void local_request::run_later(const handler& h, const cles::request& request, bool wants_progress, time_point now) {
-    if (node_->counts.handlers_running >= node_->bounds.running) {
-        fail({.code = errc::busy, .message = node_->name + " runs as many handlers as it may"}, false);
-        return;
-    }
+void local_request::run_later(execution& task, time_point due, time_point now) {
     constexpr std::uint64_t some_id = 1; // there is no progress without one
-    const auto c = std::make_shared<call>(
-        node_, static_cast<call_owner&>(*this),
-        call::terms{.verb = request.verb(), .id = some_id, .wants_progress = wants_progress}, now);
+    auto wanted = task.terms();
+    wanted.id = some_id;
+    const auto c = std::make_shared<call>(node_, static_cast<call_owner&>(*this), std::move(wanted), now);
     call_ = c;
-    node_->deadlines.arm(*c, request.deadline());
-    try {
-        h.start(request, c);
-    } catch (...) {
-        c->fail(describe(std::current_exception()));
-    }
+    node_->deadlines.arm(*c, due);
+    task.start(c);
 }
 
 // -- what the handler says -----------------------------------------------------------------------------------------
 
 void local_request::answer(call& c, std::string_view json) {
-    const auto keep = c.shared_from_this();
-    c.detach();
-    call_.reset();
+    const auto keep = let_go(c);
+    try {
+        publish_for(*node_, c.wanted());
+    } catch (...) {
+        fail(describe(std::current_exception()), true);
+        return;
+    }
     finish(std::string{json});
 }
 
 void local_request::refuse(call& c, const protocol::failure& why) {
-    const auto keep = c.shared_from_this();
+    const auto keep = let_go(c);
+    fail(why, has_begun(why));
+}
+
+std::shared_ptr<call> local_request::let_go(call& c) {
+    auto keep = c.shared_from_this();
     c.detach();
+    node_->handler_time.record(node_->time.now() - c.started());
     call_.reset();
-    fail(why, why.code != errc::busy || why.ran);
+    return keep;
 }
 
 void local_request::report(call&, double fraction, std::string_view json) {
@@ -135,20 +115,8 @@ void local_request::finish(std::string json) {
         fail({.code = errc::failed, .message = "the result's first key is 'error'"}, true);
         return;
     }
-    try {
-        publish();
-    } catch (...) {
-        fail(describe(std::current_exception()), true);
-        return;
-    }
     if (const auto to = std::exchange(to_, nullptr)) {
         to->on_result(which_, json);
-    }
-}
-
-void local_request::publish() {
-    if (!publish_path_.empty()) {
-        node_->published.publish_body(publish_path_, publish_body_);
     }
 }
 

@@ -14,6 +14,8 @@
 
 namespace cles::core {
 
+class execution;
+
 /// A request for `any` or `all` that this node serves itself, as one of those that might or do.
 class local_request final : public call_owner {
   public:
@@ -32,19 +34,16 @@ class local_request final : public call_owner {
     void report(call& c, double fraction, std::string_view json) override;
 
     void run_reserved(const protocol::request_line& r);
-    void run_plain(const handler& h, const cles::request& request);
-    void run_later(const handler& h, const cles::request& request, bool wants_progress, time_point now);
-    /// What was asked for is published, where it was.
+    void run_plain(execution& task);
+    void run_later(execution& task, time_point due, time_point now);
+    std::shared_ptr<call> let_go(call& c);
     void finish(std::string json);
     void fail(protocol::failure why, bool begun);
-    void publish();
 
     std::shared_ptr<node> node_;
     std::shared_ptr<leg_events> to_; // null: it has ended
     std::size_t which_;
     std::shared_ptr<call> call_;
-    std::string publish_path_;
-    std::string publish_body_;
 };
 
 } // namespace cles::core

@@ -21,6 +21,13 @@ protocol::failure overlong(const node& n, std::size_t datagram) {
             .message = n.name + ": a line has at most " + std::to_string(n.bounds.line) + " bytes"};
 }
 
+std::optional<protocol::failure> no_room_to_run(const node& n) {
+    if (n.counts.handlers_running < n.bounds.running) {
+        return std::nullopt;
+    }
+    return busy(n.name + " runs as many handlers as it may");
+}
+
 protocol::failure after_run(protocol::failure why) {
     why.ran = why.code == errc::too_large;
     return why;

@@ -5,6 +5,7 @@
 #include "protocol/message.hpp"
 
 #include <cstddef>
+#include <optional>
 #include <string>
 
 /// What requests are refused with.
@@ -15,6 +16,8 @@ protocol::failure busy(std::string message);
 protocol::failure no_such_task(const node& n, const protocol::request_line& request);
 /// A line over the limit; `datagram`: bytes of one, 0 on a stream.
 protocol::failure overlong(const node& n, std::size_t datagram);
+/// That it runs as many handlers as it may; nothing where it does not.
+std::optional<protocol::failure> no_room_to_run(const node& n);
 /// A failure once the handler has begun: whoever repeats what was too large has to know.
 protocol::failure after_run(protocol::failure why);
 

@@ -34,9 +34,12 @@ void reply_writer::note(std::uint64_t id, std::string_view reply) {
     }
 }
 
-void reply_writer::done(reply_to where, std::string_view body) {
+void reply_writer::done(reply_to where, std::string_view body, std::string_view head) {
     std::string text;
     protocol::append_reply_head(text, where.id);
+    if (where.id != 0 && !head.empty()) {
+        text.append(head).push_back(' ');
+    }
     const auto at = text.size();
     text.append(body);
     send(where, text, at);

@@ -53,8 +53,8 @@ class reply_writer {
             spare_ = std::move(text);
         }
     }
-    /// A reply with this body; empty for {}.
-    void done(reply_to where, std::string_view body);
+    /// A reply with this body; empty for {}. Where the request had an id, `head` are adverbs that stand before it.
+    void done(reply_to where, std::string_view body, std::string_view head = {});
     void fail(reply_to where, const protocol::failure& why);
     /// The same, where it is not the reply to the request of that id which is in flight.
     void fail_apart(reply_to where, const protocol::failure& why);

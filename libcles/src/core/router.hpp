@@ -5,6 +5,7 @@
 #include <cles/limits.hpp>
 
 #include "core/call.hpp"
+#include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <memory>
@@ -39,7 +40,10 @@ class router {
     /// `peer` lives as long as the call has not ended.
     virtual bool route(const protocol::request_line& request, const identity& peer, time_point due, time_point now,
                        call_opener& from) = 0;
-    /// The same for BIND. What the peer of the link is bound to stands in `place`, which lives as long as the call.
+    /// This node was to serve a request in line, and was `busy`, so that it has not begun: has another one asked.
+    virtual void go_on(const protocol::request_line& request, const identity& peer, const protocol::failure& why,
+                       time_point due, time_point now, call_opener& from) = 0;
+    /// As `route`, for BIND. What the peer of the link is bound to stands in `place`, which lives as long as the call.
     virtual void bind(const protocol::request_line& request, relayed_bindings& place, time_point due, time_point now,
                       call_opener& from) = 0;
     /// Where what is bound comes from.

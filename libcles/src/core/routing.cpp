@@ -60,6 +60,13 @@ bool routing::route(const protocol::request_line& r, const identity& peer, time_
     return true;
 }
 
+void routing::go_on(const protocol::request_line& r, const identity& peer, const protocol::failure& why, time_point due,
+                    time_point now, call_opener& from) {
+    if (auto c = from.open_call(r, due, now)) {
+        std::make_shared<any_request>(shared_from_this(), r, peer, std::move(c), due)->go_on_from_here(why);
+    }
+}
+
 void routing::bind(const protocol::request_line& r, relayed_bindings& place, time_point due, time_point now,
                    call_opener& from) {
     const auto c = from.open_call(r, due, now);

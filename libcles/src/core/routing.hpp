@@ -37,6 +37,8 @@ class routing final : public router, private catalogue::listener, public std::en
 
     bool route(const protocol::request_line& request, const identity& peer, time_point due, time_point now,
                call_opener& from) override;
+    void go_on(const protocol::request_line& request, const identity& peer, const protocol::failure& why,
+               time_point due, time_point now, call_opener& from) override;
     void bind(const protocol::request_line& request, relayed_bindings& place, time_point due, time_point now,
               call_opener& from) override;
     std::shared_ptr<relays> relayed() override { return relays_; }
