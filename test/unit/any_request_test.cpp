@@ -218,6 +218,35 @@ BOOST_AUTO_TEST_CASE(what_may_run_twice_is_repeated_when_it_was_lost) {
     BOOST_TEST(link.sent() == "id=7 ok");
 }
 
+BOOST_AUTO_TEST_CASE(what_was_lost_twice_is_not_begun_a_third_time) {
+    two_others("DELEGATE", "work", true);
+    offer("car4", task("DELEGATE", "work", true));
+    const auto before = ways.count();
+    link.ask("DELEGATE any:work id=7");
+    ways.open().fails(errc::unavailable, "the link was lost");
+    ways.open().refuses(R"({"error":"unavailable","message":"it was lost there too","more":1})");
+    BOOST_TEST(ways.count_open() == 0U);
+    BOOST_TEST(ways.count() - before == 2U);
+    const auto last = link.take();
+    BOOST_TEST(last.starts_with(R"(id=7 {"error":"unavailable","message":)"), last);
+    BOOST_TEST(last.ends_with("\"ran\":true}\n"), last);
+}
+
+BOOST_AUTO_TEST_CASE(what_another_has_begun_twice_is_not_begun_again) {
+    two_others("DELEGATE", "work", true);
+    link.ask("DELEGATE any:work id=7");
+    ways.open().refuses(R"({"error":"unavailable","message":"lost","ran":true})");
+    BOOST_TEST(link.take() == "id=7 {\"error\":\"unavailable\",\"message\":\"lost\",\"ran\":true}\n");
+}
+
+BOOST_AUTO_TEST_CASE(what_may_have_begun_is_not_told_as_busy) {
+    two_others("DELEGATE", "work", true);
+    link.ask("DELEGATE any:work id=7");
+    ways.open().fails(errc::unavailable, "the link was lost");
+    ways.open().refuses(full);
+    BOOST_TEST(link.sent() == "id=7 unavailable");
+}
+
 BOOST_AUTO_TEST_CASE(a_pull_is_repeated_when_it_was_lost) {
     two_others("PULL", "speed");
     link.ask("PULL any:speed id=7");
@@ -246,6 +275,32 @@ BOOST_AUTO_TEST_CASE(this_node_is_passed_over_where_it_is_busy) {
     BOOST_TEST(link.sent() == "id=7 ok");
     link.ask("DELEGATE any:work id=8"); // and for as long as it said
     BOOST_TEST(ways.open().node == "car2");
+}
+
+BOOST_AUTO_TEST_CASE(this_node_is_passed_over_where_its_handler_in_line_is_busy) {
+    node.on(verb::delegate, "work",
+            [](const cles::request&, cles::json_writer&) { throw cles::error(errc::busy, "not now"); });
+    offer("car2", task("DELEGATE", "work"), {.queued = 100});
+    for (const std::string id : {" id=7", ""}) {
+        link.ask("DELEGATE any:work" + id + " [1]");
+        BOOST_TEST(ways.open().node == "car2");
+        BOOST_TEST(ways.open().text.ends_with("[1]"));
+        ways.open().answers("[2]");
+        BOOST_TEST(link.take() == (id.empty() ? "[2]\n" : "id=7 [2]\n"));
+        node.pass(1s);
+    }
+    link.ask("DELEGATE any:work id=8");
+    ways.open().refuses(full);
+    BOOST_TEST(link.sent() == "id=8 busy");
+    BOOST_TEST(link.kind("DELEGATE car1:work id=9") == "id=9 busy"); // who names it means it
+}
+
+BOOST_AUTO_TEST_CASE(where_nobody_else_offers_it_its_own_busy_is_the_answer) {
+    node.on(verb::pull, "speed",
+            [](const cles::request&, cles::json_writer&) { throw cles::error(errc::busy, "not now"); });
+    const auto reply = link.reply("PULL any:speed id=7");
+    BOOST_TEST(reply.error == "busy");
+    BOOST_TEST(reply.message == "car1: not now");
 }
 
 BOOST_AUTO_TEST_CASE(this_node_is_asked_after_another) {
@@ -277,32 +332,6 @@ BOOST_AUTO_TEST_CASE(a_withdrawal_reaches_whoever_does_it) {
     link.ask("PUSH self:cles/cancel/8 reply=no");
     BOOST_TEST(node.started.at(0)->stopped);
     node.started.clear();
-BOOST_AUTO_TEST_CASE(this_node_is_passed_over_where_its_handler_in_line_is_busy) {
-    node.on(verb::delegate, "work",
-            [](const cles::request&, cles::json_writer&) { throw cles::error(errc::busy, "not now"); });
-    offer("car2", task("DELEGATE", "work"), {.queued = 100});
-    for (const std::string id : {" id=7", ""}) {
-        link.ask("DELEGATE any:work" + id + " [1]");
-        BOOST_TEST(ways.open().node == "car2");
-        BOOST_TEST(ways.open().text.ends_with("[1]"));
-        ways.open().answers("[2]");
-        BOOST_TEST(link.take() == (id.empty() ? "[2]\n" : "id=7 [2]\n"));
-        node.pass(1s);
-    }
-    link.ask("DELEGATE any:work id=8");
-    ways.open().refuses(full);
-    BOOST_TEST(link.sent() == "id=8 busy");
-    BOOST_TEST(link.kind("DELEGATE car1:work id=9") == "id=9 busy"); // who names it means it
-}
-
-BOOST_AUTO_TEST_CASE(where_nobody_else_offers_it_its_own_busy_is_the_answer) {
-    node.on(verb::pull, "speed",
-            [](const cles::request&, cles::json_writer&) { throw cles::error(errc::busy, "not now"); });
-    const auto reply = link.reply("PULL any:speed id=7");
-    BOOST_TEST(reply.error == "busy");
-    BOOST_TEST(reply.message == "car1: not now");
-}
-
     BOOST_TEST(node.counts().handlers_running == 0U);
 }
 

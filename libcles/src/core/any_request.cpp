@@ -116,7 +116,7 @@ bool any_request::may_repeat(const leg_failure& why) const noexcept {
         return why.unreachable || why.told.code == errc::busy || why.told.code == errc::no_task ||
                why.told.code == errc::no_target;
     }
-    return why.told.code == errc::unavailable && idempotent_;
+    return why.told.code == errc::unavailable && idempotent_ && !lost_ && !why.told.ran;
 }
 
 void any_request::on_failure(std::size_t, leg_failure why) {
@@ -134,9 +134,16 @@ void any_request::on_failure(std::size_t, leg_failure why) {
 void any_request::go_on(leg_failure why, time_point now) {
     const auto busy = why.told.code == errc::busy;
     const auto begun = why.begun;
+    const bool lost = begun && why.told.code == errc::unavailable;
     busy_ += busy ? 1 : 0;
     const bool repeat = may_repeat(why) && busy_ < most_busy;
     auto told = named(std::move(why), asked_.back());
+    if (lost && lost_) {
+        told.ran = true;
+        told.answer.clear(); // another node's words do not know of the first time
+    } else if (lost) {
+        lost_ = told;
+    }
     if (busy && (!last_busy_ || told.retry_ms.value_or(0) < last_busy_->retry_ms.value_or(0))) {
         last_busy_ = told;
     }
@@ -150,7 +157,12 @@ void any_request::go_on(leg_failure why, time_point now) {
         }
     }
     // Busy promises that the work was not begun.
-    call_->fail(last_busy_ && !begun ? *last_busy_ : told);
+    if (!begun && lost_) {
+        told = *lost_;
+    } else if (!begun && last_busy_) {
+        told = *last_busy_;
+    }
+    call_->fail(std::move(told));
 }
 
 } // namespace cles::core

@@ -19,7 +19,8 @@
 namespace cles::core {
 
 /// A request for `any`: asks one node, and another where that one could not be reached or refused the work before it
-/// began. Work that began and was lost is repeated only where that does no harm.
+/// began. Work that began and was lost is repeated only where that does no harm, and once: what brings down whoever
+/// does it is not to go from node to node.
 class any_request final : public routing::errand, public leg_events, public std::enable_shared_from_this<any_request> {
   public:
     /// Of busy nodes no more are asked than this: a network that is full is not to be kept at it by asking around.
@@ -30,9 +31,9 @@ class any_request final : public routing::errand, public leg_events, public std:
 
     /// Asks whom `chosen` says.
     void ask(const chooser::chosen& chosen, time_point now);
-    /// Chooses. False where it has to wait for others to be heard of.
     /// Goes on after this node, which has refused it before it began.
     void go_on_from_here(const protocol::failure& why);
+    /// Chooses. False where it has to wait for others to be heard of.
     bool begin(time_point now) override;
     [[nodiscard]] bool over() const override { return call_->ended(); }
 
@@ -43,8 +44,8 @@ class any_request final : public routing::errand, public leg_events, public std:
 
     void go_on(leg_failure why, time_point now);
     [[nodiscard]] bool may_repeat(const leg_failure& why) const noexcept;
-    void stop();
     void follow_stop();
+    void stop();
     void note_end(const leg_failure* why, time_point now);
 
     std::shared_ptr<routing> routing_;
@@ -57,6 +58,7 @@ class any_request final : public routing::errand, public leg_events, public std:
     bool known_ = false;             // it is another, whose load is followed
     int busy_ = 0;
     std::optional<protocol::failure> last_busy_;
+    std::optional<protocol::failure> lost_; // a node that may have begun it
     std::uint64_t ticket_ = 0;
     std::unique_ptr<local_request> here_;
 };
