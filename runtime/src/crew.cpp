@@ -53,6 +53,18 @@ void crew::mirror() noexcept {
         std::memory_order_relaxed);
 }
 
+// To be called when a worker begins or ends a job.
+void crew::note_progress(time_point now) noexcept {
+    const bool all = at_work_ >= watch_.allowed();
+    held_since_.store(all ? now.time_since_epoch().count() : 0, std::memory_order_relaxed);
+}
+
+std::chrono::nanoseconds crew::held_for(time_point now) const noexcept {
+    const auto since = held_since_.load(std::memory_order_relaxed);
+    return since == 0 ? std::chrono::nanoseconds{0}
+                      : std::max<std::chrono::nanoseconds>(now - time_point{time_point::duration{since}}, {});
+}
+
 crew::admission crew::push(job_record& job) {
     const std::lock_guard lock{mutex_};
     if (closed_ || watch_.usable() == 0) {
@@ -226,6 +238,7 @@ void crew::work() {
         job.worker = place;
         watch_.begin(place, &job, now, job.request().deadline());
         ++at_work_;
+        note_progress(now);
         mirror();
         std::vector<std::function<void()>> now_due;
         now_due.swap(job.called_back);
@@ -253,6 +266,7 @@ void crew::work() {
         service_time_.add(ended - now);
         now = ended;
         --at_work_;
+        note_progress(now);
         figures_.revived += watch_.end(place) ? 1 : 0;
         done = &job;
         job.where = job_record::place::nowhere;
@@ -290,6 +304,9 @@ void crew::watch(time_point now, const std::function<void(const worker_watch::fi
             figures_.replaced += what.replaced ? 1 : 0;
         });
         threads = watch_.allowed();
+        if (at_work_ < threads) { // another has taken the place of one that was stuck
+            held_since_.store(0, std::memory_order_relaxed);
+        }
         mirror();
     }
     for (const auto& each : all) {

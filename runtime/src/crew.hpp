@@ -72,6 +72,8 @@ class crew {
     [[nodiscard]] std::uint32_t usable() const noexcept { return usable_.load(std::memory_order_relaxed); }
     /// How long a job holds a worker, smoothed, in microseconds; zero where there has been none.
     [[nodiscard]] std::uint32_t service_us() const noexcept { return service_us_.load(std::memory_order_relaxed); }
+    /// For how long all workers have been at their jobs, without one coming free; zero where one is free.
+    [[nodiscard]] std::chrono::nanoseconds held_for(time_point now) const noexcept;
     struct figures {
         std::uint64_t stuck = 0;
         std::uint64_t replaced = 0;
@@ -89,6 +91,7 @@ class crew {
     void drop_called_back();
     [[nodiscard]] bool wants_worker() const noexcept;
     void mirror() noexcept;
+    void note_progress(time_point now) noexcept;
 
     result_box& box_;
     worker_threads threads_;
@@ -108,6 +111,7 @@ class crew {
     std::atomic<std::uint32_t> running_{0};
     std::atomic<std::uint32_t> usable_{0};
     std::atomic<std::uint32_t> service_us_{0};
+    std::atomic<time_point::rep> held_since_{0}; // 0: a worker is free
 };
 
 } // namespace cles::runtime

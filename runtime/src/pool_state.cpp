@@ -217,10 +217,13 @@ node_load pool_state::load() const noexcept {
     const auto queued = crew_.queued();
     const auto open = static_cast<std::uint32_t>(answers_.size());
     const auto begun = open - std::min(queued, open);
+    // Where no worker comes free the next job waits at least as long as that has been so.
+    const auto held = std::chrono::duration_cast<std::chrono::microseconds>(crew_.held_for(clock::now())).count();
+    constexpr std::int64_t most = 1'000'000'000;
     return {.queued = queued,
             .running = std::max(begun, crew_.running()),
             .workers = crew_.usable(),
-            .service_us = crew_.service_us()};
+            .service_us = std::max(crew_.service_us(), static_cast<std::uint32_t>(std::min<std::int64_t>(held, most)))};
 }
 
 pool_figures pool_state::figures() const {

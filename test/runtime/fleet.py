@@ -42,6 +42,10 @@ class Fleet:
     def live_at(self, name):
         return {peer["node"] for peer in self.peers_at(name) if peer["state"] == "live"}
 
+    def load_at(self, name, other):
+        """What the one knows of the other's load."""
+        return next((peer["load"] for peer in self.peers_at(name) if peer["node"] == other), {})
+
     def kill(self, name):
         """Returns when it has gone, and the system has closed all that it held."""
         self.nodes[name].send_signal(signal.SIGKILL)

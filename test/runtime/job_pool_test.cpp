@@ -320,4 +320,30 @@ BOOST_FIXTURE_TEST_CASE(its_load_tells_how_long_a_job_takes, fixture) {
     BOOST_TEST(pool->load().service_us >= 5'000U);
 }
 
+BOOST_FIXTURE_TEST_CASE(its_load_tells_that_no_worker_comes_free, fixture) {
+    cles::test::gate open;
+    add("quick", [](const job_context& job) { job.done("1"); });
+    add("waits", [&open](const job_context& job) {
+        open.pass();
+        job.done("1");
+    });
+    ask("DELEGATE self:quick");
+    auto one = peer();
+    one.send("DELEGATE self:waits id=1\n");
+    wait_for([&] { return pool->figures().running == 1; });
+    std::this_thread::sleep_for(30ms);
+    BOOST_TEST(pool->load().service_us < 30'000U); // the other worker is free
+    one.send("DELEGATE self:waits id=2\n");
+    wait_for([&] { return pool->figures().running == 2; });
+    wait_for([&] { return pool->load().service_us >= 30'000U; });
+    BOOST_TEST(pool->load().workers == 2U);
+    open.open();
+    one.line();
+    one.line();
+    for (int i = 0; i < 50; ++i) { // what took long is smoothed away
+        ask("DELEGATE self:quick");
+    }
+    BOOST_TEST(pool->load().service_us < 30'000U);
+}
+
 BOOST_AUTO_TEST_SUITE_END()

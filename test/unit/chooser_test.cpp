@@ -4,6 +4,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <set>
 #include <string>
 #include <vector>
 
@@ -51,6 +52,39 @@ BOOST_AUTO_TEST_CASE(who_is_to_be_avoided_is_chosen_where_there_is_nobody_else) 
     node.on(verb::pull, "speed", "1");
     for (int i = 0; i < 20; ++i) {
         BOOST_TEST(choose("PULL any:speed").here);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(who_is_held_by_long_jobs_is_chosen_only_where_nobody_is_free) {
+    const auto long_jobs = cles::node_load{.running = 2, .workers = 2, .service_us = 900'000};
+    offer("car2", task("DELEGATE", "work"), long_jobs);
+    offer("car3", task("DELEGATE", "work"), long_jobs);
+    offer("car4", task("DELEGATE", "work"), {.running = 1, .workers = 2, .service_us = 2'000});
+    for (int i = 0; i < 20; ++i) {
+        BOOST_TEST(choose("DELEGATE any:work").other->name == "car4");
+    }
+    // Short jobs end soon, wherever they are.
+    hear("car2", "of car2", {.running = 2, .workers = 2, .service_us = 1'000});
+    std::set<std::string> chosen;
+    for (int i = 0; i < 40; ++i) {
+        chosen.insert(choose("DELEGATE any:work").other->name);
+    }
+    BOOST_TEST(chosen.contains("car2"));
+    BOOST_TEST(!chosen.contains("car3"));
+    // Nobody is free.
+    hear("car2", "of car2", long_jobs);
+    hear("car4", "of car4", {.queued = 9, .running = 2, .workers = 2, .service_us = 1'500'000});
+    chosen.clear();
+    for (int i = 0; i < 40; ++i) {
+        chosen.insert(choose("DELEGATE any:work").other->name);
+    }
+    BOOST_TEST(chosen.size() == 2U);
+    BOOST_TEST(!chosen.contains("car4"));
+    // Where all workers are stuck there are none left.
+    hear("car3", "of car3", {.running = 2, .workers = 0, .service_us = 900'000});
+    hear("car4", "of car4", {.workers = 2});
+    for (int i = 0; i < 20; ++i) {
+        BOOST_TEST(choose("DELEGATE any:work").other->name == "car4");
     }
 }
 

@@ -96,6 +96,38 @@ BOOST_AUTO_TEST_CASE(more_than_workers_load_is_a_description_again) {
     BOOST_TEST(beats.empty());
 }
 
+BOOST_AUTO_TEST_CASE(that_work_takes_much_longer_is_a_description_again) {
+    auto said = saying("car1");
+    std::uint64_t seq = 0;
+    const auto is_described = [&](std::uint32_t service_us) {
+        const auto since = read(news("0"));
+        said.load.service_us = service_us;
+        table.hear(said, 1, ++seq, here, clock.now());
+        read(news(since));
+        BOOST_TEST(reports.size() + beats.size() == 1U);
+        return !reports.empty();
+    };
+    is_described(1'000);               // it appears
+    BOOST_TEST(!is_described(49'999)); // of what is quick nothing depends on how quick
+    BOOST_TEST(!is_described(150'000));
+    BOOST_TEST(is_described(800'000));
+    BOOST_TEST(is_described(2'000));
+    BOOST_TEST(is_described(50'000));
+    // So does this node of itself.
+    const auto speaks = [&](std::uint32_t service_us) {
+        const auto since = read(news("0"));
+        table.speak({.node = "me", .endpoints = {"tcp://0.0.0.0:9"}, .load = {.service_us = service_us}}, ++seq,
+                    clock.now());
+        read(news(since));
+        return reports.size() == 1U;
+    };
+    speaks(1'000);
+    BOOST_TEST(!speaks(2'000));
+    BOOST_TEST(speaks(200'000));
+    BOOST_TEST(!speaks(300'000));
+    BOOST_TEST(speaks(1'000));
+}
+
 BOOST_AUTO_TEST_CASE(the_node_that_answers_is_told_of_where_it_announces_itself) {
     table.speak({.node = "me", .endpoints = {"tcp://0.0.0.0:9"}}, 1, clock.now());
     read(news("0"));

@@ -21,6 +21,13 @@ struct candidate {
         const auto known = std::uint64_t{load.queued} + load.running + given;
         return known > told_of ? known - told_of : 0;
     }
+    /// Whether more work would be begun at once, as far as it can be known here.
+    [[nodiscard]] bool is_free() const noexcept { return load.workers == 0 ? !is_held() : ahead() < load.workers; }
+    /// Whether all its workers are at work, and not likely to be done soon. Where all are stuck it has none.
+    [[nodiscard]] bool is_held() const noexcept {
+        constexpr std::uint32_t long_us = 100'000;
+        return load.running != 0 && load.running >= load.workers && load.service_us >= long_us;
+    }
     /// How much it has to do.
     void hears(const node_load& now) noexcept {
         load = now;

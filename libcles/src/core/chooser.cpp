@@ -44,6 +44,10 @@ chooser::chosen chooser::choose(const protocol::request_line& r, const std::vect
     at_once_.clear();
     std::copy_if(all_.begin(), all_.end(), std::back_inserter(at_once_),
                  [now](const candidate* c) { return c->avoid_until <= now; });
+    // Work that is given to a node whose workers are held may wait there until its time is up.
+    if (std::any_of(at_once_.begin(), at_once_.end(), [](const candidate* c) { return c->is_free(); })) {
+        std::erase_if(at_once_, [](const candidate* c) { return c->is_held(); });
+    }
     auto* found = choice_.of(at_once_.empty() ? all_ : at_once_);
     if (found == nullptr) {
         return {};

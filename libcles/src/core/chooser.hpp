@@ -27,7 +27,8 @@ class chooser {
         [[nodiscard]] bool nobody() const noexcept { return other == nullptr && !here; }
     };
     /// One that offers it, is live, has not been passed, and is not among those that were asked already. Who is busy or
-    /// out of reach is asked only where there is nobody else.
+    /// out of reach is asked only where there is nobody else, and who has all workers at long jobs only where nobody
+    /// has a free one.
     [[nodiscard]] chosen choose(const protocol::request_line& r, const std::vector<std::string>& asked, time_point now);
     /// This node refused work.
     void avoid_here(time_point until) noexcept { here_.avoid_until = until; }

@@ -7,13 +7,13 @@
 #include <utility>
 
 namespace cles::core {
-
 known_run known_run::first(const word& w, std::uint64_t& numbers) {
     known_run r;
     r.epoch = w.epoch;
     r.heard = w.spoken;
     r.take(w, numbers);
     r.described = r.news;
+    r.service_us = w.said.load.service_us;
     return r;
 }
 
@@ -34,11 +34,19 @@ bool known_run::place(const word& w) {
     return true;
 }
 
+// Of the time that work takes, only what makes a node another choice is worth telling anew.
+bool known_run::is_another_choice(const node_load& now) const noexcept {
+    constexpr std::uint32_t worth_telling = 50'000; // microseconds
+    const auto [less, more] = std::minmax(service_us, now.service_us);
+    return said.load.workers != now.workers || (more >= worth_telling && more / 4 > less);
+}
+
 void known_run::take(const word& w, std::uint64_t& numbers) {
     const bool placed = place(w);
     const bool describes = w.seq != 0 || !w.said.tasks.empty();
-    if (placed || said.load.workers != w.said.load.workers || (describes && said.tasks != w.said.tasks)) {
+    if (placed || is_another_choice(w.said.load) || (describes && said.tasks != w.said.tasks)) {
         described = ++numbers;
+        service_us = w.said.load.service_us;
     }
     said.node = w.said.node;
     said.load = w.said.load;

@@ -32,8 +32,9 @@ struct known_run {
     group_source from;     ///< nothing but zeros: only others have told of it
     std::uint64_t seq = 0; ///< 0: never told
     time_point heard{};
-    std::uint64_t news = 0;      ///< the number of the last thing that was heard of it
-    std::uint64_t described = 0; ///< and of the last that was more than that it lives
+    std::uint64_t news = 0;       ///< the number of the last thing that was heard of it
+    std::uint64_t described = 0;  ///< and of the last that was more than that it lives
+    std::uint32_t service_us = 0; ///< how long work took there then
     announcement said{};
     std::vector<std::string> endpoints; ///< as they can be used here
     std::vector<std::string> passed_on; ///< as they are told to others
@@ -42,6 +43,8 @@ struct known_run {
     static known_run first(const word& w, std::uint64_t& numbers);
     /// Takes what is newer.
     void take(const word& w, std::uint64_t& numbers);
+    /// Whether that load is more than a beat tells.
+    [[nodiscard]] bool is_another_choice(const node_load& now) const noexcept;
     /// Takes where it can be asked. Whether it could not be asked there before.
     bool place(const word& w);
 

@@ -72,8 +72,9 @@ void presence::speak(const announcement& own, std::uint64_t seq, time_point now)
         own_->described = ++news_;
     }
     auto& r = *own_;
-    if (r.said.endpoints != own.endpoints || r.said.tasks != own.tasks || r.said.load.workers != own.load.workers) {
+    if (r.said.endpoints != own.endpoints || r.said.tasks != own.tasks || r.is_another_choice(own.load)) {
         r.described = ++news_;
+        r.service_us = own.load.service_us;
     }
     r.said = own;
     r.passed_on = own.endpoints;
