@@ -77,6 +77,10 @@ void service::publish_when_room(std::string_view noun, std::string_view json, de
     engine_->publish_when_room(noun, json, std::move(operation));
 }
 
+void service::close(std::chrono::milliseconds limit, detail::pending_ptr operation) {
+    engine_->close(limit, std::move(operation));
+}
+
 std::uint64_t service::send(const detail::outgoing& request, const call_options& options,
                             detail::pending_ptr operation) {
     return engine_->send(request, options, std::move(operation));

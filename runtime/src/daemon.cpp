@@ -132,7 +132,7 @@ void daemon::stop(int signal) {
     if (std::exchange(stopping_, true)) {
         log_.warning("stopping at once, on a second signal");
         leaves_something_ = true; // nobody has looked
-        finish({});
+        finish();
         return;
     }
     stop_begun_ = steady_clock::now();
@@ -143,20 +143,28 @@ void daemon::stop(int signal) {
         log_.warning("the service manager could not be told");
     }
     service_.leave(); // nobody is to send jobs that would be refused
-    pool_.drain(std::chrono::ceil<milliseconds>(setup_.drain), [this](const drain_report& how) { finish(how); });
+    pool_.drain(std::chrono::ceil<milliseconds>(setup_.drain), [this](const drain_report& how) { close(how); });
 }
 
-void daemon::finish(const drain_report& how) {
-    if (std::exchange(finished_, true)) {
-        return;
-    }
+milliseconds daemon::time_left() const {
+    return std::chrono::floor<milliseconds>(stop_begun_ + setup_.drain - steady_clock::now());
+}
+
+void daemon::close(const drain_report& how) {
     if (how.abandoned > 0) {
         log_.warning(counted(how.abandoned, "job") + " did not end in time");
     }
     leaves_something_ = leaves_something_ || how.stuck > 0;
+    // What it passes on to others, and what its plugins serve without workers, is to be answered too.
+    service_.async_close(std::max<milliseconds>(time_left(), 100ms), [this](boost::system::error_code) { finish(); });
+}
+
+void daemon::finish() {
+    if (std::exchange(finished_, true)) {
+        return;
+    }
     // A plugin gets what is left of the time to let go of what it holds.
-    const auto left = std::chrono::floor<milliseconds>(stop_begun_ + setup_.drain - steady_clock::now());
-    const auto late = plugins_.stop(std::clamp<milliseconds>(leaves_something_ ? 0ms : left, 100ms, 2000ms));
+    const auto late = plugins_.stop(std::clamp<milliseconds>(leaves_something_ ? 0ms : time_left(), 100ms, 2000ms));
     for (const auto& name : late) {
         log_.warning("plugin " + name + " did not stop in time");
         leaves_something_ = true;

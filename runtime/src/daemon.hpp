@@ -41,7 +41,9 @@ class daemon {
     void load_plugins();
     void write_metrics(json_writer& w) const;
     void stop(int signal);
-    void finish(const drain_report& how);
+    void close(const drain_report& how);
+    void finish();
+    [[nodiscard]] std::chrono::milliseconds time_left() const;
     void reload();
 
     boost::asio::io_context& io_;

@@ -22,6 +22,7 @@
 #include <chrono>
 #include <future>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <utility>
@@ -64,6 +65,88 @@ BOOST_DATA_TEST_CASE(a_foreign_loop_polls, carriers, kind) {
     car.update("place", 1);
     turn_until([&] { return feed.items.size() == 1; });
     BOOST_TEST(a.value == 42);
+}
+
+BOOST_AUTO_TEST_CASE(a_service_that_is_closed_answers_what_it_has_begun_and_says_that_it_leaves) {
+    asio::io_context io;
+    cles::service car{io, listening("car1", carrier::tcp4)};
+    std::optional<cles::responder> job;
+    car.on_delegate("work", [&](const cles::request&, cles::responder r) { job.emplace(std::move(r)); });
+    const auto url = car.endpoints().front();
+    scripted_peer peer{io, url};
+    scripted_peer idle{io, url};
+    peer.send("DELEGATE self:work id=1\n");
+    run_until(io, [&] { return job.has_value(); });
+    answer<void> closed;
+    car.async_close(patience, closed.take());
+    BOOST_TEST(peer.ask("PULL self:cles id=2").starts_with(R"(id=2 {"error":"busy")"));
+    BOOST_TEST(!closed.done());
+    job->done(7);
+    BOOST_TEST(peer.line() == "id=1 {\"value\":7}");
+    BOOST_TEST(peer.rest() == "PUSH self:cles/leaving reply=no\n");
+    BOOST_TEST(idle.rest() == "PUSH self:cles/leaving reply=no\n");
+    peer.close();
+    idle.close();
+    run_until(io, [&] { return closed.done(); });
+    BOOST_TEST(!closed.code);
+    car.stop();
+}
+
+BOOST_AUTO_TEST_CASE(a_service_that_is_closed_waits_for_its_handlers_no_longer_than_it_may) {
+    asio::io_context io;
+    asio::io_context other;
+    cles::service car{io, listening("car1", carrier::tcp4)};
+    int begun = 0;
+    bool stopped = false;
+    std::optional<cles::responder> job;
+    car.on_delegate("work", [&](const cles::request&, cles::responder r) {
+        ++begun;
+        r.on_stop([&] { stopped = true; });
+        job.emplace(std::move(r));
+    });
+    cles::service tower{other, knowing("tower", car)};
+    answer<> first;
+    answer<> second;
+    const auto until = [&](auto holds) {
+        run_until(io, [&] {
+            other.restart();
+            other.poll();
+            return holds();
+        });
+    };
+    tower.async_delegate("car1:work", 1, first.take());
+    until([&] { return job.has_value(); });
+    answer<void> closed;
+    answer<void> twice;
+    car.async_close(30ms, closed.take());
+    car.async_close(30ms, twice.take());
+    tower.async_delegate("car1:work", 2, second.take());
+    until([&] { return closed.done() && twice.done() && first.done() && second.done(); });
+    BOOST_TEST(!closed.code);
+    BOOST_TEST((twice.code == errc::stopped));
+    BOOST_TEST((first.code == errc::unavailable)); // it had begun
+    BOOST_TEST(stopped);
+    BOOST_TEST((second.code == errc::busy)); // it had not
+    BOOST_TEST(begun == 1);
+    answer<> third;
+    tower.async_delegate("car1:work", 3, third.take());
+    until([&] { return third.done(); });
+    BOOST_TEST((third.code == boost::system::errc::connection_refused));
+}
+
+BOOST_AUTO_TEST_CASE(a_service_that_is_stopped_while_it_closes_says_so) {
+    asio::io_context io;
+    cles::service car{io, listening("car1", carrier::tcp4)};
+    std::optional<cles::responder> job;
+    car.on_delegate("work", [&](const cles::request&, cles::responder r) { job.emplace(std::move(r)); });
+    scripted_peer peer{io, car.endpoints().front()};
+    peer.send("DELEGATE self:work id=1\n");
+    run_until(io, [&] { return job.has_value(); });
+    answer<void> closed;
+    car.async_close(patience, closed.take());
+    car.stop();
+    run_until(io, [&] { return closed.done(); });
+    BOOST_TEST((closed.code == errc::stopped));
 }
 
 BOOST_AUTO_TEST_CASE(a_service_that_only_asks_leaves_its_context_without_work) {

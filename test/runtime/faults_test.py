@@ -2,11 +2,13 @@
 # SPDX-License-Identifier: BSL-1.0
 """Daemons that are killed and paused while they have work: what became of every job is known, and nothing hangs."""
 
+import signal
 import time
 import unittest
 
 from fleet import Fleet
 from load import DEADLINE, RUNS, SLACK, Load
+from support import PATIENCE
 
 
 class Faults(unittest.TestCase):
@@ -95,6 +97,51 @@ class Faults(unittest.TestCase):
         self.assertLessEqual(after, 3.5 + SLACK / 2)
         self.assertIn(held.code, ("deadline", "unavailable"))
         self.account(load)
+
+    def test_nodes_are_restarted_one_after_the_other(self):
+        load = self.load_at("sat1")
+        load.PACE, load.MIX = 0.001, (("any", "once"),)
+        load.run(0.3)
+        for _ in range(3):
+            for name in ("sat2", "sat3", "sat4"):
+                self.fleet.restart(name, lambda condition, what: load.run(until=condition, what=what))
+                load.run(0.4)
+        self.assertGreater(len(load.jobs), 1000)
+        load.finish()
+        # What had not begun went elsewhere, and what had was answered.
+        self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
+        self.account(load)
+
+    def test_the_node_that_is_asked_is_restarted(self):
+        load = self.load_at("sat2")
+        load.PACE, load.MIX = 0.001, (("any", "once"), ("named", "once"))
+        load.run(0.3)
+        self.fleet["sat2"].send_signal(signal.SIGTERM)
+        load.run(until=lambda: not load.linked, what="the link has ended")
+        self.assertTrue(load.left)
+        # Every job that was not answered is known not to have begun: another node may be asked for it.
+        self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
+        load.connect(self.fleet["sat3"])
+        load.names = ["sat1", "sat3", "sat4"]
+        load.run(0.3)
+        self.account(load)
+
+    def test_a_node_whose_workers_are_held_gets_no_work_while_others_are_free(self):
+        load = self.load_at("sat1")
+        load.PACE, load.MIX = 0.01, (("any", "once"),)  # far less than three nodes do
+        load.run(0.3)
+        for name in ("sat3", "sat3", "sat4", "sat4"):
+            job = load.send(name, "holds", deadline=PATIENCE)
+            load.run(until=lambda number=job.number: self.fleet.marks()[number], what="the job has begun")
+        held = lambda name: self.fleet.load_at("sat1", name).get("service_us", 0) >= 100_000
+        load.run(until=lambda: held("sat3") and held("sat4"), what="it is known that no worker comes free")
+        since = len(load.jobs)
+        load.run(2)
+        jobs = load.jobs[since:]
+        load.run(until=lambda: all(job.ended for job in jobs), what="all have ended")
+        marks = self.fleet.marks()
+        self.assertGreater(len(jobs), 50)
+        self.assertEqual([job for job in jobs if job.code or set(marks[job.number]) & {"sat3", "sat4"}], [])
 
     def test_the_node_that_is_asked_is_killed(self):
         load = self.load_at("sat1")

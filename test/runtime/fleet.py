@@ -51,6 +51,16 @@ class Fleet:
         self.nodes[name].send_signal(signal.SIGKILL)
         self.nodes[name].process.wait()
 
+    def restart(self, name, meanwhile):
+        """As at an update: told to end, and started again when it has, which `meanwhile(condition, what)` waits for."""
+        node = self.nodes[name]
+        node.send_signal(signal.SIGTERM)
+        meanwhile(lambda: node.process.poll() is not None, f"{name} has ended")
+        if node.process.returncode != 0:
+            raise AssertionError(f"{name} ended with {node.process.returncode}: {node.log()}")
+        self.nodes[name] = self.opened.enter_context(self.start(name))
+        meanwhile(lambda: name in self.live_at("sat1"), f"{name} is there again")
+
     def pause(self, name):
         """Returns when it has stopped."""
         process = self.nodes[name].process

@@ -54,6 +54,7 @@ class Load:
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.rest = b""
         self.linked = True
+        self.left = False  # the node has said that it leaves
 
     # -- asking ------------------------------------------------------------------------------------------------------
 
@@ -104,17 +105,22 @@ class Load:
         *lines, self.rest = (self.rest + data).split(b"\n")
         now = time.monotonic()
         for line in lines:
+            if line == b"PUSH self:cles/leaving reply=no":
+                self.left = True
+                self.lose_link()
+                return
             head, _, text = line.decode().partition(" ")
             answer = json.loads(text[text.index("{"):])
             job = self.flying.pop(int(head.removeprefix("id=")))  # a second answer would find nothing
             job.ended, job.code = now, answer.get("error")
 
     def lose_link(self):
-        """What was under way by it is lost, as every client has to see it."""
+        """What was under way by it is lost, as every client has to see it; or has not begun, where the node has said
+        that it leaves."""
         self.socket.close()
         self.linked = False
         for job in self.flying.values():
-            job.ended, job.code = time.monotonic(), "link lost"
+            job.ended, job.code = time.monotonic(), "busy" if self.left else "link lost"
         self.flying.clear()
 
     def run(self, seconds=None, until=None, what=""):

@@ -25,6 +25,7 @@ class recording_outlet : public core::outlet {
     }
     void finish() override { ++finishes; }
     void close() override { ++closes; }
+    void retire() override { ++retires; }
 
     /// What has been sent since the last time.
     std::string take() { return std::exchange(urgent_, {}) + std::exchange(text_, {}); }
@@ -48,6 +49,7 @@ class recording_outlet : public core::outlet {
     int pauses = 0;
     int finishes = 0;
     int closes = 0;
+    int retires = 0;
     bool paused = false;
     bool behind = false;
     std::size_t datagram_bytes = 0; ///< 0: a stream

@@ -127,6 +127,20 @@ class service : public registrar {
     /// more. What is asked on links that are there, or at its URL, is answered as before, so that work can be brought
     /// to its end before `stop`, which does this too. Repeating it does nothing.
     void leave();
+    /// Ends in order, so that nobody loses a request: `leave`s, lets no more links in, answers what has been begun (for
+    /// `limit` at most; what is left is then `unavailable`) and whatever else comes with `busy`, says on each link that
+    /// what has not been answered by then has not been begun, and completes when the links have ended, a second after
+    /// that at the latest (`limits::discard`): `void(error_code)`. `stop` is to follow; where it comes before, the code
+    /// is `stopped`.
+    template <class Token = boost::asio::use_awaitable_t<>>
+    auto async_close(std::chrono::milliseconds limit, Token&& token = {}) {
+        return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
+            [this](auto handler, std::chrono::milliseconds at_most) {
+                auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
+                close(at_most, detail::pending_ptr{operation});
+            },
+            token, limit);
+    }
     /// Ends everything: listeners, links, feeds; operations fail with `stopped`, handlers that still run are told to
     /// stop. Answers already given and updates already published are sent first, where the peer takes them at once.
     /// Repeating it does nothing.
@@ -298,6 +312,7 @@ class service : public registrar {
 
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
     void publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
+    void close(std::chrono::milliseconds limit, detail::pending_ptr operation);
     // Both return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.
     std::uint64_t send(const detail::outgoing& request, const call_options& options, detail::pending_ptr operation);
     std::uint64_t send_command(std::string_view command, const call_options& options, detail::pending_ptr operation);

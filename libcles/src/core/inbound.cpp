@@ -13,6 +13,7 @@
 #include <chrono>
 #include <optional>
 #include <utility>
+#include <vector>
 
 namespace cles::core {
 namespace {
@@ -52,12 +53,16 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
         serve_cancel(r, *id, now);
         return;
     }
+    if (begins_nothing_) {
+        refuse_in_turn(r, shutting_down(*node_), now);
+        return;
+    }
     if (r.id == 0 && must_wait()) {
         if (in_flight() < node_->bounds.in_flight) {
             waiting_.push_line(line, now);
             follow_waiting();
         } else {
-            ++node_->counts.errors_unsent;
+            refuse_in_turn(r, busy(node_->name + ": too many requests wait on this link"), now);
         }
         return;
     }
@@ -136,6 +141,22 @@ void inbound::lose() {
     }
 }
 
+void inbound::cut_short() {
+    auto running = std::vector<std::shared_ptr<call>>{};
+    for (const auto& [id, c] : calls_) {
+        running.push_back(c);
+    }
+    if (anonymous_) {
+        running.push_back(anonymous_);
+    }
+    for (const auto& c : running) {
+        if (!c->ended()) {
+            refuse(*c, {.code = errc::unavailable, .message = node_->name + " shut down before this had ended"});
+            c->stop();
+        }
+    }
+}
+
 void inbound::finish_if_done() {
     if (ending_ && !finished_ && !must_wait() && (closing_ || bound_.empty())) {
         finished_ = true;
@@ -144,6 +165,14 @@ void inbound::finish_if_done() {
 }
 
 // -- requests without id wait for each other -----------------------------------------------------------------------
+
+void inbound::refuse_in_turn(const protocol::request_line& r, const protocol::failure& why, time_point now) {
+    if (r.id == 0 && r.wants_reply && must_wait()) {
+        answer_in_turn(failure_text(why), now);
+    } else {
+        replies_.fail(r, why);
+    }
+}
 
 void inbound::answer_in_turn(std::string answer, time_point now) {
     waiting_.push_answer(std::move(answer), now);
@@ -193,6 +222,10 @@ void inbound::serve_waiting(time_point now) {
 void inbound::serve(const protocol::request_line& r, time_point arrived, time_point now) {
     if (now - arrived >= std::chrono::milliseconds{r.deadline_ms}) {
         replies_.fail(r, errc::deadline, node_->name + ": its time ran out while it waited for its turn");
+        return;
+    }
+    if (begins_nothing_) {
+        replies_.fail(r, shutting_down(*node_));
         return;
     }
     if (const auto why = objection(*node_, peer_, r)) {

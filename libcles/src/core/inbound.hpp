@@ -47,6 +47,10 @@ class inbound final : private call_owner, private call_opener {
     void end(time_point now);
     /// The link is gone.
     void lose();
+    /// Nothing is begun any more: what comes, and what waits for its turn, is `busy`. What runs is still answered.
+    void begin_nothing() noexcept { begins_nothing_ = true; }
+    /// Answers what still runs with `unavailable`, and tells it to stop.
+    void cut_short();
 
     /// Whether requests wait whose turn has come, but which are too many for one turn.
     [[nodiscard]] bool has_more() const noexcept { return anonymous_ == nullptr && !waiting_.empty(); }
@@ -77,6 +81,7 @@ class inbound final : private call_owner, private call_opener {
 
     [[nodiscard]] bool must_wait() const noexcept { return anonymous_ != nullptr || !waiting_.empty(); }
     void answer_in_turn(std::string answer, time_point now);
+    void refuse_in_turn(const protocol::request_line& request, const protocol::failure& why, time_point now);
     void follow_waiting();
     void serve_waiting(time_point now);
     void withdraw_all();
@@ -104,7 +109,7 @@ class inbound final : private call_owner, private call_opener {
     bool ending_ = false;  // the peer sends no more, or what it sends is no longer read
     bool closing_ = false; // the link ends whatever is bound
     bool finished_ = false;
-    unsigned sample_ = 0;
+    bool begins_nothing_ = false; // this node leaves
 };
 
 } // namespace cles::core

@@ -2,6 +2,7 @@
 #include "core/outbound.hpp"
 
 #include "core/ignored_reply.hpp"
+#include "core/refusals.hpp"
 
 #include <algorithm>
 #include <string>
@@ -177,8 +178,11 @@ void outbound::lose(errc why, std::string_view message) {
     const auto lost = std::exchange(waiting_, {});
     const std::string text{message};
     for (const auto& [id, e] : lost) {
+    const auto answer =
+        why == errc::busy ? failure_text({.code = why, .message = text, .retry_ms = 1000}) : std::string{};
         node_.deadlines.disarm(*e);
-        e->operation.release()->fail(why, text);
+        auto* operation = e->operation.release();
+        answer.empty() ? operation->fail(why, text) : operation->refuse(why, text, answer);
     }
 }
 

@@ -45,7 +45,7 @@ class outbound {
     void on_reply(const protocol::reply_line& reply);
     /// A reply that is longer than a line may be.
     void on_overlong(const protocol::reply_line& reply);
-    /// Fails all that wait.
+    /// Fails all that wait. With `busy` none of them has been begun, and each ends as if the peer had refused it.
     void lose(errc why, std::string_view message);
     /// Takes out all that wait, without a word.
     [[nodiscard]] std::vector<detail::pending_ptr> take_all();

@@ -28,6 +28,8 @@ class outlet {
     /// Sends what is there, then says goodbye and closes.
     virtual void finish() = 0;
     virtual void close() = 0;
+    /// The peer answers no more requests: none is to be sent here any more.
+    virtual void retire() {}
 
   protected:
     ~outlet() = default;

@@ -79,6 +79,12 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
     // What is told of the reserved task is for the link that it comes by: an id to withdraw, for one.
     const bool stays = n.way == nullptr || (r.noun.task == "cles" && r.verb != verb::pull);
     if ((stays && !is_for(n, r)) || passes(r.via, n.name)) {
+        if (n.way == nullptr && protocol::is_reserved_target(r.noun.target) && !is_for(n, r)) {
+            return object(errc::no_target, n.name + " does not route, and so asks nobody for '" +
+                                               std::string{r.noun.target} +
+                                               "': give it cles::routing() as service_options::routing, or ask a node "
+                                               "that routes, as clesd does");
+        }
         return object(errc::no_target, n.name + " knows no way to '" + std::string{r.noun.target} + "'");
     }
     std::string why;
@@ -89,6 +95,14 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
         return object(errc::bad_request, n.name + ": an update's first key cannot be 'error'");
     }
     return std::nullopt;
+}
+
+bool says_that_it_leaves(const protocol::request_line& r) noexcept {
+    return r.verb == verb::push && !r.wants_reply && r.noun.target == "self" && r.noun.path == "cles/leaving";
+}
+
+protocol::failure shutting_down(const node& n) {
+    return {.code = errc::busy, .message = n.name + " is shutting down", .retry_ms = 1000};
 }
 
 protocol::failure no_room_for_links(const node& n) {

@@ -34,6 +34,13 @@ bool is_for(const node& n, const protocol::request_line& request);
 /// What keeps a node from serving a request, whatever it asks for: access, target, body.
 std::optional<protocol::failure> objection(const node& n, const identity& peer, const protocol::request_line& request);
 
+/// Whether it says that the peer leaves: what it has not answered by then, it has not begun (docs/protocol.md,
+/// "Leaving").
+bool says_that_it_leaves(const protocol::request_line& request) noexcept;
+
+/// What a node that leaves answers to what it does not begin any more.
+protocol::failure shutting_down(const node& n);
+
 /// What a link is told that comes past the limit.
 protocol::failure no_room_for_links(const node& n);
 

@@ -44,6 +44,8 @@ void session::on_line(std::string_view line, time_point now) {
         inbound_.on_malformed(line, malformed, now);
     } else if (request.is_update()) {
         on_update(subscriptions_.find(line, request));
+    } else if (!is_datagram() && says_that_it_leaves(request)) {
+        on_leaving();
     } else {
         inbound_.on_request(line, request, now);
     }
@@ -64,6 +66,20 @@ void session::on_update(const subscriptions::match& found) {
         ++node_->counts.updates_dropped;
     } else {
         ++node_->counts.updates_received;
+    }
+}
+
+void session::on_leaving() {
+    ++node_->counts.requests[static_cast<std::size_t>(verb::push)];
+    out_.retire();
+    outbound_.lose(errc::busy, "the node at " + peer_.address + " is leaving, and has not begun this");
+}
+
+void session::say_that_it_leaves() {
+    if (!is_datagram() && !std::exchange(closed_, true)) {
+        protocol::append_request(out_.output(),
+                                 {.verb = verb::push, .noun = "self:cles/leaving", .wants_reply = false});
+        out_.finish();
     }
 }
 

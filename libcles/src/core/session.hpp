@@ -33,6 +33,9 @@ class session {
     [[nodiscard]] bool at_rest() const noexcept {
         return inbound_.at_rest() && outbound_.in_flight() == 0 && subscriptions_.empty();
     }
+    /// The last line of this node, which leaves: all that it has begun for the peer has been answered. Ends the link;
+    /// nothing by datagram, where there is none to end.
+    void say_that_it_leaves();
     /// Answers a line with `busy` and nothing else.
     void turn_away(std::string_view line);
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
@@ -43,6 +46,7 @@ class session {
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
     void refuse(std::string_view text, const char* why, time_point now);
     void on_reply(std::string_view line);
+    void on_leaving();
     void on_update(const subscriptions::match& found);
 
     std::shared_ptr<node> node_;

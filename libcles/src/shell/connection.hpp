@@ -83,6 +83,7 @@ class connection final : public link_events,
 
     // binder
     [[nodiscard]] bool takes_updates() const override;
+    void retire() override { usable_ = false; }
     void put_updates(std::string_view lines) override;
 
   private:

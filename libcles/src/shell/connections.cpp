@@ -63,8 +63,24 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
         ++(c->is_source() ? sources_ : accepted_);
     }
     ++engine_.node().counts.links_open;
+    if (engine_.closing()) {
+        begin_nothing(*c);
+    }
     c->start();
     return c;
+}
+
+void connections::begin_nothing() {
+    for (const auto& [key, c] : open_) {
+        begin_nothing(*c);
+    }
+}
+
+// In this process it is asked by its own handlers too, which are to come to their end.
+void connections::begin_nothing(connection& c) {
+    if (c.from() != connection::origin::local) {
+        c.session().serving().begin_nothing();
+    }
 }
 
 bool connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {

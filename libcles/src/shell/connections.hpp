@@ -28,6 +28,8 @@ class connections {
     /// A link that came in; those from other processes are counted against the limit.
     void on_accepted(link_ptr arrived, bool counted);
     std::shared_ptr<connection> adopt(link_ptr made, connection::origin from);
+    /// Nothing that others ask for is begun any more, on those that are open and those to come.
+    void begin_nothing();
     /// False where it was none of them (any more).
     bool forget(connection& c, std::uint64_t received, std::uint64_t sent);
     /// Withdraws a request that waits for its reply. False where there is none of that id.
@@ -37,6 +39,7 @@ class connections {
   private:
     [[nodiscard]] bool has_room(bool is_source);
     void turn_away(link_ptr arrived);
+    static void begin_nothing(connection& c);
     void drop_sources_at_rest();
 
     detail::engine& engine_;

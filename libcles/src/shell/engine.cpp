@@ -3,6 +3,7 @@
 
 #include "core/call.hpp"
 #include "protocol/message.hpp"
+#include "shell/departure.hpp"
 #include "shell/service_call.hpp"
 
 #include <boost/asio/post.hpp>
@@ -91,6 +92,13 @@ void engine::expire(bool was_away) {
     }
     node_->deadlines.expire(at);
     settle();
+}
+
+void engine::settle() {
+    if (departure_ && !stopped_) {
+        departure_->look();
+    }
+    timer_->follow(node_->deadlines);
 }
 
 void engine::join_group() {
@@ -295,6 +303,19 @@ void engine::publish_when_room(std::string_view noun, std::string_view json, pen
 
 // -- the end -------------------------------------------------------------------------------------------------------
 
+void engine::close(std::chrono::milliseconds limit, pending_ptr operation) {
+    if (stopped_ || departure_) {
+        fail_later(std::move(operation), errc::stopped, "the service ends already");
+        return;
+    }
+    const auto keep = shared_from_this();
+    neighbours_->leave();
+    departure_ = std::make_unique<shell::departure>(*this, limit, std::move(operation));
+    listeners_.turn_away();
+    connections_.begin_nothing();
+    settle();
+}
+
 void engine::stop() {
     if (stopped_) {
         return;
@@ -327,6 +348,11 @@ void engine::stop() {
         group_->stop();
     }
     tell(routes_.stop());
+    if (departure_) {
+        if (auto operation = departure_->give_up()) {
+            fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+        }
+    }
     for (const auto& c : connections_.all()) {
         tell(c->session().asking().take_all());
         c->flush();

@@ -24,11 +24,16 @@
 
 #include <boost/asio/any_io_executor.hpp>
 
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
+
+namespace cles::shell {
+class departure;
+} // namespace cles::shell
 
 namespace cles::detail {
 
@@ -42,6 +47,10 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     void start(const std::vector<std::string>& listen_at);
     std::string listen(std::string_view where);
     void stop();
+    /// Ends in order what is to be ended; the operation ends when the links have. `stop` is to follow.
+    void close(std::chrono::milliseconds limit, pending_ptr operation);
+    /// Nothing is begun any more for others.
+    [[nodiscard]] bool closing() const noexcept { return departure_ != nullptr; }
 
     // For the rooms beneath.
     [[nodiscard]] core::node& node() noexcept { return *node_; }
@@ -74,7 +83,7 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     [[nodiscard]] core::publications& published() override { return node_->published; }
     void route_on(time_point now) override;
     /// To be called when something has happened: sets the timer.
-    void settle() override { timer_->follow(node_->deadlines); }
+    void settle() override;
 
     // For the façade.
     void add(registration task);
@@ -114,6 +123,7 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     const routing_part* routing_wanted_;
     std::unique_ptr<routing_host> routing_; // null: off
     core::turns turns_{*this, clock_};
+    std::unique_ptr<shell::departure> departure_; // once it is to end in order
     bool stopped_ = false;
 };
 

@@ -57,7 +57,7 @@ void listeners::open_local_doors() {
             auto made = carrier->listen(engine_.executor(), {.scheme = "inproc", .host = door, .port = 0, .path = {}},
                                         engine_.bounds());
             start(*made, false);
-            open_.push_back(std::move(made));
+            doors_.push_back(std::move(made));
         } catch (const boost::system::system_error&) {
             engine_.say(log_level::warning,
                         "another '" + engine_.node().name + "' in this process is the one that others find here");
@@ -65,6 +65,13 @@ void listeners::open_local_doors() {
     }
 }
 
-void listeners::close() { open_.clear(); }
+void listeners::close() {
+    open_.clear();
+    doors_.clear();
+}
+
+void listeners::turn_away() {
+    std::erase_if(open_, [](const auto& each) { return each->local().scheme != "udp"; });
+}
 
 } // namespace cles::shell

@@ -25,6 +25,8 @@ class listeners {
     /// them.
     void open_local_doors();
     void close();
+    /// Links of other processes come in no more. Sources of datagrams are heard on, so that they can be answered.
+    void turn_away();
 
     /// The door that leads to this service alone.
     [[nodiscard]] std::string self_door() const;
@@ -36,6 +38,7 @@ class listeners {
 
     detail::engine& engine_;
     std::vector<std::unique_ptr<acceptor>> open_;
+    std::vector<std::unique_ptr<acceptor>> doors_; // for this process
 };
 
 } // namespace cles::shell

@@ -34,25 +34,43 @@ class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Prot
 
     void close() {
         boost::system::error_code ignored;
-        acceptor_.close(ignored);
+        take_what_has_come();
+        acceptor_.close(ignored); // with it the last `accept` ends, and lets go of the callback
         pause_.cancel();
-        on_link_ = nullptr;
     }
 
     [[nodiscard]] const acceptor_type& socket() const noexcept { return acceptor_; }
 
   private:
+    // Those who are connected already would be reset, and could not know whether what they have sent was run.
+    void take_what_has_come() {
+        boost::system::error_code code;
+        acceptor_.non_blocking(true, code);
+        while (!code && on_link_) {
+            socket_type socket{acceptor_.get_executor()};
+            acceptor_.accept(socket, code);
+            if (!code) {
+                hand_over(std::move(socket));
+            }
+        }
+    }
+
+    void hand_over(socket_type socket) {
+        auto peer = identify_(socket);
+        on_link_(std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_));
+    }
+
     void accept() {
         acceptor_.async_accept([self = this->shared_from_this()](boost::system::error_code code, socket_type socket) {
+            if (!code && self->on_link_) { // which may have been closed since
+                self->hand_over(std::move(socket));
+            }
             if (!self->acceptor_.is_open() || !self->on_link_) {
+                self->on_link_ = nullptr;
                 return;
             }
             if (!code) {
-                auto peer = self->identify_(socket);
-                self->on_link_(std::make_shared<stream_link>(std::move(socket), std::move(peer), self->bounds_));
-                if (self->on_link_) {
-                    self->accept();
-                }
+                self->accept();
             } else if (code == boost::asio::error::no_descriptors || code == boost::asio::error::no_memory ||
                        code == boost::asio::error::no_buffer_space) {
                 self->accept_later();

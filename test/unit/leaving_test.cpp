@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSL-1.0
+// A node that leaves, and one that is left: docs/protocol.md, "Leaving".
+#include "core/leg.hpp"
+#include "support/recorded_reply.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace {
+
+using namespace std::chrono_literals;
+using cles::errc;
+using cles::verb;
+
+const std::string farewell = "PUSH self:cles/leaving reply=no\n";
+
+struct fixture {
+    std::shared_ptr<cles::test::outcome> ask_peer(std::uint64_t id) {
+        auto [operation, result] = cles::test::record();
+        const auto now = node.clock.now();
+        link.session().asking().send({.verb = verb::delegate, .noun = "car2:work", .id = id}, now + 5s, now,
+                                     std::move(operation));
+        link.take();
+        return result;
+    }
+
+    cles::test::test_node node;
+    cles::test::test_link link{node};
+};
+
+struct asked final : cles::core::leg_events {
+    void on_result(std::size_t, std::string_view) override {}
+    void on_failure(std::size_t, cles::core::leg_failure why) override { failures.push_back(std::move(why)); }
+    void on_progress(std::size_t, double, std::string_view) override {}
+    std::vector<cles::core::leg_failure> failures;
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(leaving, fixture)
+
+BOOST_AUTO_TEST_CASE(what_runs_is_answered_and_nothing_else_is_begun) {
+    node.on_later(verb::delegate, "work");
+    int ran = 0;
+    node.on(verb::pull, "speed", [&ran](const cles::request&, cles::json_writer& w) { w.value(std::int64_t{++ran}); });
+    link.ask("DELEGATE self:work id=1");
+    link.ask("DELEGATE self:work"); // others of its kind wait for it
+    link.ask("PULL self:speed");
+    link.session().serving().begin_nothing();
+    BOOST_TEST(link.kind("PULL self:speed id=2") == "id=2 busy");
+    BOOST_TEST(link.reply("DELEGATE self:work id=3").message == "car1 is shutting down");
+    BOOST_TEST(link.ask("PULL self:speed").empty()); // in its turn
+    BOOST_TEST(link.ask("PUSH self:speed reply=no").empty());
+    BOOST_TEST(link.session().serving().in_flight() != 0U);
+    node.started.at(1)->call->done("{}");
+    BOOST_TEST(link.sent() == "ok, busy, busy");
+    node.started.at(0)->call->done("{}");
+    BOOST_TEST(link.sent() == "id=1 ok");
+    BOOST_TEST(ran == 0);
+    BOOST_TEST(link.session().serving().in_flight() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(what_runs_may_still_be_withdrawn) {
+    node.on_later(verb::delegate, "work");
+    link.ask("DELEGATE self:work id=1");
+    link.session().serving().begin_nothing();
+    BOOST_TEST(link.kind("PUSH self:cles/cancel/1 reply=no") == "id=1 cancelled");
+    BOOST_TEST(node.started.at(0)->stopped);
+}
+
+BOOST_AUTO_TEST_CASE(what_does_not_end_in_time_is_cut_short) {
+    node.on_later(verb::delegate, "work");
+    link.ask("DELEGATE self:work id=1");
+    link.ask("DELEGATE self:work");
+    link.session().serving().begin_nothing();
+    link.session().serving().cut_short();
+    const auto lines = link.take_lines();
+    BOOST_REQUIRE_EQUAL(lines.size(), 2U);
+    BOOST_TEST(lines[0] == "id=1 {\"error\":\"unavailable\",\"message\":\"car1 shut down before this had ended\"}");
+    BOOST_TEST(cles::test::kind_of(lines[1]) == "unavailable");
+    BOOST_TEST(node.started.at(0)->stopped);
+    BOOST_TEST(node.started.at(1)->stopped);
+    BOOST_TEST(link.session().serving().in_flight() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(the_last_line_says_that_it_leaves) {
+    link.session().serving().begin_nothing();
+    link.session().say_that_it_leaves();
+    link.session().say_that_it_leaves();
+    BOOST_TEST(link.take() == farewell);
+    BOOST_TEST(link.finishes == 1);
+    BOOST_TEST(link.ask("PULL self:cles").empty()); // nothing follows
+}
+
+BOOST_AUTO_TEST_CASE(by_datagram_nothing_is_said) {
+    cles::test::test_link datagrams{node, 1200};
+    datagrams.session().say_that_it_leaves();
+    BOOST_TEST(datagrams.take().empty());
+    BOOST_TEST(datagrams.finishes == 0);
+    const auto waiting = [&] {
+        auto [operation, result] = cles::test::record();
+        const auto now = node.clock.now();
+        datagrams.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 7}, now + 5s, now,
+                                          std::move(operation));
+        return result;
+    }();
+    datagrams.ask("PUSH self:cles/leaving reply=no id=3"); // anybody might send it
+    BOOST_TEST(!waiting->ended);
+}
+
+BOOST_AUTO_TEST_CASE(what_a_node_that_leaves_has_not_answered_it_has_not_begun) {
+    const auto first = ask_peer(7);
+    const auto second = ask_peer(8);
+    link.ask("id=7 {}");
+    BOOST_TEST(link.ask("PUSH self:cles/leaving reply=no").empty());
+    BOOST_TEST(!first->code);
+    BOOST_TEST((second->code == errc::busy));
+    BOOST_TEST(second->text == "the node at tcp://127.0.0.1:1 is leaving, and has not begun this");
+    BOOST_TEST(link.retires == 1); // no more is asked here
+    BOOST_TEST(link.session().asking().in_flight() == 0U);
+    link.half_close();
+    BOOST_TEST(node.counts().errors_unsent == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(it_goes_on_to_another_node_as_from_one_that_is_busy) {
+    const auto to = std::make_shared<asked>();
+    const auto now = node.clock.now();
+    link.session().asking().send({.verb = verb::delegate, .noun = "car2:work", .id = 9}, now + 5s, now,
+                                 cles::detail::pending_ptr{new cles::core::leg{to, 0}});
+    link.ask("PUSH self:cles/leaving reply=no");
+    BOOST_REQUIRE_EQUAL(to->failures.size(), 1U);
+    BOOST_TEST((to->failures[0].told.code == errc::busy));
+    BOOST_TEST(!to->failures[0].begun);
+    BOOST_TEST(to->failures[0].told.retry_ms.value_or(0) == 1000U);
+}
+
+BOOST_AUTO_TEST_CASE(the_end_of_a_link_without_a_word_says_nothing_of_what_began) {
+    const auto result = ask_peer(7);
+    link.half_close();
+    BOOST_TEST((result->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_CASE(one_that_wants_an_answer_is_no_farewell) {
+    const auto result = ask_peer(7);
+    BOOST_TEST(link.kind("PUSH self:cles/leaving id=1") == "id=1 no_task");
+    BOOST_TEST(!result->ended);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
