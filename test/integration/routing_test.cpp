@@ -266,6 +266,38 @@ BOOST_FIXTURE_TEST_CASE(a_binding_is_held_upstream_once_and_made_again_when_the_
     feed.reset();
 }
 
+BOOST_FIXTURE_TEST_CASE(what_was_published_before_the_node_was_bound_again_reaches_the_binders, fixture) {
+    auto car = serving("car1", false);
+    car->update("pose", 1);
+    start_hub(false).set_peer("car1", car->endpoints().front());
+    feed_log feed;
+    feed.bind(*client, "car1:pose", cles::bind_options{}.at(hub->endpoints().front()));
+    until([&] { return feed.bound; });
+    car->update("pose", 2);
+    until([&] { return feed.bodies().size() == 1; });
+    const auto where_it_was = car->endpoints().front();
+    car.reset();
+    cles::service_options again{.name = "car1"};
+    again.listen = {where_it_was};
+    cles::service back{there, std::move(again)};
+    back.update("pose", "again"); // and never more
+    until([&] { return feed.bodies().size() == 2; });
+    BOOST_TEST(feed.bodies().back() == "{\"value\":\"again\"}");
+    BOOST_TEST(feed.items.back().seq == 1U);
+    BOOST_TEST(feed.count(cles::feed_event::gap) == 0U);
+    // Who binds now is told which update that was.
+    scripted_peer raw{here, hub->endpoints().front()};
+    raw.send("BIND car1:pose id=5 mark=yes\n");
+    std::string reply;
+    until([&] {
+        reply = raw.unread();
+        return raw.ended() || reply.ends_with('\n');
+    });
+    BOOST_TEST(reply.starts_with("id=5 seq=1 epoch="), reply);
+    BOOST_TEST(reply.ends_with(" {\"value\":\"again\"}\n"), reply);
+    feed.close();
+}
+
 BOOST_FIXTURE_TEST_CASE(a_binding_of_all_has_each_publisher_and_later_ones_too, fixture) {
     const auto one = serving("car1");
     one->update("pose", 1);

@@ -71,6 +71,14 @@ class recorded_ways final : public core::onward {
         std::uint64_t seq = 0;
 
         void binds(std::string_view last) const { to->on_bound(last); }
+        /// It is bound once more at a publisher that says which update its last value is: another run.
+        std::string binds_again(std::uint64_t number, const std::string& last) {
+            const auto line = "UPDATE " + text.substr(0, text.find(' ')) + " seq=" + std::to_string(number) +
+                              " epoch=0000cafe " + last;
+            to->on_update(line, std::string_view{line}.substr(line.size() - last.size()));
+            to->on_bound(last);
+            return line + "\n";
+        }
         void refuses(errc code, std::string why) {
             std::exchange(to, nullptr)->on_refused({.code = code, .message = std::move(why)});
         }

@@ -31,6 +31,19 @@ BOOST_AUTO_TEST_CASE(all_who_offer_it_are_bound_and_the_answer_holds_their_last_
     BOOST_TEST(link.take() == "UPDATE car1:pose seq=2 epoch=5f3a09c1 {\"x\":4}\n" + line);
 }
 
+BOOST_AUTO_TEST_CASE(with_mark_the_answer_says_which_updates_the_values_are) {
+    offer("car2", task("BIND", "pose"));
+    offer("car3", task("BIND", "pose"));
+    node.open("pose");
+    node.publish_now("pose", "{\"x\":1}");
+    link.ask("BIND all:pose id=7 mark=yes");
+    ways.bound("car3:pose").binds("{\"x\":3}");
+    ways.bound("car2:pose").binds_again(4, "{\"x\":2}");
+    BOOST_TEST(link.take() == R"(id=7 {"results":{"car1":{"x":1},"car2":{"x":2},"car3":{"x":3}},"errors":{},)"
+                              R"("marks":{"car1":{"seq":1,"epoch":"5f3a09c1"},"car2":{"seq":4,"epoch":"0000cafe"}}})"
+                              "\n");
+}
+
 BOOST_AUTO_TEST_CASE(publishers_that_appear_later_are_bound_too) {
     BOOST_TEST(link.ask("BIND all:pose id=7") == "id=7 {\"results\":{},\"errors\":{}}\n");
     offer("car2", task("BIND", "pose"));

@@ -55,6 +55,8 @@ class wait final : public cles::detail::pending_event {
     std::string text = "(waiting)";
 };
 
+const cles::update_mark seventh{.seq = 7, .epoch = 0x5f3a09c1};
+
 struct fixture {
     explicit fixture(cles::limits bounds = {}) : feed(host, deadlines, bounds, "car1", "speed", false, 7) {}
 
@@ -119,6 +121,31 @@ BOOST_AUTO_TEST_CASE(the_last_value_comes_as_the_first_event) {
     update(5);
     BOOST_TEST(next() == "current {\"v\":3}");
     BOOST_TEST(next() == "update 5 {}");
+}
+
+BOOST_AUTO_TEST_CASE(a_value_that_says_which_update_it_is_is_told_as_one_where_it_is_news) {
+    bound();
+    update(seventh.seq, "5f3a09c1", "{\"v\":2}");
+    BOOST_TEST(next() == "update 7 {\"v\":2}");
+    const auto bind_again = [this](std::string_view last, const cles::update_mark& mark) {
+        lose();
+        BOOST_TEST(next().starts_with("lost"));
+        pass(1min);
+        feed.on_bound(last, mark);
+        BOOST_TEST(next() == "rebound");
+    };
+    bind_again("{\"v\":2}", seventh); // has come before
+    BOOST_TEST(next() == "current {\"v\":2}");
+    bind_again("{\"v\":5}", {.seq = 10, .epoch = seventh.epoch});
+    BOOST_TEST(next() == "gap 2");
+    BOOST_TEST(next() == "update 10 {\"v\":5}");
+    BOOST_TEST(next() == "current {\"v\":5}");
+    bind_again("{\"v\":1}", {.seq = 1, .epoch = 0xbeef}); // another run
+    BOOST_TEST(next() == "update 1 {\"v\":1}");
+    BOOST_TEST(next() == "current {\"v\":1}");
+    update(1, "0000beef");  // the same once more
+    update(11, "5f3a09c1"); // of the run that has gone
+    BOOST_TEST(next() == "(nothing)");
 }
 
 BOOST_AUTO_TEST_CASE(a_refusal_of_the_first_bind_closes_it) {

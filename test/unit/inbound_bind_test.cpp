@@ -37,6 +37,19 @@ BOOST_AUTO_TEST_CASE(the_reply_is_an_empty_object_before_the_first_update) {
     BOOST_TEST(link.ask("BIND car1:pose id=7") == "id=7 {}\n");
 }
 
+BOOST_AUTO_TEST_CASE(with_mark_the_reply_says_which_update_it_bears) {
+    BOOST_TEST(link.ask("BIND car1:pose id=7 mark=yes") == "id=7 {}\n"); // none
+    node.publish_now("pose", "{\"x\":1}");
+    node.publish_now("pose", "{\"x\":2}");
+    link.take();
+    cles::test::test_link other{node};
+    BOOST_TEST(other.ask("BIND car1:pose id=5 mark=yes") == "id=5 seq=2 epoch=5f3a09c1 {\"x\":2}\n");
+    BOOST_TEST(other.ask("BIND car1:pose id=6") == "id=6 {\"x\":2}\n");
+    BOOST_TEST(other.ask("BIND car1:pose mark=yes") == "{\"x\":2}\n"); // there is no place for it without an id
+    BOOST_TEST(other.kind("BIND car1:pose id=8 mark=maybe") == "id=8 bad_request");
+    BOOST_TEST(other.ask("BIND car1:pose id=9 mark=yes lease=0") == "id=9 {}\n");
+}
+
 BOOST_AUTO_TEST_CASE(the_reply_is_the_nouns_last_update) {
     node.publish_now("pose", "{\"x\":1}");
     node.publish_now("pose", "{\"x\":2}");

@@ -5,6 +5,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
+#include <memory>
 #include <string>
 
 BOOST_FIXTURE_TEST_SUITE(relays, cles::test::routing_fixture)
@@ -63,6 +64,46 @@ BOOST_AUTO_TEST_CASE(who_comes_later_gets_the_last_value_at_once) {
     cles::test::test_link fourth{node};
     BOOST_TEST(fourth.ask("BIND car2:pose id=9") == "id=9 {\"x\":3}\n");
     BOOST_TEST(ways.count_bound() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_publisher_that_is_back_is_told_with_its_last_value) {
+    link.ask("BIND car2:pose id=7");
+    auto& feed = ways.bound("car2:pose");
+    feed.binds("{\"x\":1}");
+    feed.publishes("{\"x\":2}");
+    drain();
+    link.take();
+    const auto line = feed.binds_again(5, "{\"x\":9}");
+    drain();
+    BOOST_TEST(link.take() == line);
+    cles::test::test_link other{node};
+    BOOST_TEST(other.ask("BIND car2:pose id=8 mark=yes") == "id=8 seq=5 epoch=0000cafe {\"x\":9}\n");
+    BOOST_TEST(other.ask("BIND car2:pose id=9") == "id=9 {\"x\":9}\n");
+}
+
+BOOST_AUTO_TEST_CASE(at_the_limit_what_is_bound_is_renewed) {
+    cles::test::test_node small{{.bindings = 1}};
+    cles::test::recorded_ways others;
+    const auto routes = std::make_shared<cles::core::routing>(small.host, others, 1, [] {});
+    cles::test::test_link datagrams{small, 1200};
+    datagrams.ask("BIND car2:pose id=1 lease=1000");
+    others.bound("car2:pose").binds("{\"x\":1}");
+    datagrams.take();
+    small.pass(900ms);
+    BOOST_TEST(datagrams.ask("BIND car2:pose id=2 lease=1000") == "id=2 {\"x\":1}\n");
+    BOOST_TEST(datagrams.kind("BIND car2:speed id=3") == "id=3 busy");
+    small.pass(900ms); // it has been renewed
+    others.bound("car2:pose").publishes("{\"x\":2}");
+    routes->drain(small.clock.now());
+    BOOST_TEST(datagrams.take().ends_with("{\"x\":2}\n"));
+    routes->stop();
+}
+
+BOOST_AUTO_TEST_CASE(what_a_publisher_does_not_mark_is_passed_on_without) {
+    link.ask("BIND car2:pose id=7 mark=yes");
+    BOOST_TEST(ways.bound("car2:pose").text == "car2:pose hops=7 via=car1"); // of one link, as an id
+    ways.bound("car2:pose").binds("{\"x\":1}");
+    BOOST_TEST(link.take() == "id=7 {\"x\":1}\n");
 }
 
 BOOST_AUTO_TEST_CASE(each_client_is_thinned_and_queued_apart) {

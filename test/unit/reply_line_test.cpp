@@ -33,6 +33,21 @@ std::string written(const cles::protocol::failure& why) {
 
 BOOST_AUTO_TEST_SUITE(reply_line)
 
+BOOST_AUTO_TEST_CASE(a_mark_says_which_update_a_value_is) {
+    const auto marked = parse("id=5 seq=2 epoch=5f3a09c1 {\"x\":1}");
+    BOOST_TEST_REQUIRE(marked.ok);
+    BOOST_TEST((marked.line.mark == cles::update_mark{.seq = 2, .epoch = 0x5f3a09c1}));
+    BOOST_TEST(marked.line.body == "{\"x\":1}");
+    BOOST_TEST(cles::protocol::mark_text(marked.line.mark) == "seq=2 epoch=5f3a09c1");
+    // Half a mark, or a broken one, is none; as an unknown adverb it is passed over.
+    for (const std::string_view text : {"id=5 {}", "id=5 seq=2 {}", "id=5 epoch=5f3a09c1 {}",
+                                        "id=5 seq=0 epoch=5f3a09c1 {}", "id=5 seq=2 epoch=5F3A09C1 {}"}) {
+        const auto other = parse(text);
+        BOOST_TEST_REQUIRE(other.ok, text);
+        BOOST_TEST(!other.line.mark, text);
+    }
+}
+
 BOOST_AUTO_TEST_CASE(a_line_that_begins_with_id_or_a_bracket_is_a_reply) {
     for (const std::string_view reply : {"{}", "[1]", "id=7 {}", "id=", "id=x", "{", "["}) {
         BOOST_TEST(cles::protocol::is_reply(reply), reply);

@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
+#include <cles/update_mark.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -30,6 +31,11 @@ class pending {
 
     /// Offers the result's text. `malformed`: it is no JSON, and the operation goes on waiting.
     virtual verdict offer(std::string_view json) = 0;
+    /// The same for an answer to BIND that says which update it bears.
+    virtual verdict offer_marked(std::string_view json, const update_mark& mark) {
+        static_cast<void>(mark);
+        return offer(json);
+    }
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
     /// The same where the peer itself said so; `answer` is the whole of what it said.
     virtual void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/all_answer.hpp"
 
+#include "protocol/request_line.hpp"
+
 #include <algorithm>
 #include <chrono>
 
@@ -18,6 +20,23 @@ void all_answer::add_result(std::string_view node, std::string_view json) {
 void all_answer::add_failure(std::string_view node, const protocol::failure& why) {
     begin_member(errors_, node);
     append_failure(errors_, why);
+}
+
+void all_answer::add_mark(std::string_view node, const std::optional<update_mark>& mark) {
+    auto& marks = marks_ ? *marks_ : marks_.emplace();
+    if (mark) {
+        begin_member(marks, node);
+        marks.append(R"({"seq":)").append(std::to_string(mark->seq));
+        marks.append(R"(,"epoch":")").append(protocol::epoch_text(mark->epoch)).append("\"}");
+    }
+}
+
+std::string all_answer::whole() const {
+    auto text = results_ + R"(},"errors":{)" + errors_ + "}";
+    if (marks_) {
+        text.append(R"(,"marks":{)").append(*marks_).append("}");
+    }
+    return text + "}";
 }
 
 time_point answer_by(time_point due, time_point now) {

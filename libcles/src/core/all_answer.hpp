@@ -5,6 +5,7 @@
 
 #include "protocol/reply_line.hpp"
 
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -15,13 +16,16 @@ class all_answer {
   public:
     void add_result(std::string_view node, std::string_view json);
     void add_failure(std::string_view node, const protocol::failure& why);
-    [[nodiscard]] std::string whole() const { return results_ + R"(},"errors":{)" + errors_ + "}}"; }
+    /// Which update a node's result is. With the first, the answer says so of all of which it is known.
+    void add_mark(std::string_view node, const std::optional<update_mark>& mark);
+    [[nodiscard]] std::string whole() const;
 
   private:
     static void begin_member(std::string& in, std::string_view node);
 
     std::string results_ = R"({"results":{)";
     std::string errors_;
+    std::optional<std::string> marks_{};
 };
 
 /// When it is to leave, so that it comes before the time runs out.

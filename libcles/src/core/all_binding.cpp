@@ -13,8 +13,8 @@ namespace cles::core {
 all_binding::all_binding(std::shared_ptr<routing> by, const protocol::request_line& r, std::string path,
                          relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due)
     : routing_(std::move(by)), task_(r.noun.task), path_(std::move(path)), via_(r.via),
-      adverbs_(onward_adverbs(r, routing_->host().name)), may_pass_on_(r.hops != 0), place_(place), wanted_(wanted),
-      call_(std::move(answers)), due_(due) {}
+      adverbs_(onward_adverbs(r, routing_->host().name)), may_pass_on_(r.hops != 0), wants_mark_(r.wants_mark),
+      place_(place), wanted_(wanted), call_(std::move(answers)), due_(due) {}
 
 bool all_binding::begin(time_point now) {
     if (routing_->expects_more()) {
@@ -49,6 +49,7 @@ void all_binding::follow() {
         own.asked = false;
         if (const auto* t = place_.take_own_part(path_, wanted_)) {
             own.last = t->last_body();
+            own.mark = t->last_mark();
         }
     }
     if (may_pass_on_) {
@@ -89,6 +90,7 @@ void all_binding::on_told(const std::string& node, topic* t, std::string_view la
     p.asked = false;
     if (t != nullptr) {
         p.last = last.empty() ? std::string{"{}"} : std::string{last};
+        p.mark = place_.from()->mark_of(*t);
         place_.take_part(*t, wanted_);
     } else {
         p.failure = why;
@@ -116,6 +118,9 @@ void all_binding::answer() {
     for (const auto& [node, p] : parts_) {
         if (p.last) {
             text.add_result(node, p.last->empty() ? "{}" : std::string_view{*p.last});
+            if (wants_mark_) {
+                text.add_mark(node, p.mark);
+            }
         } else if (p.failure) {
             text.add_failure(node, *p.failure);
         } else {

@@ -34,6 +34,7 @@ class all_binding final : public routing::errand, private deadline, public std::
   private:
     struct part {
         std::optional<std::string> last{};
+        std::optional<update_mark> mark{};
         std::optional<protocol::failure> failure{};
         bool asked = true; // until it has answered
     };
@@ -51,6 +52,7 @@ class all_binding final : public routing::errand, private deadline, public std::
     std::string via_;
     std::string adverbs_;
     bool may_pass_on_;
+    bool wants_mark_;
     relayed_bindings& place_;
     binding::terms wanted_;
     std::shared_ptr<call> call_;

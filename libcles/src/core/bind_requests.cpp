@@ -17,6 +17,10 @@ std::chrono::milliseconds lease_of(const protocol::request_line& r) {
     return std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)};
 }
 
+std::string head_of(const topic& t, bool wants_mark) {
+    return wants_mark ? protocol::mark_text(t.last_mark()) : std::string{};
+}
+
 binding::terms terms_of(const protocol::request_line& r) {
     return {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep};
 }
@@ -73,7 +77,9 @@ void bind_requests::serve_elsewhere(const protocol::request_line& r, time_point 
         replies_.done(reply_to{r}, {});
         return;
     }
-    if (size() >= node_.bounds.bindings) {
+    // What is bound already takes no more room.
+    const bool known = elsewhere_ && elsewhere_->binds(r.noun.target, protocol::canonical_path(r.noun, scratch));
+    if (!known && size() >= node_.bounds.bindings) {
         replies_.fail(r, errc::busy, node_.name + ": too many bindings on this link");
         return;
     }
@@ -114,7 +120,7 @@ void bind_requests::serve(const protocol::request_line& r, time_point due, time_
     try {
         ask_bind_handler(node_, peer_, r);
         auto& t = open(path);
-        replies_.done(reply_to{r}, t.last_body());
+        replies_.done(reply_to{r}, t.last_body(), head_of(t, r.wants_mark));
         bound_.bind(t, terms_of(r));
         hold(path, lease_of(r), now);
     } catch (...) {
@@ -137,9 +143,9 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
     }
     std::erase_if(asking_, [](const asking& a) { return a.answers->ended(); });
     asking_.push_back({std::string{path}, c});
-    const auto decision =
-        std::make_shared<bind_decision>(shared_node_, [this, c, path = std::string{path}, terms = terms_of(r),
-                                                       lease = lease_of(r)](const protocol::failure* why_not) {
+    const auto decision = std::make_shared<bind_decision>(
+        shared_node_, [this, c, path = std::string{path}, terms = terms_of(r), lease = lease_of(r),
+                       mark = r.wants_mark](const protocol::failure* why_not) {
             if (c->ended()) { // and this may be gone with its link
                 return;
             }
@@ -152,6 +158,7 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
                 // Bound before the answer, which may set off what else the peer asked for; updates follow it later.
                 bound_.bind(t, terms);
                 hold(path, lease, node_.time.now());
+                c->set_head(head_of(t, mark));
                 c->done(t.last_body());
             } catch (...) {
                 c->fail(describe(std::current_exception()));

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/feed_machine.hpp"
 
+#include "protocol/message.hpp"
+
 #include <utility>
 
 namespace cles::core {
 
 feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
                            std::string path, bool thinned, std::uint32_t seed)
-    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines), mail_(bounds),
-      backoff_(seed), renewal_(*this, deadlines, ~seed) {}
+    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines),
+      longest_(bounds.line), mail_(bounds), backoff_(seed), renewal_(*this, deadlines, ~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);
@@ -16,7 +18,7 @@ void feed_machine::start(detail::pending_ptr bound) {
     host_.bind(*this);
 }
 
-void feed_machine::on_bound(std::string_view last) {
+void feed_machine::on_bound(std::string_view last, const std::optional<update_mark>& mark) {
     if (state_ != state::binding) {
         return;
     }
@@ -28,11 +30,29 @@ void feed_machine::on_bound(std::string_view last) {
         on_event({.kind = feed_event::rebound});
     }
     was_bound_ = true;
+    if (mark) {
+        take_marked(body, *mark);
+        if (state_ != state::bound) { // whoever took it has closed the feed
+            return;
+        }
+    }
     if (body != "{}") {
         on_event({.kind = feed_event::current, .body = body, .checked = true});
     }
     if (first_) {
         first_.release()->offer(body);
+    }
+}
+
+// As if the publisher had sent it once more: it is dropped where it has come before, shows a gap, or another run.
+void feed_machine::take_marked(const std::string& body, const update_mark& mark) {
+    std::string line;
+    protocol::append_update_head(line, target(), path(), mark.seq, protocol::epoch_text(mark.epoch));
+    line.append(body);
+    protocol::request_line update;
+    protocol::malformed_request ignored;
+    if (line.size() <= longest_ && protocol::parse_request(line, update, ignored)) {
+        take(update);
     }
 }
 

@@ -4,6 +4,7 @@
 #include <cles/error.hpp>
 #include <cles/limits.hpp>
 #include <cles/pending.hpp>
+#include <cles/update_mark.hpp>
 
 #include "core/backoff.hpp"
 #include "core/deadlines.hpp"
@@ -12,8 +13,10 @@
 #include "core/subscription.hpp"
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
@@ -52,7 +55,8 @@ class feed_machine final : public subscription, private deadline, private renewa
 
     /// Binds for the first time. The operation ends with the answer; where it fails, the feed is closed.
     void start(detail::pending_ptr bound);
-    void on_bound(std::string_view last);
+    /// `mark`: which update the last value is, where the publisher says so. Where it is news it is told as one too.
+    void on_bound(std::string_view last, const std::optional<update_mark>& mark = {});
     /// Bound by datagram: for a lease that counts from when the BIND was sent, and is renewed from now on.
     void on_leased(time_point asked, std::chrono::milliseconds lease);
     void on_renewed(time_point asked);
@@ -87,9 +91,11 @@ class feed_machine final : public subscription, private deadline, private renewa
     void renew(time_point until) override { host_.renew(*this, until); }
     void pause(time_point now);
 
+    void take_marked(const std::string& body, const update_mark& mark);
     feed_host& host_;
     deadline_queue& deadlines_;
     feed_mailbox mail_;
+    std::size_t longest_; // line that may be passed on
     backoff backoff_;
     renewal renewal_;
     time_point bound_at_{}; // when the BIND was sent that leases count from

@@ -82,6 +82,10 @@ void write_description(json_writer& w, const node& n) {
     w.value(std::string_view{version});
     w.key("protocol");
     w.value(std::int64_t{1});
+    w.key("features"); // what may be sent to it beyond the first version
+    w.begin_array();
+    w.value(std::string_view{"mark"});
+    w.end_array();
     w.key("epoch");
     w.value(std::string_view{n.epoch});
     w.key("uptime_ms");

@@ -156,7 +156,8 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         }
     } else {
         auto* operation = e->operation.release();
-        ended = operation->offer(reply.body) == detail::pending::verdict::completed;
+        ended = (reply.mark ? operation->offer_marked(reply.body, *reply.mark) : operation->offer(reply.body)) ==
+                detail::pending::verdict::completed;
         if (!ended) {
             e->operation.reset(operation);
         }
@@ -177,9 +178,9 @@ void outbound::on_overlong(const protocol::reply_line& reply) {
 void outbound::lose(errc why, std::string_view message) {
     const auto lost = std::exchange(waiting_, {});
     const std::string text{message};
-    for (const auto& [id, e] : lost) {
     const auto answer =
         why == errc::busy ? failure_text({.code = why, .message = text, .retry_ms = 1000}) : std::string{};
+    for (const auto& [id, e] : lost) {
         node_.deadlines.disarm(*e);
         auto* operation = e->operation.release();
         answer.empty() ? operation->fail(why, text) : operation->refuse(why, text, answer);

@@ -19,12 +19,12 @@ bool has(const std::vector<std::string>& all, std::string_view one) {
 relayed_bindings::~relayed_bindings() { clear(); }
 
 void relayed_bindings::bind(std::string_view node, std::string_view path, std::string_view adverbs,
-                            binding::terms wanted, const std::shared_ptr<call>& c) {
+                            binding::terms wanted, bool wants_mark, const std::shared_ptr<call>& c) {
     std::erase_if(asking_, [](const asking& a) { return a.answers->ended(); });
     auto noun = noun_of(node, path);
     asking_.push_back({noun, c});
     from_->join(node, path, adverbs,
-                [this, c, wanted, noun](topic* t, std::string_view last, const protocol::failure& why) {
+                [this, c, wanted, wants_mark, noun](topic* t, std::string_view last, const protocol::failure& why) {
                     if (c->ended()) { // and this may be gone with its link
                         return;
                     }
@@ -37,8 +37,15 @@ void relayed_bindings::bind(std::string_view node, std::string_view path, std::s
                     if (!has(by_name_, noun)) {
                         by_name_.push_back(noun);
                     }
+                    if (wants_mark) {
+                        c->set_head(protocol::mark_text(from_->mark_of(*t)));
+                    }
                     c->done(last);
                 });
+}
+
+bool relayed_bindings::binds(std::string_view target, std::string_view path) {
+    return target == "all" ? all_.find(path) != all_.end() : bound_.has(noun_of(target, path));
 }
 
 void relayed_bindings::withdraw(std::string_view noun) {

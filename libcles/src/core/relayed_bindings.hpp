@@ -30,7 +30,7 @@ class relayed_bindings {
 
     /// Binds a noun of another node, and answers when that has. BIND again changes the terms.
     void bind(std::string_view node, std::string_view path, std::string_view adverbs, binding::terms wanted,
-              const std::shared_ptr<call>& c);
+              bool wants_mark, const std::shared_ptr<call>& c);
     /// Binds a noun of all who publish it, from now on. What was so before is given back, to be closed.
     std::shared_ptr<all_binding> bind_all(std::string_view path, std::shared_ptr<all_binding> all) {
         return std::exchange(all_[std::string{path}], std::move(all));
@@ -39,6 +39,7 @@ class relayed_bindings {
     void unbind(std::string_view target, std::string_view path);
     void clear();
     void drain(time_point now) { bound_.drain(now); }
+    [[nodiscard]] bool binds(std::string_view target, std::string_view path);
     [[nodiscard]] std::size_t size() const noexcept { return bound_.size() + all_.size(); }
     [[nodiscard]] bool empty() const noexcept { return size() == 0; }
 

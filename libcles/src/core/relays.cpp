@@ -22,6 +22,7 @@ class relays::relay final : public feed_events {
         }
     }
 
+    [[nodiscard]] std::optional<update_mark> mark() const { return fresh_ ? std::nullopt : topic_.last_mark(); }
     [[nodiscard]] topic& subject() noexcept { return topic_; }
     [[nodiscard]] std::uint64_t ticket() const noexcept { return ticket_; }
     [[nodiscard]] bool is_wanted() const noexcept { return topic_.is_bound() || !waiting_.empty() || telling_; }
@@ -30,7 +31,7 @@ class relays::relay final : public feed_events {
     void on_bound(std::string_view last) override {
         bound_ = true;
         last_ = last;
-        fresh_ = true;
+        fresh_ = last_ != topic_.last_body(); // a node that says which update it is has had it told as one
         telling_ = true;
         for (auto& tell : std::exchange(waiting_, {})) {
             tell(&topic_, last_, {});
@@ -85,6 +86,11 @@ void relays::join(std::string_view node, std::string_view path, std::string_view
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
     at->second->join(std::move(tell));
     at->second->start(node, path, adverbs);
+}
+
+std::optional<update_mark> relays::mark_of(const topic& t) const {
+    const auto at = all_.find(t.path());
+    return at == all_.end() ? std::nullopt : at->second->mark();
 }
 
 topic* relays::find(std::string_view noun) noexcept {

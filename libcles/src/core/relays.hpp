@@ -12,6 +12,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,9 @@ class relays final : public topic_source {
     using told = std::function<void(topic*, std::string_view last, const protocol::failure& why)>;
     /// Has a noun bound. Tells of it once, at once where it is bound already.
     void join(std::string_view node, std::string_view path, std::string_view adverbs, told tell);
+
+    /// Which update the last value of a topic is; nothing where that is not known.
+    [[nodiscard]] std::optional<update_mark> mark_of(const topic& t) const;
 
     [[nodiscard]] topic* find(std::string_view noun) noexcept override;
     void release(topic& t) override;

@@ -90,7 +90,7 @@ void routing::bind(const protocol::request_line& r, relayed_bindings& place, tim
                  .message = r.hops == 0 ? "it may not be passed on: it bears hops=0"
                                         : "a binding is of a node's noun, or of that of all"});
     } else {
-        place.bind(r.noun.target, path, onward_adverbs(r, node_->name), wanted, c);
+        place.bind(r.noun.target, path, onward_adverbs(r, node_->name), wanted, r.wants_mark, c);
     }
 }
 

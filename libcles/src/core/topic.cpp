@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/topic.hpp"
 
+#include "protocol/line.hpp"
+#include "protocol/message.hpp"
+
 #include <algorithm>
 #include <limits>
 
@@ -73,6 +76,16 @@ std::string_view topic::last_body() const noexcept {
     auto line = last_line();
     line.remove_suffix(1);
     return line.substr(last_body_at_);
+}
+
+// From its line, for what is passed on bears its publisher's.
+std::optional<update_mark> topic::last_mark() const {
+    protocol::request_line update;
+    protocol::malformed_request ignored;
+    if (seq() == 0 || !protocol::parse_request(protocol::trim(last_line()), update, ignored) || !update.is_update()) {
+        return std::nullopt;
+    }
+    return update_mark{.seq = *update.seq, .epoch = *update.epoch};
 }
 
 std::string_view topic::last_line() const noexcept { return log_.lines(seq(), seq()); }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/pending.hpp>
+#include <cles/update_mark.hpp>
 
 #include "core/counters.hpp"
 #include "core/deadlines.hpp"
@@ -11,6 +12,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -81,6 +83,9 @@ class topic {
     [[nodiscard]] std::uint64_t seq() const noexcept { return log_.last(); }
     /// The body of the last update; empty before the first.
     [[nodiscard]] std::string_view last_body() const noexcept;
+
+    /// Which update that is; nothing before the first.
+    [[nodiscard]] std::optional<update_mark> last_mark() const;
 
     /// The last update with its LF; empty before the first.
     [[nodiscard]] std::string_view last_line() const noexcept;

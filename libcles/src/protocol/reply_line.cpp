@@ -6,6 +6,7 @@
 
 #include "protocol/grammar.hpp"
 #include "protocol/parts.hpp"
+#include "protocol/request_line.hpp"
 
 #include <array>
 #include <charconv>
@@ -33,12 +34,18 @@ bool parse_reply(std::string_view line, reply_line& out) noexcept {
         return false;
     }
     out.id = *id;
+    std::optional<std::uint64_t> seq;
+    std::optional<std::uint32_t> epoch;
     for (auto part = parts.next(); !part.empty(); part = parts.next()) {
         adverb a;
         if (!split_adverb(part, a)) {
             return false;
         }
-        if (a.key == "progress") {
+        if (a.key == "seq") {
+            seq = number_between(a.value, 1, max_id);
+        } else if (a.key == "epoch") {
+            epoch = parse_epoch(a.value);
+        } else if (a.key == "progress") {
             double fraction = -1;
             const auto end = a.value.data() + a.value.size();
             const auto [ptr, code] = std::from_chars(a.value.data(), end, fraction);
@@ -49,6 +56,9 @@ bool parse_reply(std::string_view line, reply_line& out) noexcept {
         } else if (a.key == "id") {
             return false;
         }
+    }
+    if (seq && epoch) {
+        out.mark = update_mark{.seq = *seq, .epoch = *epoch};
     }
     out.body = parts.rest();
     return !out.body.empty();
@@ -108,6 +118,10 @@ void append_reply_head(std::string& out, std::uint64_t id) {
         append_number(out, id);
         out.push_back(' ');
     }
+}
+
+std::string mark_text(const std::optional<update_mark>& mark) {
+    return mark ? "seq=" + std::to_string(mark->seq) + " epoch=" + epoch_text(mark->epoch) : std::string{};
 }
 
 void append_progress_head(std::string& out, std::uint64_t id, double fraction) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/error.hpp>
+#include <cles/update_mark.hpp>
 
 #include <cstdint>
 #include <optional>
@@ -20,6 +21,7 @@ constexpr bool is_reply(std::string_view line) noexcept {
 struct reply_line {
     std::uint64_t id = 0; ///< 0: none
     std::optional<double> progress;
+    std::optional<update_mark> mark; ///< of a value that answers BIND
     std::string_view body;
 };
 
@@ -52,6 +54,9 @@ void append_failure(std::string& out, const failure& f);
 
 /// Appends "id=7 ", or nothing for 0.
 void append_reply_head(std::string& out, std::uint64_t id);
+
+/// "seq=17 epoch=5f3a09c1", as it stands before the value that answers BIND; empty for none.
+std::string mark_text(const std::optional<update_mark>& mark);
 
 /// Appends "id=7 progress=0.4 ".
 void append_progress_head(std::string& out, std::uint64_t id, double fraction);

@@ -65,12 +65,13 @@ enum class known : std::uint8_t {
     via,
     since,
     describe,
+    mark,
     none
 };
 
-constexpr std::array<std::string_view, 14> known_keys{"id",     "deadline", "reply", "hops",    "progress",
-                                                      "urgent", "lease",    "every", "keep",    "seq",
-                                                      "epoch",  "via",      "since", "describe"};
+constexpr std::array<std::string_view, 15> known_keys{"id",     "deadline", "reply", "hops",     "progress",
+                                                      "urgent", "lease",    "every", "keep",     "seq",
+                                                      "epoch",  "via",      "since", "describe", "mark"};
 
 constexpr std::uint8_t on(std::initializer_list<verb> verbs) {
     std::uint8_t mask = 0;
@@ -81,7 +82,7 @@ constexpr std::uint8_t on(std::initializer_list<verb> verbs) {
 }
 
 constexpr std::uint8_t on_all = on({verb::pull, verb::push, verb::delegate, verb::bind, verb::update});
-constexpr std::array<std::uint8_t, 14> known_on{on_all,
+constexpr std::array<std::uint8_t, 15> known_on{on_all,
                                                 on_all,
                                                 on({verb::push, verb::update}),
                                                 on_all,
@@ -94,7 +95,8 @@ constexpr std::array<std::uint8_t, 14> known_on{on_all,
                                                 on({verb::update}),
                                                 on_all,
                                                 on({verb::pull}),
-                                                on({verb::pull})};
+                                                on({verb::pull}),
+                                                on({verb::bind})};
 
 known find_known(std::string_view key, verb v) noexcept {
     for (std::size_t i = 0; i < known_keys.size(); ++i) {
@@ -137,6 +139,7 @@ bool apply(known k, std::string_view value, request_line& out) {
     case known::via: out.via = value; return is_name_list(value);
     case known::since: out.since = value; return value.size() <= longest_since;
     case known::describe: out.describe = value; return is_epoch_list(value);
+    case known::mark: out.wants_mark = true; return value == "yes";
     case known::none: break;
     }
     return true;

@@ -45,6 +45,7 @@ struct request_line {
     std::optional<std::uint32_t> lease_ms;
     std::uint32_t every_ms = 0; ///< 0: every update
     std::uint32_t keep = default_keep;
+    bool wants_mark = false; ///< which update the answer to BIND bears
     std::optional<std::uint64_t> seq;
     std::optional<std::uint32_t> epoch;
     std::string_view via;

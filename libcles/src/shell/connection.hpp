@@ -55,6 +55,9 @@ class connection final : public link_events,
     void bind(core::feed_machine& feed, protocol::request_text request, time_point deadline,
               detail::pending_ptr operation);
     void unbind(core::feed_machine& feed);
+    /// Whether the peer says which update it answers BIND with; nothing as long as it has not been asked.
+    [[nodiscard]] std::optional<bool> marks() const noexcept { return marks_; }
+    void set_marks(bool does) noexcept { marks_ = does; }
 
     // link_events
     void on_line(std::string_view line) override;
@@ -80,10 +83,10 @@ class connection final : public link_events,
     void pause(bool stop) override;
     void finish() override;
     void close() override;
+    void retire() override { usable_ = false; }
 
     // binder
     [[nodiscard]] bool takes_updates() const override;
-    void retire() override { usable_ = false; }
     void put_updates(std::string_view lines) override;
 
   private:
@@ -114,6 +117,7 @@ class connection final : public link_events,
     std::optional<core::datagram_output> datagrams_;
     std::optional<core::source_life> life_;
     std::vector<core::feed_machine*> feeds_;
+    std::optional<bool> marks_;
     std::optional<time_point> now_; // while a batch is handed over
     unsigned lines_ = 0;            // of this batch
     bool usable_ = true;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/feed_links.hpp"
 
+#include <cles/json_reader.hpp>
+
 #include "core/ignored_reply.hpp"
 #include "protocol/message.hpp"
 #include "shell/engine.hpp"
@@ -14,25 +16,41 @@
 namespace cles::shell {
 namespace {
 
+/// Whether what `PULL self:cles` tells names the feature.
+bool lists_mark(std::string_view description) {
+    json_reader reader{description, detail::answer_depth};
+    bool found = false;
+    std::string_view key;
+    reader.begin_object();
+    while (reader.next_key(key)) {
+        if (key != "features" || reader.peek() != json_reader::kind::array) {
+            reader.skip();
+            continue;
+        }
+        reader.begin_array();
+        while (reader.next_element()) {
+            std::string_view feature;
+            if (reader.peek() != json_reader::kind::string) {
+                reader.skip();
+            } else if (reader.read(feature)) {
+                found = found || feature == "mark";
+            }
+        }
+    }
+    return found;
+}
+
 /// The answer to a feed's BIND. The feed lives as long as its handle.
 class bind_reply final : public detail::pending {
   public:
     /// `asked`: when the BIND was sent by datagram; nothing for a stream.
     bind_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle, core::feed_machine& feed,
-               std::optional<time_point> asked)
-        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked) {}
+               std::optional<time_point> asked, bool marked)
+        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked), marked_(marked) {}
 
-    verdict offer(std::string_view json) override {
-        if (!detail::is_valid_answer(json)) {
-            return verdict::malformed;
-        }
-        const std::unique_ptr<bind_reply> self{this};
-        const auto host = host_.lock();
-        const auto alive = handle_.lock();
-        if (host && alive) {
-            bound(*host, json);
-        }
-        return verdict::completed;
+    verdict offer(std::string_view json) override { return take(json, {}); }
+    verdict offer_marked(std::string_view json, const update_mark& mark) override {
+        return take(json, marked_ ? std::optional{mark} : std::nullopt);
     }
 
     void fail(boost::system::error_code code, std::string_view message) override {
@@ -44,7 +62,7 @@ class bind_reply final : public detail::pending {
         }
         const std::string text{message};
         if (feed_.is_bound_without_value(code)) {
-            bound(*host, "{}");
+            bound(*host, "{}", {});
         } else {
             if (code == errc::deadline) { // the publisher may still answer, and would send updates for ever
                 host->feeds().unbind(feed_);
@@ -57,8 +75,21 @@ class bind_reply final : public detail::pending {
     void discard() noexcept override { delete this; }
 
   private:
-    void bound(const detail::engine& host, std::string_view last) {
-        feed_.on_bound(last);
+    verdict take(std::string_view json, const std::optional<update_mark>& mark) {
+        if (!detail::is_valid_answer(json)) {
+            return verdict::malformed;
+        }
+        const std::unique_ptr<bind_reply> self{this};
+        const auto host = host_.lock();
+        const auto alive = handle_.lock();
+        if (host && alive) {
+            bound(*host, json, mark);
+        }
+        return verdict::completed;
+    }
+
+    void bound(const detail::engine& host, std::string_view last, const std::optional<update_mark>& mark) {
+        feed_.on_bound(last, mark);
         if (asked_) {
             feed_.on_leased(*asked_, host.bounds().lease);
         }
@@ -68,6 +99,7 @@ class bind_reply final : public detail::pending {
     std::weak_ptr<detail::feed_control> handle_;
     core::feed_machine& feed_;
     std::optional<time_point> asked_;
+    bool marked_; // it was asked which update the value is
 };
 
 /// The answer to a feed's BIND that renews its lease.
@@ -106,6 +138,52 @@ class renewal_reply final : public detail::pending {
 };
 
 } // namespace
+
+/// What a node says of itself, before a feed is bound there that asks for more than every node can say.
+class feed_links::features_reply final : public detail::pending {
+  public:
+    features_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle,
+                   core::feed_machine& feed, std::weak_ptr<connection> on)
+        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), on_(std::move(on)) {}
+
+    verdict offer(std::string_view json) override {
+        if (!detail::is_valid_answer(json)) {
+            return verdict::malformed;
+        }
+        go_on(lists_mark(json));
+        return verdict::completed;
+    }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        if (code != errc::unavailable && code != errc::busy) {
+            go_on(false);
+            return;
+        }
+        const std::unique_ptr<features_reply> self{this};
+        const auto host = host_.lock();
+        if (const auto alive = handle_.lock(); host && alive) {
+            const std::string text{message};
+            feed_.on_refused(code, text, host->now());
+        }
+    }
+    void discard() noexcept override { delete this; }
+
+  private:
+    void go_on(bool marks) {
+        const std::unique_ptr<features_reply> self{this};
+        if (const auto c = on_.lock()) {
+            c->set_marks(marks);
+        }
+        const auto host = host_.lock();
+        if (const auto alive = handle_.lock(); host && alive && !feed_.closed()) {
+            host->feeds().bind(feed_);
+        }
+    }
+
+    std::weak_ptr<detail::engine> host_;
+    std::weak_ptr<detail::feed_control> handle_;
+    core::feed_machine& feed_;
+    std::weak_ptr<connection> on_;
+};
 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
     feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, 0});
@@ -156,13 +234,31 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     auto& e = feeds_.at(&feed);
     e.on = c;
     auto limit = e.terms.deadline;
+    if (e.terms.marked && !c->marks()) {
+        ask_for_features(feed, c);
+        return;
+    }
+    const bool marked = e.terms.marked && *c->marks();
     if (limit.count() <= 0) {
         limit = std::chrono::milliseconds{protocol::default_deadline_ms};
     }
     const auto now = engine_.now();
     const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
-    c->bind(feed, bind_text(e, *c), now + limit,
-            detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked)});
+    auto request = bind_text(e, *c);
+    const auto adverbs = e.terms.adverbs + (e.terms.adverbs.empty() ? "mark=yes" : " mark=yes");
+    if (marked) {
+        request.adverbs = adverbs;
+    }
+    c->bind(feed, request, now + limit,
+            detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked, marked)});
+}
+
+void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
+    const auto now = engine_.now();
+    c->session().asking().send(
+        {.verb = verb::pull, .noun = "self:cles", .id = engine_.draw_id()},
+        now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
+        detail::pending_ptr{new features_reply(engine_.weak_from_this(), feeds_.at(&feed).handle, feed, c)});
 }
 
 protocol::request_text feed_links::bind_text(entry& e, const connection& c) {

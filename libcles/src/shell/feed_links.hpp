@@ -26,6 +26,7 @@ struct feed_terms {
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
     std::string adverbs{}; ///< further ones, as they stand on the wire
+    bool marked = false;   ///< asks which update the last value is, where the publisher can say
 };
 
 /// The feeds of a service and the links that they are on: finds each a link, sends its BIND, and unbinds it.
@@ -50,7 +51,10 @@ class feed_links final : public core::feed_host {
         std::uint64_t asking = 0; // the id of its last BIND by datagram
     };
 
+    class features_reply;
+
     void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
+    void ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c);
     [[nodiscard]] protocol::request_text bind_text(entry& e, const connection& c);
     void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
 

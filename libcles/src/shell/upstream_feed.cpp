@@ -65,7 +65,8 @@ void upstream_feed::begin(std::string_view adverbs) {
                          {.noun = machine_.target() + ":" + machine_.path(),
                           .at = {},
                           .keep = upstream_keep,
-                          .adverbs = std::string{adverbs}});
+                          .adverbs = std::string{adverbs},
+                          .marked = true});
     wait();
     start(detail::pending_ptr{new first_answer(weak_from_this())});
     host_->settle();
