@@ -133,4 +133,42 @@ BOOST_AUTO_TEST_CASE(self_is_whoever_is_at_the_other_end) {
     BOOST_TEST(all.find("car2", "speed") == &by_self);
 }
 
+BOOST_AUTO_TEST_CASE(those_of_one_noun_and_the_same_terms_share_a_binding) {
+    cles::core::subscriptions all;
+    recorder one{"car1", "speed", false};
+    recorder two{"car1", "speed", false};
+    recorder thinned{"car1", "speed", true};
+    recorder none{"car1", "speed", false};
+    one.share_by("every=0");
+    two.share_by("every=0");
+    thinned.share_by("every=100");
+    BOOST_TEST(all.add(one));
+    BOOST_TEST(all.admits(two));
+    BOOST_TEST(!all.admits(thinned));
+    BOOST_TEST(!all.admits(none));
+    BOOST_TEST(all.add(two));
+    BOOST_TEST(!all.add(none));
+    const auto hear = [&all](std::uint64_t seq) {
+        const auto line = "UPDATE car1:speed seq=" + std::to_string(seq) + " epoch=0000000a {}";
+        cles::protocol::request_line update;
+        cles::protocol::malformed_request error;
+        BOOST_REQUIRE(cles::protocol::parse_request(line, update, error));
+        const auto found = all.find(line, update);
+        return found.whose != nullptr && all.deliver(found);
+    };
+    BOOST_TEST(hear(1));
+    BOOST_TEST(one.events.size() == 1U);
+    BOOST_TEST(two.events.size() == 1U);
+    BOOST_TEST(!hear(1));
+    all.remove(one);
+    BOOST_TEST(hear(2));
+    BOOST_TEST(one.events.size() == 1U);
+    BOOST_TEST(two.events.size() == 2U);
+    BOOST_TEST(all.has("car1", "speed"));
+    all.remove(two);
+    BOOST_TEST(all.empty());
+    BOOST_TEST(all.add(thinned));
+    all.remove(thinned);
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -82,6 +82,7 @@ class feed_machine final : public subscription, private deadline, private renewa
     /// Closes it and leaves telling those who wait to the caller.
     [[nodiscard]] waiting abandon();
     [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
+    [[nodiscard]] bool is_bound() const noexcept override { return state_ == state::bound; }
 
   private:
     enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
@@ -90,12 +91,12 @@ class feed_machine final : public subscription, private deadline, private renewa
     void on_deadline(time_point now) override;
     void renew(time_point until) override { host_.renew(*this, until); }
     void pause(time_point now);
-
     void take_marked(const std::string& body, const update_mark& mark);
+
     feed_host& host_;
     deadline_queue& deadlines_;
-    feed_mailbox mail_;
     std::size_t longest_; // line that may be passed on
+    feed_mailbox mail_;
     backoff backoff_;
     renewal renewal_;
     time_point bound_at_{}; // when the BIND was sent that leases count from

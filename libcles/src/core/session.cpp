@@ -62,7 +62,7 @@ void session::on_reply(std::string_view line) {
 
 void session::on_update(const subscriptions::match& found) {
     const auto& update = *found.update;
-    if (found.whose == nullptr || protocol::begins_with_error(update.body) || !found.whose->take(update)) {
+    if (found.whose == nullptr || protocol::begins_with_error(update.body) || !subscriptions_.deliver(found)) {
         ++node_->counts.updates_dropped;
     } else {
         ++node_->counts.updates_received;

@@ -4,6 +4,7 @@
 #include "core/update_intake.hpp"
 
 #include <algorithm>
+#include <iterator>
 
 namespace cles::core {
 
@@ -29,11 +30,26 @@ bool subscriptions::has(std::string_view target, std::string_view path) const {
                                                   [&](const auto* s) { return overlap(s->target(), target); });
 }
 
+bool subscriptions::admits(const subscription& s) const {
+    const auto found = by_path_.find(s.path());
+    return found == by_path_.end() || std::all_of(found->second.begin(), found->second.end(), [&](const auto* other) {
+               return other->may_share(s) || !overlap(other->target(), s.target());
+           });
+}
+
+bool subscriptions::is_shared(const subscription& s) const {
+    const auto found = by_path_.find(s.path());
+    return found != by_path_.end() && std::any_of(found->second.begin(), found->second.end(), [&](const auto* other) {
+               return other != &s && other->may_share(s);
+           });
+}
+
 bool subscriptions::add(subscription& s) {
-    if (has(s.target(), s.path())) {
+    if (!admits(s)) {
         return false;
     }
     forget_last();
+    sharing_ += is_shared(s) ? 1 : 0;
     by_path_[s.path()].push_back(&s);
     return true;
 }
@@ -42,7 +58,9 @@ void subscriptions::remove(const subscription& s) {
     forget_last();
     const auto found = by_path_.find(s.path());
     if (found != by_path_.end()) {
-        std::erase(found->second, &s);
+        if (std::erase(found->second, &s) != 0 && is_shared(s)) {
+            --sharing_;
+        }
         if (found->second.empty()) {
             by_path_.erase(found);
         }
@@ -64,6 +82,28 @@ subscription* subscriptions::find(std::string_view publisher, std::string_view p
         }
     }
     return of_all;
+}
+
+bool subscriptions::deliver(const match& found) {
+    if (sharing_ == 0) {
+        return found.whose->take(*found.update);
+    }
+    // Whoever is told may end it, or others.
+    const std::string path{found.whose->path()};
+    const auto& there = by_path_.find(path)->second;
+    std::vector<subscription*> all;
+    std::copy_if(there.begin(), there.end(), std::back_inserter(all), [&](const auto* other) {
+        return other == found.whose || (other->may_share(*found.whose) && other->is_bound());
+    });
+    bool taken = false;
+    for (auto* each : all) {
+        const auto now = by_path_.find(path);
+        if (now != by_path_.end() && std::find(now->second.begin(), now->second.end(), each) != now->second.end() &&
+            each->is_bound()) {
+            taken = each->take(*found.update) || taken;
+        }
+    }
+    return taken;
 }
 
 subscriptions::match subscriptions::recognise(std::string_view line) noexcept {

@@ -10,6 +10,7 @@
 #include "protocol/message.hpp"
 #include "protocol/update_head.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -31,6 +32,13 @@ class subscription {
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
     [[nodiscard]] const std::string& target() const noexcept { return target_; }
+    /// With these terms, as any text; one of the same noun and terms may share its binding. Without, none does.
+    void share_by(std::string terms) { terms_ = std::move(terms); }
+    [[nodiscard]] bool may_share(const subscription& other) const noexcept {
+        return !terms_.empty() && terms_ == other.terms_ && target_ == other.target_ && path_ == other.path_;
+    }
+    /// Its BIND has been answered: what comes is for it. (For one alone nothing comes before.)
+    [[nodiscard]] virtual bool is_bound() const noexcept { return true; }
 
     /// Hands an update on: first a gap that it shows, then itself. False where it is old or repeated, or its body is no
     /// JSON.
@@ -45,16 +53,19 @@ class subscription {
 
     std::string target_;
     std::string path_;
+    std::string terms_;
     bool thinned_;
     update_order order_;
     std::unique_ptr<publisher_orders> each_; // where it is bound to all
 };
 
-/// The subscriptions on one link, by what they are bound to: one for each publisher and noun.
+/// The subscriptions on one link, by what they are bound to: one for each publisher and noun, or several that share
+/// their binding.
 class subscriptions {
   public:
-    /// False where the noun is, or may be, bound on this link already.
+    /// False where the noun is, or may be, bound on this link already, and that binding cannot be shared.
     bool add(subscription& s);
+    [[nodiscard]] bool admits(const subscription& s) const;
     void remove(const subscription& s);
     [[nodiscard]] bool has(std::string_view target, std::string_view path) const;
     /// The subscription that an update is for, or null.
@@ -69,13 +80,17 @@ class subscriptions {
     [[nodiscard]] match recognise(std::string_view line) noexcept;
     /// Finds whom a parsed update is for, and keeps its head in mind where updates of the noun follow each other.
     [[nodiscard]] match find(std::string_view line, const protocol::request_line& update);
+    /// Hands an update to whom it is for, and those who share the binding. False where it is news to none of them.
+    bool deliver(const match& found);
     [[nodiscard]] bool empty() const noexcept { return by_path_.empty(); }
 
   private:
     void forget_last() noexcept;
+    [[nodiscard]] bool is_shared(const subscription& s) const;
 
     // Mostly one node publishes a path on a link, so that a short list is quicker than a second key.
     text_map<std::vector<subscription*>> by_path_;
+    std::size_t sharing_ = 0;         // those that share the binding of another
     subscription* last_ = nullptr;    // whom the update before was for
     subscription* head_of_ = nullptr; // whom updates with the head in mind are for
     protocol::update_head head_;

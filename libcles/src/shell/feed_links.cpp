@@ -186,6 +186,8 @@ class feed_links::features_reply final : public detail::pending {
 };
 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
+    feed.share_by("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
+                  terms.adverbs);
     feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, 0});
 }
 
@@ -232,13 +234,13 @@ void feed_links::bind(core::feed_machine& feed) {
 
 void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feeds_.at(&feed);
-    e.on = c;
-    auto limit = e.terms.deadline;
     if (e.terms.marked && !c->marks()) {
         ask_for_features(feed, c);
         return;
     }
     const bool marked = e.terms.marked && *c->marks();
+    e.on = c;
+    auto limit = e.terms.deadline;
     if (limit.count() <= 0) {
         limit = std::chrono::milliseconds{protocol::default_deadline_ms};
     }
@@ -312,7 +314,8 @@ void feed_links::unbind(core::feed_machine& feed) {
     const auto c = found->second.on.lock();
     const auto now = engine_.now();
     detach(feed);
-    if (c && c->usable() && !engine_.stopped()) {
+    // Another feed may share the binding.
+    if (c && c->usable() && !engine_.stopped() && !c->session().bound().has(feed.target(), feed.path())) {
         c->session().asking().send(
             {.verb = verb::bind, .noun = found->second.terms.noun, .id = engine_.draw_id(), .lease_ms = 0},
             now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,

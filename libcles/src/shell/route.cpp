@@ -35,7 +35,7 @@ std::shared_ptr<connection> route::usable() const {
 
 std::shared_ptr<connection> route::free_for(const core::feed_machine& feed) const {
     for (const auto& c : links_) {
-        if (c->usable() && !c->session().bound().has(feed.target(), feed.path())) {
+        if (c->usable() && c->session().bound().admits(feed)) {
             return c;
         }
     }
