@@ -10,6 +10,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -171,6 +172,29 @@ BOOST_AUTO_TEST_CASE(feeds_may_end_and_begin_while_an_update_is_handed_out) {
     BOOST_TEST((events(late) == lines{"car1 2 {}"}));
     BOOST_TEST((feeds.remove_all() == std::vector<group_feed*>{&last, &late}));
     BOOST_TEST(!hear("car1", 3));
+}
+
+BOOST_AUTO_TEST_CASE(what_ends_while_an_update_is_handed_out_leaves_nothing_behind) {
+    group_feed elsewhere{node.host->bounds, "all", "speed/fast"};
+    struct meddler final : cles::detail::pending_event {
+        bool deliver(const cles::detail::raw_event&) override {
+            for (auto* feed : ends) {
+                f->feeds.remove(*feed);
+            }
+            throw std::runtime_error{"of the user's"};
+        }
+        void fail(boost::system::error_code, std::string_view) override {}
+        void discard() noexcept override {}
+        fixture* f = nullptr;
+        std::vector<group_feed*> ends;
+    } meddling;
+    meddling.f = this;
+    meddling.ends = {&elsewhere, &all};
+    add(all);
+    add(elsewhere);
+    BOOST_TEST(!all.mail().next(cles::core::feed_mailbox::event_ptr{&meddling}));
+    BOOST_CHECK_THROW(hear("car1", 1), std::runtime_error);
+    BOOST_TEST(feeds.empty());
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <utility>
 
 namespace cles::core {
@@ -77,8 +78,9 @@ void group_feeds::remove(group_feed& feed) {
     if (place == feeds.end()) {
         return;
     }
-    if (handing_out_ != 0) {
+    if (depth_ != 0) {
         *place = nullptr;
+        holes_ = true;
     } else {
         feeds.erase(place);
     }
@@ -87,6 +89,25 @@ void group_feeds::remove(group_feed& feed) {
         by_path_.erase(found);
     }
 }
+
+/// Whoever is told may close feeds, of any noun, and make new ones; or throw. Their places are kept until then.
+class group_feeds::handing_out {
+  public:
+    explicit handing_out(group_feeds& of) noexcept : of_(of) { ++of_.depth_; }
+    handing_out(const handing_out&) = delete;
+    handing_out& operator=(const handing_out&) = delete;
+    ~handing_out() {
+        if (--of_.depth_ == 0 && std::exchange(of_.holes_, false)) {
+            for (auto at = of_.by_path_.begin(); at != of_.by_path_.end();) {
+                std::erase(at->second, nullptr);
+                at = at->second.empty() ? of_.by_path_.erase(at) : std::next(at);
+            }
+        }
+    }
+
+  private:
+    group_feeds& of_;
+};
 
 std::vector<group_feed*> group_feeds::remove_all() {
     std::vector<group_feed*> all;
@@ -105,29 +126,13 @@ bool group_feeds::take(const protocol::request_line& update) {
     if (found == by_path_.end()) {
         return false;
     }
-    // Whoever is told may close feeds and make new ones.
-    struct holding {
-        explicit holding(int& count) noexcept : depth(count) { ++depth; }
-        holding(const holding&) = delete;
-        holding& operator=(const holding&) = delete;
-        ~holding() { --depth; }
-        int& depth;
-    };
-    auto& feeds = found->second;
+    const auto& feeds = found->second;
+    const handing_out on{*this};
     bool taken = false;
-    {
-        const holding on{handing_out_};
-        // NOLINTNEXTLINE(modernize-loop-convert): what is added meanwhile may move the others
-        for (std::size_t i = 0, end = feeds.size(); i < end; ++i) {
-            if (auto* feed = feeds[i]; feed != nullptr && feed->wants(update.noun.target)) {
-                taken = feed->take(update) || taken;
-            }
-        }
-    }
-    if (handing_out_ == 0) {
-        std::erase(feeds, nullptr);
-        if (feeds.empty()) {
-            by_path_.erase(found);
+    // NOLINTNEXTLINE(modernize-loop-convert): what is added meanwhile may move the others
+    for (std::size_t i = 0, end = feeds.size(); i < end; ++i) {
+        if (auto* feed = feeds[i]; feed != nullptr && feed->wants(update.noun.target)) {
+            taken = feed->take(update) || taken;
         }
     }
     return taken;

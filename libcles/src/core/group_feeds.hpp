@@ -32,8 +32,12 @@ class group_feeds {
     [[nodiscard]] std::vector<group_feed*> remove_all();
     /// Hands an update on. False where nobody wants it, or it is not news to anybody.
     bool take(const protocol::request_line& update);
+    /// Nothing is kept of any feed.
+    [[nodiscard]] bool empty() const noexcept { return by_path_.empty() && bound_.empty(); }
 
   private:
+    class handing_out;
+
     struct bound final : deadline { // due when it is to be renewed
         bound(group_feeds& all, std::string what) : owner(all), noun(std::move(what)) {}
         void on_deadline(time_point now) override { owner.send_bind(*this, now); }
@@ -52,7 +56,8 @@ class group_feeds {
     jitter jitter_;
     std::map<std::string, std::unique_ptr<bound>, std::less<>> bound_;
     std::map<std::string, std::vector<group_feed*>, std::less<>> by_path_; // null: removed while updates are handed out
-    int handing_out_ = 0;
+    int depth_ = 0;                                                        // of handing out
+    bool holes_ = false;                                                   // there are such
 };
 
 } // namespace cles::core
