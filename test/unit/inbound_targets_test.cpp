@@ -56,6 +56,14 @@ BOOST_AUTO_TEST_CASE(without_routing_any_all_and_other_nodes_are_no_target) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(without_routing_it_is_said_what_any_and_all_need) {
+    for (const std::string_view line : {"PULL any:speed", "BIND all:pose"}) {
+        const auto said = link.reply(line).message;
+        BOOST_TEST(said.find("cles::routing()") != std::string::npos, said);
+    }
+    BOOST_TEST(link.reply("PULL car2:speed").message == "car1 knows no way to 'car2'");
+}
+
 BOOST_AUTO_TEST_CASE(a_node_that_finds_itself_in_via_answers_no_target) {
     BOOST_TEST(link.kind("PULL car1:speed via=car1") == "no_target");
     BOOST_TEST(link.kind("PULL car1:speed via=car3,car1,car2") == "no_target");

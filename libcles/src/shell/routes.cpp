@@ -60,7 +60,9 @@ std::string routes::address_of(std::string_view target) const {
         return "inproc://" + door;
     }
     if (protocol::is_reserved_target(target)) {
-        throw error(errc::no_target, "'" + std::string{target} + "' needs a node that routes");
+        throw error(errc::no_target, "'" + std::string{target} +
+                                         "' needs a node that routes: give this one cles::routing() as "
+                                         "service_options::routing, or say with call_options::at where another is");
     }
     const auto unknown = own_name + " knows no way to '" + std::string{target} + "': ";
     const auto& neighbours = engine_.neighbours();
