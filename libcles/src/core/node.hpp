@@ -64,6 +64,7 @@ struct node {
     gossip_answers* talk = nullptr; ///< to those who take part in gossip; null where this node does not
     counters counts;
     latency_histogram handler_time; ///< of all handlers that answer later, and of a sample of the others
+    std::uint64_t plain_runs = 0;   ///< of those others, to choose the sample by
     publications published;
     dedup_memory remembered;
     reflection_limit reflection;
