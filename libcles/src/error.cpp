@@ -33,6 +33,7 @@ constexpr std::array entries{
     entry{errc::already_registered, "already_registered", "the verb and task have a handler already"},
     entry{errc::conversion, "conversion", "the JSON does not have the shape of the type"},
     entry{errc::stopped, "stopped", "the service has been stopped"},
+    entry{errc::closed, "closed", "the feed is not open"},
 };
 constexpr std::size_t wire_codes = 10;
 

@@ -50,16 +50,28 @@ std::vector<std::string> service::endpoints() const { return engine_->node().end
 
 const asio::any_io_executor& service::get_executor() const noexcept { return engine_->executor(); }
 
-std::string service::listen(std::string_view url) { return engine_->listen(url); }
+// The functions of the user's that these call (log, load) may destroy the service.
 
-void service::set_peer(std::string_view name, std::string_view url) { engine_->routes().set_peer(name, url); }
-
-void service::leave() {
-    engine_->neighbours().leave();
-    engine_->settle();
+std::string service::listen(std::string_view url) {
+    const auto inside = engine_;
+    return inside->listen(url);
 }
 
-void service::set_gossip(const gossip_options& how) { engine_->neighbours().gossip(how); }
+void service::set_peer(std::string_view name, std::string_view url) {
+    const auto inside = engine_;
+    inside->routes().set_peer(name, url);
+}
+
+void service::leave() {
+    const auto inside = engine_;
+    inside->neighbours().leave();
+    inside->settle();
+}
+
+void service::set_gossip(const gossip_options& how) {
+    const auto inside = engine_;
+    inside->neighbours().gossip(how);
+}
 
 std::vector<peer> service::peers() const { return engine_->node().others.list(engine_->now()); }
 
@@ -73,8 +85,8 @@ void service::publish(std::string_view noun, const std::function<void(json_write
     engine_->publish(noun, write);
 }
 
-void service::publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation) {
-    engine_->publish_when_room(noun, json, std::move(operation));
+std::uint64_t service::publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation) {
+    return engine_->publish_when_room(noun, json, std::move(operation));
 }
 
 std::uint64_t service::send(const detail::outgoing& request, const call_options& options,

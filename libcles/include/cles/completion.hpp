@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/cancellation.hpp>
 #include <cles/error.hpp>
 
 #include <boost/asio/any_io_executor.hpp>
@@ -9,6 +10,7 @@
 #include <boost/asio/associated_executor.hpp>
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/use_awaitable.hpp>
 
 #include <exception>
@@ -76,6 +78,7 @@ class completion {
   private:
     template <class... A>
     void run(A&&... arguments) && {
+        release_slot(handler_);
         const auto executor = boost::asio::get_associated_executor(handler_, service_);
         if (!work_) {
             std::move(handler_)(std::forward<A>(arguments)...);
@@ -111,6 +114,23 @@ void end_operation(Operation* self, Completion& kept, boost::system::error_code 
     std::destroy_at(self);
     std::allocator_traits<decltype(allocator)>::deallocate(allocator, self, 1);
     std::move(complete)(code, message, std::forward<A>(values)...);
+}
+
+/// Fails an operation that cannot begin, never inside the call. Without an executor of its own the handler runs on
+/// `executor`; where that is none, on Asio's system executor.
+template <bool Throws, class Handler, class... T>
+void fail_later(Handler handler, boost::asio::any_io_executor executor, boost::system::error_code code,
+                std::string_view message, T&&... values) {
+    if (!executor) {
+        executor = boost::asio::any_io_executor{boost::asio::get_associated_executor(handler)};
+    }
+    if constexpr (Throws) {
+        boost::asio::post(executor, boost::asio::append(std::move(handler),
+                                                        std::make_exception_ptr(error(code, std::string{message})),
+                                                        std::forward<T>(values)...));
+    } else {
+        boost::asio::post(executor, boost::asio::append(std::move(handler), code, std::forward<T>(values)...));
+    }
 }
 
 /// Destroys an operation without calling its handler.

@@ -32,6 +32,7 @@ enum class errc {
     already_registered,   ///< the verb and task have a handler already
     conversion,           ///< JSON does not have the shape of the C++ type
     stopped,              ///< the service has been stopped
+    closed,               ///< the feed is not open: never bound, closed, or moved from
 };
 
 /// The category of `errc`; its name is "cles".

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/cancellation.hpp>
 #include <cles/completion.hpp>
 #include <cles/feed_event.hpp>
 #include <cles/pending.hpp>
@@ -8,7 +9,6 @@
 
 #include <boost/asio/associated_cancellation_slot.hpp>
 #include <boost/asio/async_result.hpp>
-#include <boost/asio/cancellation_type.hpp>
 
 #include <cstdint>
 #include <memory>
@@ -42,10 +42,12 @@ class feed_control {
     virtual ~feed_control() = default;
     /// Binds. The operation completes when the publisher has answered; where it fails, the feed is closed.
     virtual void start(pending_ptr bound) = 0;
+    /// Closes it where that operation still waits.
+    virtual void cancel_start() = 0;
     /// Takes the event that waits, or keeps the operation until one comes. A second operation while one waits fails.
     virtual void next(event_ptr operation) = 0;
-    /// Withdraws the operation that waits, if any.
-    virtual void cancel() = 0;
+    /// Withdraws this operation, if it still waits.
+    virtual void cancel(const pending_event* operation) = 0;
     /// Unbinds.
     virtual void close() = 0;
     [[nodiscard]] virtual const boost::asio::any_io_executor& executor() const = 0;
@@ -176,11 +178,15 @@ class feed {
     using value_type = T;
 
     feed() = default;
-    explicit feed(std::shared_ptr<detail::feed_control> control) : control_(std::move(control)) {}
-    feed(feed&&) noexcept = default;
+    explicit feed(std::shared_ptr<detail::feed_control> control)
+        : control_(std::move(control)), executor_(control_->executor()) {}
+    feed(feed&& other) noexcept : control_(std::move(other.control_)), executor_(other.executor_) {}
     feed& operator=(feed&& other) noexcept {
-        close();
-        control_ = std::move(other.control_);
+        if (this != &other) {
+            close();
+            control_ = std::move(other.control_);
+            executor_ = other.executor_;
+        }
         return *this;
     }
     feed(const feed&) = delete;
@@ -188,29 +194,33 @@ class feed {
     ~feed() { close(); }
 
     /// The next event. An update that is not a T fails with `conversion`, and the next call goes on behind it.
-    /// Cancellation (terminal, partial or total) leaves the feed as it was.
+    /// Cancellation (terminal, partial or total) leaves the feed as it was. On a feed that is not open it fails with
+    /// `closed`; the handler then runs on its own executor, which without one is the service's, or, where the feed
+    /// never had any, Asio's system executor.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_next(Token&& token = {}) {
         constexpr bool with_exceptions = detail::throws<std::remove_cvref_t<Token>>;
         return boost::asio::async_initiate<Token, detail::signature_for<Token, feed_item<T>>>(
-            [control = control_](auto handler) {
-                auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                if (slot.is_connected()) {
-                    slot.assign([weak = std::weak_ptr{control}](boost::asio::cancellation_type type) {
-                        const auto alive = weak.lock();
-                        if (alive && type != boost::asio::cancellation_type::none) {
-                            alive->cancel();
-                        }
-                    });
+            [control = control_, fallback = control_ ? boost::asio::any_io_executor{} : executor_](auto handler) {
+                if (!control) {
+                    detail::fail_later<with_exceptions>(std::move(handler), fallback, errc::closed,
+                                                        "the feed is not open", feed_item<T>{});
+                    return;
                 }
                 using operation_type = detail::event_operation<T, with_exceptions, decltype(handler)>;
-                const auto executor = control->executor();
-                control->next(detail::event_ptr{detail::make_operation<operation_type>(std::move(handler), executor)});
+                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+                auto* operation = detail::make_operation<operation_type>(std::move(handler), control->executor());
+                detail::connect_slot(slot, [weak = std::weak_ptr{control}, operation] {
+                    if (const auto alive = weak.lock()) {
+                        alive->cancel(operation);
+                    }
+                });
+                control->next(detail::event_ptr{operation});
             },
             token);
     }
 
-    /// Unbinds. An `async_next` that waits fails with `cancelled`.
+    /// Unbinds. An `async_next` that waits fails with `cancelled`, soon and never inside the call.
     void close() {
         if (auto control = std::exchange(control_, nullptr)) {
             control->close();
@@ -221,6 +231,7 @@ class feed {
 
   private:
     std::shared_ptr<detail::feed_control> control_;
+    boost::asio::any_io_executor executor_; // stays when it is closed
 };
 
 } // namespace cles

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/call_options.hpp>
+#include <cles/cancellation.hpp>
 #include <cles/error.hpp>
 #include <cles/feed.hpp>
 #include <cles/gossip.hpp>
@@ -95,8 +96,14 @@ struct outgoing {
 /// Failures. Operations complete with `(error_code, result)`; the peer's own words go to `call_options::diagnostics`.
 /// With `co_await` (the default token) and `use_future` they throw `cles::error`, which holds code and words.
 ///
-/// Cancellation. All operations honour their cancellation slot (terminal, partial, total): the request is withdrawn at
-/// the peer and completes with `cancelled` at once.
+/// Cancellation. All operations honour their cancellation slot (terminal, partial, total) until they complete: the
+/// request is withdrawn at the peer and completes with `cancelled` without waiting for it.
+///
+/// Handlers. A completion handler is never called from inside the function that began, withdrew or ended its operation
+/// (an emission, `stop`, `feed::close`, a destructor), and may do anything: throw (it comes out of the executor's
+/// `run`, as with Asio's operations, and harms no other operation; call `run` again), cancel, begin, destroy the
+/// service. What the functions of `service_options` throw is caught: `authorise` then denies, `load` and `metrics` are
+/// left out, and what `log` throws is dropped.
 class service : public registrar {
   public:
     /// Starts listening at once; accepting begins when the executor runs.
@@ -147,13 +154,14 @@ class service : public registrar {
     }
 
     /// Publishes once every binder's queue has room, so that nothing is dropped: `void(error_code)`. It completes when
-    /// the update is in those queues, in the order of the calls.
+    /// the update is in those queues, in the order of the calls. Withdrawn before, it is not published.
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
             [this](auto handler, std::string path, std::string json) {
+                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                publish_when_room(path, json, detail::pending_ptr{operation});
+                connect_cancellation(slot, publish_when_room(path, json, detail::pending_ptr{operation}));
             },
             token, std::string{noun}, to_json(value));
     }
@@ -269,10 +277,9 @@ class service : public registrar {
 
     template <class Slot>
     void connect_cancellation(Slot slot, std::uint64_t ticket) {
-        if (ticket != 0 && slot.is_connected()) {
-            slot.assign([weak = std::weak_ptr{engine_}, ticket](boost::asio::cancellation_type type) {
-                const auto alive = weak.lock();
-                if (alive && type != boost::asio::cancellation_type::none) {
+        if (ticket != 0) {
+            detail::connect_slot(slot, [weak = std::weak_ptr{engine_}, ticket] {
+                if (const auto alive = weak.lock()) {
                     cancel(*alive, ticket);
                 }
             });
@@ -283,24 +290,20 @@ class service : public registrar {
     void start_bind(Handler handler, const std::string& noun, const bind_options& options) {
         using operation_type = detail::bind_operation<T, detail::throws<std::remove_cvref_t<Token>>, Handler>;
         auto control = make_feed(noun, options);
-        auto slot = boost::asio::get_associated_cancellation_slot(handler);
-        if (slot.is_connected()) {
-            slot.assign([weak = std::weak_ptr{control}](boost::asio::cancellation_type type) {
-                const auto alive = weak.lock();
-                if (alive && type != boost::asio::cancellation_type::none) {
-                    alive->close();
-                }
-            });
-        }
+        detail::connect_slot(boost::asio::get_associated_cancellation_slot(handler), [weak = std::weak_ptr{control}] {
+            if (const auto alive = weak.lock()) {
+                alive->cancel_start();
+            }
+        });
         control->start(detail::pending_ptr{
             detail::make_operation<operation_type>(std::move(handler), get_executor(), control, options.diagnostics_)});
     }
 
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
-    void publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
-    // Both return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.
+    // These return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.
     std::uint64_t send(const detail::outgoing& request, const call_options& options, detail::pending_ptr operation);
     std::uint64_t send_command(std::string_view command, const call_options& options, detail::pending_ptr operation);
+    std::uint64_t publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
     static void cancel(detail::engine& inside, std::uint64_t ticket);
     std::shared_ptr<detail::feed_control> make_feed(std::string_view noun, const bind_options& options);
 

@@ -5,10 +5,10 @@
 
 namespace cles::core {
 
-feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
-                           std::string path, bool thinned, std::uint32_t seed)
-    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines), mail_(bounds),
-      backoff_(seed), renewal_(*this, deadlines, ~seed) {}
+feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, completion_queue& completions,
+                           const limits& bounds, std::string target, std::string path, bool thinned, std::uint32_t seed)
+    : subscription(std::move(target), std::move(path), thinned), host_(host), deadlines_(deadlines),
+      completions_(completions), mail_(bounds, completions), backoff_(seed), renewal_(*this, deadlines, ~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);
@@ -32,7 +32,7 @@ void feed_machine::on_bound(std::string_view last) {
         on_event({.kind = feed_event::current, .body = body, .checked = true});
     }
     if (first_) {
-        first_.release()->offer(body);
+        completions_.succeed(std::move(first_), body);
     }
 }
 
@@ -71,7 +71,7 @@ void feed_machine::on_refused(boost::system::error_code why, std::string_view me
         auto operation = std::move(first_);
         const std::string text{message};
         close(errc::cancelled);
-        operation.release()->fail(why, text);
+        completions_.fail(std::move(operation), why, text);
         return;
     }
     pause(now);
@@ -98,7 +98,7 @@ void feed_machine::on_deadline(time_point) {
     }
 }
 
-void feed_machine::close(errc why) { abandon().fail(why); }
+void feed_machine::close(errc why) { abandon().fail(completions_, why); }
 
 feed_machine::waiting feed_machine::abandon() {
     if (state_ != state::closed) {
@@ -110,12 +110,12 @@ feed_machine::waiting feed_machine::abandon() {
     return {.first = std::move(first_), .next = mail_.close()};
 }
 
-void feed_machine::waiting::fail(errc why) {
-    if (auto* operation = first.release()) {
-        operation->fail(why, "the feed was closed");
+void feed_machine::waiting::fail(completion_queue& completions, errc why) {
+    if (first != nullptr) {
+        completions.fail(std::move(first), why, "the feed was closed");
     }
-    if (auto* operation = next.release()) {
-        operation->fail(why, "the feed was closed");
+    if (next != nullptr) {
+        completions.fail(std::move(next), why, "the feed was closed");
     }
 }
 

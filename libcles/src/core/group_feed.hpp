@@ -19,8 +19,9 @@ namespace cles::core {
 class group_feed {
   public:
     /// `target`: a node's name, or "all".
-    group_feed(const limits& bounds, std::string target, std::string path)
-        : target_(std::move(target)), path_(std::move(path)), mail_(bounds), publishers_(bounds.publishers) {}
+    group_feed(const limits& bounds, completion_queue& completions, std::string target, std::string path)
+        : target_(std::move(target)), path_(std::move(path)), mail_(bounds, completions),
+          publishers_(bounds.publishers) {}
     group_feed(const group_feed&) = delete;
     group_feed& operator=(const group_feed&) = delete;
 
@@ -28,7 +29,7 @@ class group_feed {
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
     [[nodiscard]] bool wants(std::string_view node) const noexcept { return target_ == "all" || target_ == node; }
     /// Hands an update on that it wants. False where it is old or repeated, or its body is no JSON.
-    bool take(const protocol::request_line& update);
+    bool take(const protocol::request_line& update, feed_mailbox::hand_over when = feed_mailbox::hand_over::now);
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
     [[nodiscard]] std::size_t publishers() const noexcept { return publishers_.size(); }
 

@@ -105,7 +105,8 @@ bool group_feeds::take(const protocol::request_line& update) {
     if (found == by_path_.end()) {
         return false;
     }
-    // Whoever is told may close feeds and make new ones.
+    // Whoever is told may close feeds and make new ones. So the last is told when nothing here is looked at any more
+    // (mostly it is the only one), and the others later, unless they are the library's own.
     struct holding {
         explicit holding(int& count) noexcept : depth(count) { ++depth; }
         holding(const holding&) = delete;
@@ -114,23 +115,30 @@ bool group_feeds::take(const protocol::request_line& update) {
         int& depth;
     };
     auto& feeds = found->second;
+    const auto wants = [&](const group_feed* feed) { return feed != nullptr && feed->wants(update.noun.target); };
+    const auto behind_last = std::find_if(feeds.rbegin(), feeds.rend(), wants).base();
+    if (behind_last == feeds.begin()) {
+        return false;
+    }
     bool taken = false;
+    const auto last_at = static_cast<std::size_t>(behind_last - feeds.begin()) - 1;
     {
         const holding on{handing_out_};
         // NOLINTNEXTLINE(modernize-loop-convert): what is added meanwhile may move the others
-        for (std::size_t i = 0, end = feeds.size(); i < end; ++i) {
-            if (auto* feed = feeds[i]; feed != nullptr && feed->wants(update.noun.target)) {
-                taken = feed->take(update) || taken;
+        for (std::size_t i = 0; i < last_at; ++i) {
+            if (wants(feeds[i])) {
+                taken = feeds[i]->take(update, feed_mailbox::hand_over::later) || taken;
             }
         }
     }
+    auto* const last = feeds[last_at];
     if (handing_out_ == 0) {
         std::erase(feeds, nullptr);
         if (feeds.empty()) {
             by_path_.erase(found);
         }
     }
-    return taken;
+    return (last != nullptr && last->take(update)) || taken;
 }
 
 } // namespace cles::core

@@ -44,7 +44,10 @@ class inbound final : private call_owner, private call_opener {
     /// The peer sends no more: what has an id is withdrawn, the rest is still answered, then the link finishes.
     void end(time_point now);
     /// The link is gone.
-    void lose();
+    void lose() {
+        lost_ = true;
+        drop_all();
+    }
 
     /// Whether requests wait whose turn has come, but which are too many for one turn.
     [[nodiscard]] bool has_more() const noexcept { return anonymous_ == nullptr && !waiting_.empty(); }
@@ -78,6 +81,7 @@ class inbound final : private call_owner, private call_opener {
     void follow_waiting();
     void serve_waiting(time_point now);
     void withdraw_all();
+    void drop_all();
     void finish_if_done();
 
     void withdraw(std::uint64_t id);
@@ -103,6 +107,7 @@ class inbound final : private call_owner, private call_opener {
     bool ending_ = false;  // the peer sends no more, or what it sends is no longer read
     bool closing_ = false; // the link ends whatever is bound
     bool finished_ = false;
+    bool lost_ = false; // there is no link any more
     unsigned sample_ = 0;
 };
 

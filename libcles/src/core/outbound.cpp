@@ -89,8 +89,9 @@ void outbound::recycle(std::unique_ptr<entry> e) {
 void outbound::fail(std::uint64_t id, errc why, std::string_view message) {
     if (auto e = take(id)) {
         auto operation = std::move(e->operation);
+        auto progress = std::move(e->progress);
         recycle(std::move(e));
-        operation.release()->fail(why, message);
+        node_.completions.fail(std::move(operation), why, message, std::move(progress));
     }
 }
 
@@ -141,21 +142,22 @@ void outbound::on_reply(const protocol::reply_line& reply) {
             e->reported = std::max(e->reported, *reply.progress);
             go_on(std::move(e), due);
             if (!late) {
-                report(*reply.progress, reply.body);
+                node_.completions.now([&] { report(*reply.progress, reply.body); });
             }
             return;
         }
     } else if (protocol::is_failure(reply.body)) {
         protocol::failure why;
         if (protocol::parse_failure(reply.body, why)) {
-            auto operation = std::move(e->operation);
+            auto* operation = e->operation.release();
             recycle(std::move(e));
-            operation.release()->refuse(why.code, why.message, reply.body);
+            node_.completions.now([&] { operation->refuse(why.code, why.message, reply.body); });
             return;
         }
     } else {
         auto* operation = e->operation.release();
-        ended = operation->offer(reply.body) == detail::pending::verdict::completed;
+        ended = true; // what is thrown comes from its handler
+        node_.completions.now([&] { ended = operation->offer(reply.body) == detail::pending::verdict::completed; });
         if (!ended) {
             e->operation.reset(operation);
         }
@@ -178,7 +180,7 @@ void outbound::lose(errc why, std::string_view message) {
     const std::string text{message};
     for (const auto& [id, e] : lost) {
         node_.deadlines.disarm(*e);
-        e->operation.release()->fail(why, text);
+        node_.completions.fail(std::move(e->operation), why, text, std::move(e->progress));
     }
 }
 

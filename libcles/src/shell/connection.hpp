@@ -96,6 +96,7 @@ class connection final : public link_events,
     time_point now();
     /// The peer has said something. False where it has been turned away with it.
     bool hears(std::string_view text);
+    void throw_on();
     void on_quiet() override;
     void on_stall(time_point now);
     void send_output();

@@ -29,7 +29,8 @@ class refused_feed final : public detail::feed_control {
             operation.release()->fail(code, message);
         });
     }
-    void cancel() override {}
+    void cancel_start() override {}
+    void cancel(const detail::pending_event*) override {}
     void close() override {}
     [[nodiscard]] const asio::any_io_executor& executor() const override { return host_->executor(); }
 
@@ -42,8 +43,8 @@ class refused_feed final : public detail::feed_control {
 } // namespace
 
 feed_handle::feed_handle(std::shared_ptr<detail::engine> host, std::string target, std::string path, bool thinned)
-    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->bounds(), std::move(target),
-                                       std::move(path), thinned, seed()) {}
+    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
+                                       std::move(target), std::move(path), thinned, seed()) {}
 
 feed_handle::~feed_handle() { host_->feeds().leave(machine_); }
 
@@ -53,7 +54,11 @@ void feed_handle::next(detail::event_ptr operation) {
     fetch_next(machine_.mail(), executor(), shared_from_this(), std::move(operation));
 }
 
-void feed_handle::cancel() { machine_.mail().cancel(); }
+void feed_handle::cancel_start() {
+    if (machine_.is_starting()) {
+        close();
+    }
+}
 
 void feed_handle::close() {
     machine_.close(errc::cancelled);

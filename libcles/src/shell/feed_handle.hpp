@@ -21,7 +21,8 @@ class feed_handle final : public detail::feed_control, public std::enable_shared
 
     void start(detail::pending_ptr bound) override;
     void next(detail::event_ptr operation) override;
-    void cancel() override;
+    void cancel_start() override;
+    void cancel(const detail::pending_event* operation) override { machine_.mail().cancel(operation); }
     void close() override;
     [[nodiscard]] const boost::asio::any_io_executor& executor() const override { return host_->executor(); }
 

@@ -55,6 +55,7 @@ class bind_reply final : public detail::pending {
         }
     }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     void bound(const detail::engine& host, std::string_view last) {
@@ -97,6 +98,7 @@ class renewal_reply final : public detail::pending {
         }
     }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     std::weak_ptr<detail::engine> host_;
@@ -229,8 +231,7 @@ void feed_links::stop() {
     for (const auto& [feed, e] : feeds) {
         if (const auto handle = e.handle.lock()) {
             // Taken out of the feed, which they may own: else neither would go if the context goes without running.
-            boost::asio::post(engine_.executor(),
-                              [waiting = feed->abandon()]() mutable { waiting.fail(errc::stopped); });
+            feed->abandon().fail(engine_.completions(), errc::stopped);
         }
     }
 }
