@@ -122,6 +122,7 @@ class event_operation final : public pending_event {
     }
 
     void discard() noexcept override { discard_operation(this, complete_); }
+    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
     completion<Throws, Handler> complete_;
@@ -138,12 +139,14 @@ namespace detail {
 template <class T, bool Throws, class Handler>
 class bind_operation final : public pending {
   public:
-    bind_operation(Handler handler, const boost::asio::any_io_executor& service, std::shared_ptr<feed_control> control,
-                   std::string* diagnostics)
-        : complete_(std::move(handler), service), control_(std::move(control)), diagnostics_(diagnostics) {}
+    bind_operation(Handler handler, const boost::asio::any_io_executor& service, std::string* diagnostics)
+        : complete_(std::move(handler), service), diagnostics_(diagnostics) {}
+
+    /// What the feed is made of; before it starts.
+    void make_of(std::shared_ptr<feed_control> control) { control_ = std::move(control); }
 
     verdict offer(std::string_view) override {
-        feed<T> bound{std::move(control_)};
+        feed<T> bound{std::move(control_), complete_.elsewhere()};
         end_operation(this, complete_, {}, {}, std::move(bound));
         return verdict::completed;
     }
@@ -157,6 +160,7 @@ class bind_operation final : public pending {
     }
 
     void discard() noexcept override { discard_operation(this, complete_); }
+    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
     completion<Throws, Handler> complete_;
@@ -170,22 +174,25 @@ class bind_operation final : public pending {
 ///
 /// Events come in order. While nobody fetches them, the newest are kept, up to `limits::feed`; what is dropped shows as
 /// a gap. When the publisher is lost the feed says so once and binds again by itself, backing off from 100 ms to 5 s.
-/// It ends with its last handle: destruction unbinds. Use it on the service's executor, with one `async_next` at a
-/// time; it may outlive the service, and then fails with `stopped`.
+/// It ends with its last handle: destruction unbinds. Use it on the executor on which the handler of its `async_bind`
+/// was called (the service's, or the handler's own), with one `async_next` at a time; it may outlive the service, and
+/// then fails with `stopped`.
 template <class T>
 class feed {
   public:
     using value_type = T;
 
     feed() = default;
-    explicit feed(std::shared_ptr<detail::feed_control> control)
-        : control_(std::move(control)), executor_(control_->executor()) {}
-    feed(feed&& other) noexcept : control_(std::move(other.control_)), executor_(other.executor_) {}
+    explicit feed(std::shared_ptr<detail::feed_control> control, bool elsewhere = false)
+        : control_(std::move(control)), executor_(control_->executor()), elsewhere_(elsewhere) {}
+    feed(feed&& other) noexcept
+        : control_(std::move(other.control_)), executor_(other.executor_), elsewhere_(other.elsewhere_) {}
     feed& operator=(feed&& other) noexcept {
         if (this != &other) {
             close();
             control_ = std::move(other.control_);
             executor_ = other.executor_;
+            elsewhere_ = other.elsewhere_;
         }
         return *this;
     }
@@ -201,7 +208,8 @@ class feed {
     auto async_next(Token&& token = {}) {
         constexpr bool with_exceptions = detail::throws<std::remove_cvref_t<Token>>;
         return boost::asio::async_initiate<Token, detail::signature_for<Token, feed_item<T>>>(
-            [control = control_, fallback = control_ ? boost::asio::any_io_executor{} : executor_](auto handler) {
+            [control = control_, elsewhere = elsewhere_,
+             fallback = control_ ? boost::asio::any_io_executor{} : executor_](auto handler) {
                 if (!control) {
                     detail::fail_later<with_exceptions>(std::move(handler), fallback, errc::closed,
                                                         "the feed is not open", feed_item<T>{});
@@ -210,12 +218,19 @@ class feed {
                 using operation_type = detail::event_operation<T, with_exceptions, decltype(handler)>;
                 const auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = detail::make_operation<operation_type>(std::move(handler), control->executor());
-                detail::connect_slot(slot, [weak = std::weak_ptr{control}, operation] {
+                const bool hop = elsewhere || operation->elsewhere();
+                detail::connect_slot(slot, hop, control->executor(), [weak = std::weak_ptr{control}, operation] {
                     if (const auto alive = weak.lock()) {
                         alive->cancel(operation);
                     }
                 });
-                control->next(detail::event_ptr{operation});
+                if (!hop) {
+                    control->next(detail::event_ptr{operation});
+                    return;
+                }
+                boost::asio::dispatch(control->executor(), [control, waiting = detail::event_ptr{operation}]() mutable {
+                    control->next(std::move(waiting));
+                });
             },
             token);
     }
@@ -223,7 +238,11 @@ class feed {
     /// Unbinds. An `async_next` that waits fails with `cancelled`, soon and never inside the call.
     void close() {
         if (auto control = std::exchange(control_, nullptr)) {
-            control->close();
+            if (elsewhere_) {
+                boost::asio::dispatch(executor_, [control = std::move(control)] { control->close(); });
+            } else {
+                control->close();
+            }
         }
     }
 
@@ -232,6 +251,7 @@ class feed {
   private:
     std::shared_ptr<detail::feed_control> control_;
     boost::asio::any_io_executor executor_; // stays when it is closed
+    bool elsewhere_ = false;                // it was handed to a handler on another executor
 };
 
 } // namespace cles

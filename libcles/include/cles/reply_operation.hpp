@@ -78,6 +78,7 @@ class reply_operation final : public pending {
     }
 
     void discard() noexcept override { discard_operation(this, complete_); }
+    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
     template <class... V>

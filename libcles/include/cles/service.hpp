@@ -89,9 +89,15 @@ struct outgoing {
 /// others.
 ///
 /// It runs on the executor that it is given, starts no thread and takes no lock. All functions are to be called, and
-/// all handlers are called, on that executor; where several threads run it, hand in a strand (for a `thread_pool` the
-/// service takes one itself). Handlers of operations are called on their own associated executor. The service must
-/// outlive neither its operations nor its feeds: when it goes, they fail with `stopped`.
+/// all handlers are called, on that executor; where several threads run it, hand in a strand. Operations whose handler
+/// has an associated executor of its own may be begun, and withdrawn, there, as by a coroutine of another context:
+/// they hop to the service's executor, and their handlers are called on their own. The service must outlive neither
+/// its operations nor its feeds: when it goes, they fail with `stopped`.
+///
+/// Of a `thread_pool` the service takes a strand itself. Then operations may be begun on any thread, and the other
+/// functions too: they run on the strand, and wait for it (on the pool's own threads, which are not to wait, they throw
+/// `would_deadlock`). `stop` and the destructor are the exception: call them on the service's executor, or when the
+/// pool has been joined.
 ///
 /// Failures. Operations complete with `(error_code, result)`; the peer's own words go to `call_options::diagnostics`.
 /// With `co_await` (the default token) and `use_future` they throw `cles::error`, which holds code and words.
@@ -161,7 +167,13 @@ class service : public registrar {
             [this](auto handler, std::string path, std::string json) {
                 const auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                connect_cancellation(slot, publish_when_room(path, json, detail::pending_ptr{operation}));
+                if (hops(*operation)) {
+                    begin_elsewhere(slot, operation, [path, json](detail::engine& inside, detail::pending_ptr waiting) {
+                        return publish_when_room(inside, path, json, std::move(waiting));
+                    });
+                } else {
+                    connect_cancellation(slot, publish_when_room(*engine_, path, json, detail::pending_ptr{operation}));
+                }
             },
             token, std::string{noun}, to_json(value));
     }
@@ -259,7 +271,15 @@ class service : public registrar {
                          const call_options& chosen) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                connect_cancellation(slot, send({verb, target.view(), text}, chosen, detail::pending_ptr{operation}));
+                if (hops(*operation)) {
+                    begin_elsewhere(slot, operation,
+                                    [verb, target, text, chosen](detail::engine& inside, detail::pending_ptr waiting) {
+                                        return send(inside, {verb, target.view(), text}, chosen, std::move(waiting));
+                                    });
+                } else {
+                    connect_cancellation(
+                        slot, send(*engine_, {verb, target.view(), text}, chosen, detail::pending_ptr{operation}));
+                }
             },
             token, detail::short_text{noun}, std::move(body), options);
     }
@@ -270,9 +290,37 @@ class service : public registrar {
             [this](auto handler, const std::string& text, const call_options& chosen) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                connect_cancellation(slot, send_command(text, chosen, detail::pending_ptr{operation}));
+                if (hops(*operation)) {
+                    begin_elsewhere(slot, operation,
+                                    [text, chosen](detail::engine& inside, detail::pending_ptr waiting) {
+                                        return send_command(inside, text, chosen, std::move(waiting));
+                                    });
+                } else {
+                    connect_cancellation(slot, send_command(*engine_, text, chosen, detail::pending_ptr{operation}));
+                }
             },
             token, std::string{command}, options);
+    }
+
+    /// Whether an operation is begun on another executor than the service's: by its handler's, or, where the service
+    /// has made a strand of its own, by where this is called.
+    template <class Operation>
+    [[nodiscard]] bool hops(const Operation& operation) const noexcept {
+        return operation.elsewhere() || (pooled_ && !on_strand());
+    }
+
+    /// Begins it on the service's executor. `begin` returns its ticket, and is handed over with all that it needs.
+    template <class Slot, class Operation, class F>
+    void begin_elsewhere(Slot slot, Operation* operation, F begin) {
+        const auto ticket = std::make_shared<std::uint64_t>(0); // used on the service's executor
+        detail::connect_slot(slot, true, get_executor(), [weak = std::weak_ptr{engine_}, ticket] {
+            if (const auto alive = weak.lock(); alive && *ticket != 0) {
+                cancel(*alive, *ticket);
+            }
+        });
+        boost::asio::dispatch(get_executor(),
+                              [inside = engine_, ticket, waiting = detail::pending_ptr{operation},
+                               begin = std::move(begin)]() mutable { *ticket = begin(*inside, std::move(waiting)); });
     }
 
     template <class Slot>
@@ -289,25 +337,54 @@ class service : public registrar {
     template <class T, class Token, class Handler>
     void start_bind(Handler handler, const std::string& noun, const bind_options& options) {
         using operation_type = detail::bind_operation<T, detail::throws<std::remove_cvref_t<Token>>, Handler>;
-        auto control = make_feed(noun, options);
-        detail::connect_slot(boost::asio::get_associated_cancellation_slot(handler), [weak = std::weak_ptr{control}] {
-            if (const auto alive = weak.lock()) {
+        const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+        auto* operation =
+            detail::make_operation<operation_type>(std::move(handler), get_executor(), options.diagnostics_);
+        const auto made = std::make_shared<std::weak_ptr<detail::feed_control>>();
+        const bool hop = hops(*operation);
+        detail::connect_slot(slot, hop, get_executor(), [made] {
+            if (const auto alive = made->lock()) {
                 alive->cancel_start();
             }
         });
-        control->start(detail::pending_ptr{
-            detail::make_operation<operation_type>(std::move(handler), get_executor(), control, options.diagnostics_)});
+        if (!hop) {
+            start_bind(*made, engine_, operation, noun, options);
+            return;
+        }
+        struct discarding { // until it has begun
+            void operator()(operation_type* unused) const noexcept { unused->discard(); }
+        };
+        boost::asio::dispatch(get_executor(),
+                              [inside = engine_, made, noun, options,
+                               waiting = std::unique_ptr<operation_type, discarding>{operation}]() mutable {
+                                  start_bind(*made, inside, waiting.release(), noun, options);
+                              });
+    }
+
+    template <class Operation>
+    static void start_bind(std::weak_ptr<detail::feed_control>& made, const std::shared_ptr<detail::engine>& inside,
+                           Operation* operation, const std::string& noun, const bind_options& options) {
+        const auto control = make_feed(inside, noun, options);
+        made = control;
+        operation->make_of(control);
+        control->start(detail::pending_ptr{operation});
     }
 
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
     // These return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.
-    std::uint64_t send(const detail::outgoing& request, const call_options& options, detail::pending_ptr operation);
-    std::uint64_t send_command(std::string_view command, const call_options& options, detail::pending_ptr operation);
-    std::uint64_t publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
+    static std::uint64_t send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
+                              detail::pending_ptr operation);
+    static std::uint64_t send_command(detail::engine& inside, std::string_view command, const call_options& options,
+                                      detail::pending_ptr operation);
+    static std::uint64_t publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
+                                           detail::pending_ptr operation);
     static void cancel(detail::engine& inside, std::uint64_t ticket);
-    std::shared_ptr<detail::feed_control> make_feed(std::string_view noun, const bind_options& options);
+    static std::shared_ptr<detail::feed_control> make_feed(const std::shared_ptr<detail::engine>& inside,
+                                                           std::string_view noun, const bind_options& options);
+    [[nodiscard]] bool on_strand() const noexcept;
 
     std::shared_ptr<detail::engine> engine_;
+    bool pooled_; ///< it has made a strand of a pool
 };
 
 } // namespace cles

@@ -46,7 +46,11 @@ feed_handle::feed_handle(std::shared_ptr<detail::engine> host, std::string targe
     : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
                                        std::move(target), std::move(path), thinned, seed()) {}
 
-feed_handle::~feed_handle() { host_->feeds().leave(machine_); }
+feed_handle::~feed_handle() {
+    if (!left_) {
+        host_->feeds().leave(machine_);
+    }
+}
 
 void feed_handle::start(detail::pending_ptr bound) { machine_.start(std::move(bound)); }
 
@@ -63,6 +67,7 @@ void feed_handle::cancel_start() {
 void feed_handle::close() {
     machine_.close(errc::cancelled);
     host_->feeds().leave(machine_);
+    left_ = true;
     // The feed may be closed from inside its own event: what is up the stack still needs it.
     asio::post(host_->executor(), [self = shared_from_this()] {});
 }

@@ -29,6 +29,7 @@ class feed_handle final : public detail::feed_control, public std::enable_shared
   private:
     std::shared_ptr<detail::engine> host_;
     core::feed_machine machine_;
+    bool left_ = false; // and may be destroyed on any thread
 };
 
 /// A feed that could not even begin; its `start` fails with the reason.

@@ -17,7 +17,7 @@ group_feed_handle::group_feed_handle(std::shared_ptr<detail::engine> host, std::
 group_feed_handle::~group_feed_handle() { leave(); }
 
 void group_feed_handle::leave() {
-    if (auto* group = host_->group()) {
+    if (auto* group = std::exchange(left_, true) ? nullptr : host_->group()) {
         group->session().feeds().remove(feed_);
         host_->settle();
     }

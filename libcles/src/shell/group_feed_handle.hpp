@@ -32,6 +32,7 @@ class group_feed_handle final : public detail::feed_control, public std::enable_
     std::shared_ptr<detail::engine> host_;
     core::group_feed feed_;
     bool starting_ = false;
+    bool left_ = false; // and may be destroyed on any thread
 };
 
 /// The feed that was asked for, or one whose `start` fails with the reason why there can be none.
