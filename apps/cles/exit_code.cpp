@@ -26,7 +26,8 @@ int of(const cles::error& failure) {
     case cles::errc::invalid_option: return usage;
     case cles::errc::would_deadlock:
     case cles::errc::already_registered:
-    case cles::errc::stopped: return local_failure;
+    case cles::errc::stopped:
+    case cles::errc::closed: return local_failure;
     }
     return remote_error;
 }

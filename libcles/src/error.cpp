@@ -45,6 +45,7 @@ constexpr std::array entries{
     entry{errc::stopped, "stopped", "the service has been stopped", conditions::operation_canceled},
     entry{errc::invalid_option, "invalid_option", "an option is outside of what it may be",
           conditions::invalid_argument},
+    entry{errc::closed, "closed", "the feed is not open", conditions::bad_file_descriptor},
 };
 constexpr std::size_t wire_codes = 10;
 

@@ -15,6 +15,8 @@
 #include <boost/asio/thread_pool.hpp>
 
 #include <algorithm>
+#include <future>
+#include <type_traits>
 #include <utility>
 
 namespace cles {
@@ -30,13 +32,50 @@ asio::any_io_executor one_at_a_time(asio::any_io_executor executor) {
     return executor;
 }
 
+using strand = asio::strand<asio::any_io_executor>;
+
+// Runs it on the strand that was made of a pool, and waits for that; in line where there is none.
+template <class F>
+std::invoke_result_t<F> run_on(const strand* own, F f) {
+    if (own == nullptr || own->running_in_this_thread()) {
+        return f();
+    }
+    const auto pool = own->get_inner_executor();
+    if (const auto* threads = pool.target<asio::thread_pool::executor_type>();
+        threads != nullptr && threads->running_in_this_thread()) {
+        throw error(errc::would_deadlock, "on a thread of the service's pool: call it on the service's own executor");
+    }
+    std::packaged_task<std::invoke_result_t<F>()> task{std::move(f)};
+    auto result = task.get_future();
+    asio::post(*own, std::move(task));
+    return result.get();
+}
+
+// The same on a strand that nothing runs on yet: from a thread of the pool it runs in line.
+template <class F>
+void begin_on(const strand* own, F f) {
+    if (own == nullptr) {
+        f();
+        return;
+    }
+    std::packaged_task<void()> task{std::move(f)};
+    auto begun = task.get_future();
+    asio::dispatch(*own, std::move(task));
+    begun.get();
+}
+
+const strand* strand_of(bool pooled, const asio::any_io_executor& executor) noexcept {
+    return pooled ? executor.target<strand>() : nullptr;
+}
+
 } // namespace
 
-service::service(asio::any_io_executor executor, service_options options) {
+service::service(asio::any_io_executor executor, service_options options)
+    : pooled_(executor.target<asio::thread_pool::executor_type>() != nullptr) {
     const auto listen_at = std::move(options.listen);
     engine_ = std::make_shared<detail::engine>(one_at_a_time(std::move(executor)), std::move(options));
     try {
-        engine_->start(listen_at);
+        begin_on(strand_of(pooled_, get_executor()), [&] { engine_->start(listen_at); });
     } catch (...) {
         engine_->stop();
         throw;
@@ -47,84 +86,109 @@ service::~service() { engine_->stop(); }
 
 const std::string& service::name() const noexcept { return engine_->node().name; }
 
-std::vector<std::string> service::endpoints() const { return engine_->node().endpoints; }
+bool service::on_strand() const noexcept {
+    const auto* own = strand_of(pooled_, get_executor());
+    return own == nullptr || own->running_in_this_thread();
+}
+
+std::vector<std::string> service::endpoints() const {
+    return run_on(strand_of(pooled_, get_executor()), [this] { return engine_->node().endpoints; });
+}
 
 const asio::any_io_executor& service::get_executor() const noexcept { return engine_->executor(); }
 
-std::string service::listen(std::string_view url) { return engine_->listen(url); }
+// The functions of the user's that these call (log, load) may destroy the service.
 
-void service::set_peer(std::string_view name, std::string_view url) { engine_->routes().set_peer(name, url); }
-
-void service::leave() {
-    engine_->neighbours().leave();
-    engine_->settle();
+std::string service::listen(std::string_view url) {
+    return run_on(strand_of(pooled_, get_executor()), [inside = engine_, url] { return inside->listen(url); });
 }
 
-void service::set_gossip(const gossip_options& how) { engine_->neighbours().gossip(how); }
+void service::set_peer(std::string_view name, std::string_view url) {
+    run_on(strand_of(pooled_, get_executor()), [inside = engine_, name, url] { inside->routes().set_peer(name, url); });
+}
 
-std::vector<peer> service::peers() const { return engine_->node().others.list(engine_->now()); }
+void service::leave() {
+    run_on(strand_of(pooled_, get_executor()), [inside = engine_] {
+        inside->neighbours().leave();
+        inside->settle();
+    });
+}
+
+void service::set_gossip(const gossip_options& how) {
+    run_on(strand_of(pooled_, get_executor()), [inside = engine_, &how] { inside->neighbours().gossip(how); });
+}
+
+std::vector<peer> service::peers() const {
+    return run_on(strand_of(pooled_, get_executor()), [this] { return engine_->node().others.list(engine_->now()); });
+}
 
 void service::stop() { engine_->stop(); }
 
-void service::add(registration task) { engine_->add(std::move(task)); }
+void service::add(registration task) {
+    run_on(strand_of(pooled_, get_executor()), [this, &task] { engine_->add(std::move(task)); });
+}
 
-publisher service::make_publisher() { return publisher{engine_->outside_updates()}; }
+publisher service::make_publisher() {
+    return run_on(strand_of(pooled_, get_executor()), [this] { return publisher{engine_->outside_updates()}; });
+}
 
 void service::fail_later(detail::pending_ptr operation, const detail::outgoing_body& why) {
     engine_->fail_later(std::move(operation), why.wrong, why.text);
 }
 
 void service::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
-    engine_->publish(noun, write);
+    run_on(strand_of(pooled_, get_executor()), [&] { engine_->publish(noun, write); });
 }
 
-void service::publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation) {
-    engine_->publish_when_room(noun, json, std::move(operation));
+std::uint64_t service::publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
+                                         detail::pending_ptr operation) {
+    return inside.publish_when_room(noun, json, std::move(operation));
 }
 
-void service::close(std::chrono::milliseconds limit, detail::pending_ptr operation) {
-    engine_->close(limit, std::move(operation));
+std::uint64_t service::close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation) {
+    return inside.close(limit, std::move(operation));
 }
 
-std::uint64_t service::send(const detail::outgoing& request, const call_options& options,
+std::uint64_t service::send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
                             detail::pending_ptr operation) {
-    return engine_->send(request, options, std::move(operation));
+    return inside.send(request, options, std::move(operation));
 }
 
-std::uint64_t service::send_command(std::string_view command, const call_options& options,
+std::uint64_t service::send_command(detail::engine& inside, std::string_view command, const call_options& options,
                                     detail::pending_ptr operation) {
-    return shell::send_command(*engine_, command, options, std::move(operation));
+    return shell::send_command(inside, command, options, std::move(operation));
 }
 
 void service::cancel(detail::engine& inside, std::uint64_t ticket) { inside.cancel(ticket); }
 
-std::shared_ptr<detail::feed_control> service::make_feed(std::string_view noun, const bind_options& options) {
+std::shared_ptr<detail::feed_control> service::make_feed(const std::shared_ptr<detail::engine>& inside,
+                                                         std::string_view noun, const bind_options& options) {
     protocol::noun_view parts;
     std::string why;
     if (!protocol::parse_noun(noun, parts, why)) {
-        return shell::make_refused_feed(engine_, errc::bad_request, why);
+        return shell::make_refused_feed(inside, errc::bad_request, why);
     }
     if (auto wrong = shell::objection_to(options); !wrong.empty()) {
-        return shell::make_refused_feed(engine_, errc::invalid_option, std::move(wrong));
+        return shell::make_refused_feed(inside, errc::invalid_option, std::move(wrong));
     }
-    if (engine_->stopped()) {
-        return shell::make_refused_feed(engine_, errc::stopped, "the service has been stopped");
+    if (inside->stopped()) {
+        return shell::make_refused_feed(inside, errc::stopped, "the service has been stopped");
     }
     std::string scratch;
     const std::string path{protocol::canonical_path(parts, scratch)};
-    const bool routes = engine_->node().way != nullptr; // then `all` is bound by links, through this service itself
+    const bool routes = inside->node().way != nullptr; // then `all` is bound by links, through this service itself
     if (options.multicast_ || (parts.target == "all" && options.at_.empty() && !routes)) {
-        return shell::make_group_feed(engine_, parts, path, options);
+        return shell::make_group_feed(inside, parts, path, options);
     }
     auto made =
-        std::make_shared<shell::feed_handle>(engine_, std::string{parts.target}, path, options.every_.count() > 0);
-    engine_->feeds().enter(made->machine(), made,
-                           {.noun = std::string{noun},
-                            .at = options.at_,
-                            .deadline = options.deadline_,
-                            .every_ms = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
-                                options.every_.count(), 0, static_cast<std::int64_t>(protocol::max_deadline_ms))),
-                            .keep = options.keep_});
+        std::make_shared<shell::feed_handle>(inside, std::string{parts.target}, path, options.every_.count() > 0);
+    inside->feeds().enter(made->machine(), made,
+                          {.noun = std::string{noun},
+                           .at = options.at_,
+                           .deadline = options.deadline_,
+                           .every_ms = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+                               options.every_.count(), 0, static_cast<std::int64_t>(protocol::max_deadline_ms))),
+                           .keep = options.keep_});
     return made;
 }
 

@@ -31,8 +31,8 @@ class follower::first_answer final : public detail::pending {
 follower::follower(node_run& at, std::uint32_t label, feed_terms terms, std::string target, std::string path,
                    std::chrono::milliseconds slow)
     : feed_reader(at, label, slow), terms_(std::move(terms)),
-      machine_(at.feeds(), at.node()->deadlines, at.bounds(), std::move(target), std::move(path), terms_.every_ms != 0,
-               label * 7919U) {}
+      machine_(at.feeds(), at.node()->deadlines, at.node()->completions, at.bounds(), std::move(target),
+               std::move(path), terms_.every_ms != 0, label * 7919U) {}
 
 std::string follower::name() const { return at().name() + " feed " + std::to_string(label()) + " of " + terms_.noun; }
 

@@ -10,7 +10,7 @@ namespace cles::simulation {
 
 group_follower::group_follower(node_run& at, std::uint32_t label, std::string target, std::string path,
                                std::chrono::milliseconds slow)
-    : feed_reader(at, label, slow), feed_(at.bounds(), std::move(target), std::move(path)) {}
+    : feed_reader(at, label, slow), feed_(at.bounds(), at.node()->completions, std::move(target), std::move(path)) {}
 
 std::string group_follower::name() const {
     return at().name() + " group feed " + std::to_string(label()) + " of " + feed_.target() + ":" + feed_.path();

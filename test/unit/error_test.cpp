@@ -22,11 +22,15 @@ const named on_the_wire[] = {
     {errc::no_task, "no_task"},         {errc::too_large, "too_large"},     {errc::cancelled, "cancelled"},
     {errc::failed, "failed"},           {errc::unavailable, "unavailable"}, {errc::busy, "busy"},
     {errc::deadline, "deadline"}};
-const named in_the_process[] = {
-    {errc::would_deadlock, "would_deadlock"}, {errc::invalid_url, "invalid_url"},
-    {errc::unknown_scheme, "unknown_scheme"}, {errc::insecure_listen, "insecure_listen"},
-    {errc::invalid_name, "invalid_name"},     {errc::already_registered, "already_registered"},
-    {errc::conversion, "conversion"},         {errc::stopped, "stopped"}};
+const named in_the_process[] = {{errc::would_deadlock, "would_deadlock"},
+                                {errc::invalid_url, "invalid_url"},
+                                {errc::unknown_scheme, "unknown_scheme"},
+                                {errc::insecure_listen, "insecure_listen"},
+                                {errc::invalid_name, "invalid_name"},
+                                {errc::already_registered, "already_registered"},
+                                {errc::conversion, "conversion"},
+                                {errc::stopped, "stopped"},
+                                {errc::closed, "closed"}};
 
 } // namespace
 } // namespace error

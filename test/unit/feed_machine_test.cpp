@@ -59,7 +59,8 @@ class wait final : public cles::detail::pending_event {
 const cles::update_mark seventh{.seq = 7, .epoch = 0x5f3a09c1};
 
 struct fixture {
-    explicit fixture(cles::limits bounds = {}) : feed(host, deadlines, bounds, "car1", "speed", false, 7) {}
+    explicit fixture(cles::limits bounds = {})
+        : feed(host, deadlines, completions, bounds, "car1", "speed", false, 7) {}
 
     /// Binds for the first time, the publisher answering with this.
     void bound(std::string_view last = "{}") {
@@ -97,6 +98,7 @@ struct fixture {
 
     cles::test::manual_clock clock;
     cles::core::deadline_queue deadlines;
+    cles::core::completion_queue completions;
     counting_host host;
     cles::core::feed_machine feed;
     std::shared_ptr<cles::test::outcome> first;

@@ -30,7 +30,8 @@ struct wait final : cles::detail::pending_event {
 
 struct fixture {
     wait w; // goes last: who waits is discarded
-    cles::core::feed_mailbox mail{cles::limits{}};
+    cles::core::completion_queue completions;
+    cles::core::feed_mailbox mail{cles::limits{}, completions};
 };
 
 } // namespace

@@ -34,7 +34,7 @@ struct wait final : cles::detail::pending_event {
 using lines = std::vector<std::string>;
 
 struct fixture {
-    explicit fixture(const cles::limits& bounds = {}) : feed(bounds, "all", "speed") {}
+    explicit fixture(const cles::limits& bounds = {}) : feed(bounds, completions, "all", "speed") {}
 
     bool hear(const std::string& line) {
         cles::protocol::request_line r;
@@ -59,6 +59,7 @@ struct fixture {
         }
     }
 
+    cles::core::completion_queue completions;
     cles::core::group_feed feed;
 };
 
@@ -73,7 +74,7 @@ BOOST_FIXTURE_TEST_SUITE(group_feed, fixture)
 
 BOOST_AUTO_TEST_CASE(all_wants_every_publisher_and_a_name_that_one) {
     BOOST_TEST(feed.wants("car1"));
-    const cles::core::group_feed one{{}, "car1", "speed"};
+    const cles::core::group_feed one{{}, completions, "car1", "speed"};
     BOOST_TEST(one.wants("car1"));
     BOOST_TEST(!one.wants("car2"));
 }

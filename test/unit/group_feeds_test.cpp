@@ -63,8 +63,8 @@ struct fixture {
     test_node node;
     group_recorder out;
     cles::core::group_feeds feeds{*node.host, out, 3};
-    group_feed all{node.host->bounds, "all", "speed"};
-    group_feed one{node.host->bounds, "car1", "speed"};
+    group_feed all{node.host->bounds, node.host->completions, "all", "speed"};
+    group_feed one{node.host->bounds, node.host->completions, "car1", "speed"};
 };
 
 using lines = std::vector<std::string>;
@@ -88,7 +88,7 @@ BOOST_AUTO_TEST_CASE(a_node_that_begins_anew_is_asked_soon_and_several_are_asked
 }
 
 BOOST_AUTO_TEST_CASE(the_first_feed_of_a_noun_binds_and_the_last_unbinds) {
-    group_feed second{node.host->bounds, "all", "speed"};
+    group_feed second{node.host->bounds, node.host->completions, "all", "speed"};
     add(all);
     add(second);
     BOOST_TEST((out.take() == lines{"BIND all:speed lease=10000"}));
@@ -124,8 +124,8 @@ BOOST_AUTO_TEST_CASE(a_binding_is_renewed_at_a_third_of_its_lease_jittered) {
 }
 
 BOOST_AUTO_TEST_CASE(an_update_goes_to_every_feed_that_wants_it) {
-    group_feed other{node.host->bounds, "car2", "speed"};
-    group_feed elsewhere{node.host->bounds, "all", "speed/fast"};
+    group_feed other{node.host->bounds, node.host->completions, "car2", "speed"};
+    group_feed elsewhere{node.host->bounds, node.host->completions, "all", "speed/fast"};
     for (auto* feed : {&all, &one, &other, &elsewhere}) {
         add(*feed);
     }
@@ -159,8 +159,8 @@ BOOST_AUTO_TEST_CASE(a_feed_of_all_that_ends_has_those_of_single_nodes_bind_agai
 }
 
 BOOST_AUTO_TEST_CASE(feeds_may_end_and_begin_while_an_update_is_handed_out) {
-    group_feed last{node.host->bounds, "all", "speed"};
-    group_feed late{node.host->bounds, "all", "speed"};
+    group_feed last{node.host->bounds, node.host->completions, "all", "speed"};
+    group_feed late{node.host->bounds, node.host->completions, "all", "speed"};
     struct meddler final : cles::detail::pending_event {
         bool deliver(const cles::detail::raw_event&) override {
             f->feeds.remove(f->all);

@@ -195,7 +195,7 @@ BOOST_AUTO_TEST_CASE(an_update_that_nobody_wants_is_counted) {
 }
 
 BOOST_AUTO_TEST_CASE(an_update_that_begins_like_a_failure_is_dropped) {
-    cles::core::group_feed feed{{}, "all", "speed"};
+    cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
     session.feeds().add(feed, node.clock.now());
     hear(R"(UPDATE car2:speed seq=1 epoch=5f3a09c1 {"error":"failed"})");
     BOOST_TEST(node.counts().updates_dropped == 1U);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/asio_error.hpp>
+#include <cles/cancellation.hpp>
 #include <cles/completion_token.hpp>
 #include <cles/error.hpp>
 
@@ -10,7 +11,12 @@
 #include <boost/asio/associated_allocator.hpp>
 #include <boost/asio/associated_executor.hpp>
 #include <boost/asio/dispatch.hpp>
+#include <boost/asio/execution/context.hpp>
 #include <boost/asio/executor_work_guard.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/query.hpp>
+#include <boost/asio/system_executor.hpp>
+#include <boost/asio/use_awaitable.hpp>
 
 #include <exception>
 #include <memory>
@@ -32,13 +38,20 @@ class completion {
 
     completion(Handler handler, const boost::asio::any_io_executor& service)
         : handler_(std::move(handler)), service_(service) {
-        const auto executor = boost::asio::get_associated_executor(handler_, service_);
-        if (boost::asio::any_io_executor{executor} != service_) {
+        const boost::asio::any_io_executor executor{boost::asio::get_associated_executor(handler_, service_)};
+        if (executor != service_) {
             work_.emplace(executor); // the handler's own context must not run out of work meanwhile
+            // The system's, which futures name too, is no place where anything is begun in particular.
+            namespace execution = boost::asio::execution;
+            elsewhere_ = &boost::asio::query(executor, execution::context) !=
+                         &boost::asio::query(boost::asio::system_executor{}, execution::context);
         }
     }
 
     [[nodiscard]] const Handler& handler() const noexcept { return handler_; }
+    /// Whether the handler is called on another executor than the service's. Then its operation is begun, and
+    /// withdrawn, from there too, and has to be handed to the service's executor.
+    [[nodiscard]] bool elsewhere() const noexcept { return elsewhere_; }
 
     template <class... T>
     void operator()(boost::system::error_code code, std::string_view message, T&&... values) && {
@@ -55,17 +68,19 @@ class completion {
     void run(A&&... arguments) && {
         const auto executor = boost::asio::get_associated_executor(handler_, service_);
         if (!work_) {
+            release_slot(handler_);
             std::move(handler_)(std::forward<A>(arguments)...);
         } else {
-            boost::asio::dispatch(executor, boost::asio::append(std::move(handler_), std::forward<A>(arguments)...));
+            boost::asio::dispatch(executor, boost::asio::append(slot_releasing<Handler>{std::move(handler_)},
+                                                                std::forward<A>(arguments)...));
             work_.reset();
         }
     }
 
     Handler handler_;
     boost::asio::any_io_executor service_;
-    using executor_type = boost::asio::associated_executor_t<Handler, boost::asio::any_io_executor>;
-    std::optional<boost::asio::executor_work_guard<executor_type>> work_;
+    std::optional<boost::asio::executor_work_guard<boost::asio::any_io_executor>> work_;
+    bool elsewhere_ = false;
 };
 
 /// Makes an operation that lives in memory of its handler's allocator.
@@ -88,6 +103,23 @@ void end_operation(Operation* self, Completion& kept, boost::system::error_code 
     std::destroy_at(self);
     std::allocator_traits<decltype(allocator)>::deallocate(allocator, self, 1);
     std::move(complete)(code, message, std::forward<A>(values)...);
+}
+
+/// Fails an operation that cannot begin, never inside the call. Without an executor of its own the handler runs on
+/// `executor`; where that is none, on Asio's system executor.
+template <bool Throws, class Handler, class... T>
+void fail_later(Handler handler, boost::asio::any_io_executor executor, boost::system::error_code code,
+                std::string_view message, T&&... values) {
+    if (!executor) {
+        executor = boost::asio::any_io_executor{boost::asio::get_associated_executor(handler)};
+    }
+    if constexpr (Throws) {
+        boost::asio::post(executor, boost::asio::append(std::move(handler),
+                                                        std::make_exception_ptr(error(code, std::string{message})),
+                                                        std::forward<T>(values)...));
+    } else {
+        boost::asio::post(executor, boost::asio::append(std::move(handler), code, std::forward<T>(values)...));
+    }
 }
 
 /// Destroys an operation without calling its handler.

@@ -36,6 +36,7 @@ enum class errc {
     conversion,           ///< JSON does not have the shape of the C++ type
     stopped,              ///< the service has been stopped
     invalid_option,       ///< an option is outside of what it may be; the message names it
+    closed,               ///< the feed is not open: never bound, closed, or moved from
 };
 
 /// The category of `errc`; its name is "cles". Its codes equal the conditions of `std::errc` and `boost::system::errc`

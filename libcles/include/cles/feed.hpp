@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/cancellation.hpp>
 #include <cles/completion.hpp>
 #include <cles/feed_event.hpp>
 #include <cles/pending.hpp>
@@ -8,7 +9,6 @@
 
 #include <boost/asio/associated_cancellation_slot.hpp>
 #include <boost/asio/async_result.hpp>
-#include <boost/asio/cancellation_type.hpp>
 
 #include <cstdint>
 #include <memory>
@@ -42,10 +42,12 @@ class feed_control {
     virtual ~feed_control() = default;
     /// Binds. The operation completes when the publisher has answered; where it fails, the feed is closed.
     virtual void start(pending_ptr bound) = 0;
+    /// Closes it where that operation still waits.
+    virtual void cancel_start() = 0;
     /// Takes the event that waits, or keeps the operation until one comes. A second operation while one waits fails.
     virtual void next(event_ptr operation) = 0;
-    /// Withdraws the operation that waits, if any.
-    virtual void cancel() = 0;
+    /// Withdraws this operation, if it still waits.
+    virtual void cancel(const pending_event* operation) = 0;
     /// Unbinds.
     virtual void close() = 0;
     [[nodiscard]] virtual const boost::asio::any_io_executor& executor() const = 0;
@@ -120,6 +122,7 @@ class event_operation final : public pending_event {
     }
 
     void discard() noexcept override { discard_operation(this, complete_); }
+    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
     completion<Throws, Handler> complete_;
@@ -136,12 +139,14 @@ namespace detail {
 template <class T, bool Throws, class Handler>
 class bind_operation final : public pending {
   public:
-    bind_operation(Handler handler, const boost::asio::any_io_executor& service, std::shared_ptr<feed_control> control,
-                   std::string* diagnostics)
-        : complete_(std::move(handler), service), control_(std::move(control)), diagnostics_(diagnostics) {}
+    bind_operation(Handler handler, const boost::asio::any_io_executor& service, std::string* diagnostics)
+        : complete_(std::move(handler), service), diagnostics_(diagnostics) {}
+
+    /// What the feed is made of; before it starts.
+    void make_of(std::shared_ptr<feed_control> control) { control_ = std::move(control); }
 
     verdict offer(std::string_view) override {
-        feed<T> bound{std::move(control_)};
+        feed<T> bound{std::move(control_), complete_.elsewhere()};
         end_operation(this, complete_, {}, {}, std::move(bound));
         return verdict::completed;
     }
@@ -155,6 +160,7 @@ class bind_operation final : public pending {
     }
 
     void discard() noexcept override { discard_operation(this, complete_); }
+    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
     completion<Throws, Handler> complete_;
@@ -168,19 +174,26 @@ class bind_operation final : public pending {
 ///
 /// Events come in order. While nobody fetches them, the newest are kept, up to `limits::feed`; what is dropped shows as
 /// a gap. When the publisher is lost the feed says so once and binds again by itself, backing off from 100 ms to 5 s.
-/// It ends with its last handle: destruction unbinds. Use it on the service's executor, with one `async_next` at a
-/// time; it may outlive the service, and then fails with `stopped`.
+/// It ends with its last handle: destruction unbinds. Use it on the executor on which the handler of its `async_bind`
+/// was called (the service's, or the handler's own), with one `async_next` at a time; it may outlive the service, and
+/// then fails with `stopped`.
 template <class T>
 class feed {
   public:
     using value_type = T;
 
     feed() = default;
-    explicit feed(std::shared_ptr<detail::feed_control> control) : control_(std::move(control)) {}
-    feed(feed&&) noexcept = default;
+    explicit feed(std::shared_ptr<detail::feed_control> control, bool elsewhere = false)
+        : control_(std::move(control)), executor_(control_->executor()), elsewhere_(elsewhere) {}
+    feed(feed&& other) noexcept
+        : control_(std::move(other.control_)), executor_(other.executor_), elsewhere_(other.elsewhere_) {}
     feed& operator=(feed&& other) noexcept {
-        close();
-        control_ = std::move(other.control_);
+        if (this != &other) {
+            close();
+            control_ = std::move(other.control_);
+            executor_ = other.executor_;
+            elsewhere_ = other.elsewhere_;
+        }
         return *this;
     }
     feed(const feed&) = delete;
@@ -188,32 +201,48 @@ class feed {
     ~feed() { close(); }
 
     /// The next event. An update that is not a T fails with `conversion`, and the next call goes on behind it.
-    /// Cancellation (terminal, partial or total) leaves the feed as it was.
+    /// Cancellation (terminal, partial or total) leaves the feed as it was. On a feed that is not open it fails with
+    /// `closed`; the handler then runs on its own executor, which without one is the service's, or, where the feed
+    /// never had any, Asio's system executor.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_next(Token&& token = {}) {
         constexpr bool with_exceptions = detail::throws<std::remove_cvref_t<Token>>;
         return boost::asio::async_initiate<Token, detail::signature_for<Token, feed_item<T>>>(
-            [control = control_](auto handler) {
-                auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                if (slot.is_connected()) {
-                    slot.assign([weak = std::weak_ptr{control}](boost::asio::cancellation_type type) {
-                        const auto alive = weak.lock();
-                        if (alive && type != boost::asio::cancellation_type::none) {
-                            alive->cancel();
-                        }
-                    });
+            [control = control_, elsewhere = elsewhere_,
+             fallback = control_ ? boost::asio::any_io_executor{} : executor_](auto handler) {
+                if (!control) {
+                    detail::fail_later<with_exceptions>(std::move(handler), fallback, errc::closed,
+                                                        "the feed is not open", feed_item<T>{});
+                    return;
                 }
                 using operation_type = detail::event_operation<T, with_exceptions, decltype(handler)>;
-                const auto executor = control->executor();
-                control->next(detail::event_ptr{detail::make_operation<operation_type>(std::move(handler), executor)});
+                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+                auto* operation = detail::make_operation<operation_type>(std::move(handler), control->executor());
+                const bool hop = elsewhere || operation->elsewhere();
+                detail::connect_slot(slot, hop, control->executor(), [weak = std::weak_ptr{control}, operation] {
+                    if (const auto alive = weak.lock()) {
+                        alive->cancel(operation);
+                    }
+                });
+                if (!hop) {
+                    control->next(detail::event_ptr{operation});
+                    return;
+                }
+                boost::asio::dispatch(control->executor(), [control, waiting = detail::event_ptr{operation}]() mutable {
+                    control->next(std::move(waiting));
+                });
             },
             token);
     }
 
-    /// Unbinds. An `async_next` that waits fails with `cancelled`.
+    /// Unbinds. An `async_next` that waits fails with `cancelled`, soon and never inside the call.
     void close() {
         if (auto control = std::exchange(control_, nullptr)) {
-            control->close();
+            if (elsewhere_) {
+                boost::asio::dispatch(executor_, [control = std::move(control)] { control->close(); });
+            } else {
+                control->close();
+            }
         }
     }
 
@@ -221,6 +250,8 @@ class feed {
 
   private:
     std::shared_ptr<detail::feed_control> control_;
+    boost::asio::any_io_executor executor_; // stays when it is closed
+    bool elsewhere_ = false;                // it was handed to a handler on another executor
 };
 
 } // namespace cles

@@ -58,6 +58,8 @@ class pending_event {
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
     /// Destroys it without calling its handler.
     virtual void discard() noexcept = 0;
+    /// As `pending::calls_user`.
+    [[nodiscard]] virtual bool calls_user() const noexcept { return true; }
 
   protected:
     ~pending_event() = default;

@@ -46,8 +46,8 @@ struct limits {
     std::chrono::milliseconds discard{1'000};
     /// A link that others opened and that brings no whole line for so long is closed; up to a day; 0: never.
     std::chrono::milliseconds first_line{60'000};
-    /// How long after a peer has ended its stream it is probed first, then at three times that, and every 15 s at least;
-    /// 1 ms to a day.
+    /// How long after a peer has ended its stream it is probed first, then at three times that, and every 15 s at
+    /// least; 1 ms to a day.
     std::chrono::milliseconds probe{5'000};
 };
 

@@ -44,6 +44,8 @@ class pending {
     }
     /// Destroys it without calling its handler, as Asio does when an execution context goes.
     virtual void discard() noexcept = 0;
+    /// Whether its end calls a handler of the user's; else it is the library's own.
+    [[nodiscard]] virtual bool calls_user() const noexcept { return true; }
 
   protected:
     ~pending() = default;

@@ -8,6 +8,7 @@
 #include <cles/error.hpp>
 #include <cles/pending.hpp>
 
+#include <exception>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -22,7 +23,13 @@ template <class T>
 pending::verdict read_result(std::string_view json, T& value, boost::system::error_code& code, std::string& why,
                              std::string_view what = "the answer") {
     json_reader reader{json, answer_depth};
-    if (read_json(reader, value) && reader.at_end()) {
+    try {
+        if (read_json(reader, value) && reader.at_end()) {
+            return pending::verdict::completed;
+        }
+    } catch (const std::exception& thrown) { // by a conversion of the user's own
+        code = errc::conversion;
+        why = std::string{what} + " cannot be read: " + thrown.what();
         return pending::verdict::completed;
     }
     if (!is_valid_answer(json)) {
@@ -72,6 +79,7 @@ class reply_operation final : public pending {
     }
 
     void discard() noexcept override { discard_operation(this, complete_); }
+    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
 
   private:
     template <class... V>

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/call_options.hpp>
+#include <cles/cancellation.hpp>
 #include <cles/error.hpp>
 #include <cles/feed.hpp>
 #include <cles/gossip.hpp>
@@ -102,22 +103,35 @@ struct outgoing {
 /// others.
 ///
 /// It runs on the executor that it is given, starts no thread and takes no lock. All functions are to be called, and
-/// all handlers are called, on that executor; where several threads run it, hand in a strand (for a `thread_pool` the
-/// service takes one itself). Handlers of operations are called on their own associated executor. The service must
-/// outlive neither its operations nor its feeds: when it goes, they fail with `stopped`.
+/// all handlers are called, on that executor; where several threads run it, hand in a strand. Operations whose handler
+/// has an associated executor of its own may be begun, and withdrawn, there, as by a coroutine of another context:
+/// they hop to the service's executor, and their handlers are called on their own. The service must outlive neither
+/// its operations nor its feeds: when it goes, they fail with `stopped`.
+///
+/// Of a `thread_pool` the service takes a strand itself. Then operations may be begun on any thread, and the other
+/// functions too: they run on the strand, and wait for it (on the pool's own threads, which are not to wait, they throw
+/// `would_deadlock`). `stop` and the destructor are the exception: call them on the service's executor, or when the
+/// pool has been joined.
 ///
 /// Failures. Operations complete with `(error_code, result)`; the peer's own words go to `call_options::diagnostics`.
 /// With `co_await` (the default token) and `use_future`, bound to an executor or not, or begun after `asio::deferred`,
 /// they throw `cles::error`, which holds code and words. A body that cannot be written as JSON completes its operation
 /// with `conversion`.
 ///
-/// Cancellation. All operations honour their cancellation slot (terminal, partial, total): the request is withdrawn at
-/// the peer and completes with `cancelled` at once.
+/// Cancellation. All operations honour their cancellation slot (terminal, partial, total) until they complete: the
+/// request is withdrawn at the peer and completes with `cancelled` without waiting for it.
+///
+/// Handlers. A completion handler is never called from inside the function that began, withdrew or ended its operation
+/// (an emission, `stop`, `feed::close`, a destructor), and may do anything: throw (it comes out of the executor's
+/// `run`, as with Asio's operations, and harms no other operation; call `run` again), cancel, begin, destroy the
+/// service. What the functions of `service_options` throw is caught: `authorise` then denies, `load` and `metrics` are
+/// left out, and what `log` throws is dropped.
 class service : public registrar {
   public:
     /// Starts listening at once; accepting begins when the executor runs.
     /// \throws cles::error: `invalid_name`, `invalid_url` (of a network or multicast group too), `unknown_scheme`,
-    /// `insecure_listen`, `invalid_option` (a limit, gossip), or the system's code where an address or interface cannot be had (the message names it)
+    /// `insecure_listen`, `invalid_option` (a limit, gossip), or the system's code where an address or interface cannot
+    /// be had (the message names it)
     service(boost::asio::any_io_executor executor, service_options options);
     template <std::derived_from<boost::asio::execution_context> Context>
     service(Context& context, service_options options)
@@ -147,13 +161,20 @@ class service : public registrar {
     /// `limit` at most; what is left is then `unavailable`) and whatever else comes with `busy`, says on each link that
     /// what has not been answered by then has not been begun, and completes when the links have ended, a second after
     /// that at the latest (`limits::discard`): `void(error_code)`. `stop` is to follow; where it comes before, the code
-    /// is `stopped`.
+    /// is `stopped`. Withdrawn, it waits no longer, and nothing new is begun all the same.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_close(std::chrono::milliseconds limit, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
             [this](auto handler, std::chrono::milliseconds at_most) {
+                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                close(at_most, detail::pending_ptr{operation});
+                if (hops(*operation)) {
+                    begin_elsewhere(slot, operation, [at_most](detail::engine& inside, detail::pending_ptr waiting) {
+                        return close(inside, at_most, std::move(waiting));
+                    });
+                } else {
+                    connect_cancellation(slot, close(*engine_, at_most, detail::pending_ptr{operation}));
+                }
             },
             token, limit);
     }
@@ -177,16 +198,23 @@ class service : public registrar {
     }
 
     /// Publishes once every binder's queue has room, so that nothing is dropped: `void(error_code)`. It completes when
-    /// the update is in those queues, in the order of the calls.
+    /// the update is in those queues, in the order of the calls. Withdrawn before, it is not published.
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
             [this](auto handler, std::string path, const detail::outgoing_body& json) {
-                detail::pending_ptr operation{make_operation<void, Token>(std::move(handler), nullptr)};
+                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+                auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
                 if (json.wrong) {
-                    fail_later(std::move(operation), json);
+                    fail_later(detail::pending_ptr{operation}, json);
+                } else if (hops(*operation)) {
+                    begin_elsewhere(slot, operation,
+                                    [path, text = json.text](detail::engine& inside, detail::pending_ptr waiting) {
+                                        return publish_when_room(inside, path, text, std::move(waiting));
+                                    });
                 } else {
-                    publish_when_room(path, json.text, std::move(operation));
+                    connect_cancellation(slot,
+                                         publish_when_room(*engine_, path, json.text, detail::pending_ptr{operation}));
                 }
             },
             token, std::string{noun}, converted([&] { return to_json(value); }));
@@ -313,11 +341,18 @@ class service : public registrar {
             [this, verb](auto handler, const detail::short_text& target, const detail::outgoing_body& content,
                          const call_options& chosen) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                detail::pending_ptr operation{make_operation<T, Token>(std::move(handler), chosen.diagnostics_)};
+                auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
                 if (content.wrong) {
-                    fail_later(std::move(operation), content);
+                    fail_later(detail::pending_ptr{operation}, content);
+                } else if (hops(*operation)) {
+                    begin_elsewhere(slot, operation,
+                                    [verb, target, text = content.text, chosen](detail::engine& inside,
+                                                                                detail::pending_ptr waiting) {
+                                        return send(inside, {verb, target.view(), text}, chosen, std::move(waiting));
+                                    });
                 } else {
-                    connect_cancellation(slot, send({verb, target.view(), content.text}, chosen, std::move(operation)));
+                    connect_cancellation(slot, send(*engine_, {verb, target.view(), content.text}, chosen,
+                                                    detail::pending_ptr{operation}));
                 }
             },
             token, detail::short_text{noun}, std::move(body), options);
@@ -329,17 +364,44 @@ class service : public registrar {
             [this](auto handler, const std::string& text, const call_options& chosen) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                connect_cancellation(slot, send_command(text, chosen, detail::pending_ptr{operation}));
+                if (hops(*operation)) {
+                    begin_elsewhere(slot, operation,
+                                    [text, chosen](detail::engine& inside, detail::pending_ptr waiting) {
+                                        return send_command(inside, text, chosen, std::move(waiting));
+                                    });
+                } else {
+                    connect_cancellation(slot, send_command(*engine_, text, chosen, detail::pending_ptr{operation}));
+                }
             },
             token, std::string{command}, options);
     }
 
+    /// Whether an operation is begun on another executor than the service's: by its handler's, or, where the service
+    /// has made a strand of its own, by where this is called.
+    template <class Operation>
+    [[nodiscard]] bool hops(const Operation& operation) const noexcept {
+        return operation.elsewhere() || (pooled_ && !on_strand());
+    }
+
+    /// Begins it on the service's executor. `begin` returns its ticket, and is handed over with all that it needs.
+    template <class Slot, class Operation, class F>
+    void begin_elsewhere(Slot slot, Operation* operation, F begin) {
+        const auto ticket = std::make_shared<std::uint64_t>(0); // used on the service's executor
+        detail::connect_slot(slot, true, get_executor(), [weak = std::weak_ptr{engine_}, ticket] {
+            if (const auto alive = weak.lock(); alive && *ticket != 0) {
+                cancel(*alive, *ticket);
+            }
+        });
+        boost::asio::dispatch(get_executor(),
+                              [inside = engine_, ticket, waiting = detail::pending_ptr{operation},
+                               begin = std::move(begin)]() mutable { *ticket = begin(*inside, std::move(waiting)); });
+    }
+
     template <class Slot>
     void connect_cancellation(Slot slot, std::uint64_t ticket) {
-        if (ticket != 0 && slot.is_connected()) {
-            slot.assign([weak = std::weak_ptr{engine_}, ticket](boost::asio::cancellation_type type) {
-                const auto alive = weak.lock();
-                if (alive && type != boost::asio::cancellation_type::none) {
+        if (ticket != 0) {
+            detail::connect_slot(slot, [weak = std::weak_ptr{engine_}, ticket] {
+                if (const auto alive = weak.lock()) {
                     cancel(*alive, ticket);
                 }
             });
@@ -349,31 +411,56 @@ class service : public registrar {
     template <class T, class Token, class Handler>
     void start_bind(Handler handler, const std::string& noun, const bind_options& options) {
         using operation_type = detail::bind_operation<T, detail::throws<std::remove_cvref_t<Token>>, Handler>;
-        auto control = make_feed(noun, options);
-        auto slot = boost::asio::get_associated_cancellation_slot(handler);
-        if (slot.is_connected()) {
-            slot.assign([weak = std::weak_ptr{control}](boost::asio::cancellation_type type) {
-                const auto alive = weak.lock();
-                if (alive && type != boost::asio::cancellation_type::none) {
-                    alive->close();
-                }
-            });
+        const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+        auto* operation =
+            detail::make_operation<operation_type>(std::move(handler), get_executor(), options.diagnostics_);
+        const auto made = std::make_shared<std::weak_ptr<detail::feed_control>>();
+        const bool hop = hops(*operation);
+        detail::connect_slot(slot, hop, get_executor(), [made] {
+            if (const auto alive = made->lock()) {
+                alive->cancel_start();
+            }
+        });
+        if (!hop) {
+            start_bind(*made, engine_, operation, noun, options);
+            return;
         }
-        control->start(detail::pending_ptr{
-            detail::make_operation<operation_type>(std::move(handler), get_executor(), control, options.diagnostics_)});
+        struct discarding { // until it has begun
+            void operator()(operation_type* unused) const noexcept { unused->discard(); }
+        };
+        boost::asio::dispatch(get_executor(),
+                              [inside = engine_, made, noun, options,
+                               waiting = std::unique_ptr<operation_type, discarding>{operation}]() mutable {
+                                  start_bind(*made, inside, waiting.release(), noun, options);
+                              });
+    }
+
+    template <class Operation>
+    static void start_bind(std::weak_ptr<detail::feed_control>& made, const std::shared_ptr<detail::engine>& inside,
+                           Operation* operation, const std::string& noun, const bind_options& options) {
+        const auto control = make_feed(inside, noun, options);
+        made = control;
+        operation->make_of(control);
+        control->start(detail::pending_ptr{operation});
     }
 
     void fail_later(detail::pending_ptr operation, const detail::outgoing_body& why);
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
-    void publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
-    void close(std::chrono::milliseconds limit, detail::pending_ptr operation);
-    // Both return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.
-    std::uint64_t send(const detail::outgoing& request, const call_options& options, detail::pending_ptr operation);
-    std::uint64_t send_command(std::string_view command, const call_options& options, detail::pending_ptr operation);
+    // These return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.
+    static std::uint64_t send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
+                              detail::pending_ptr operation);
+    static std::uint64_t send_command(detail::engine& inside, std::string_view command, const call_options& options,
+                                      detail::pending_ptr operation);
+    static std::uint64_t publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
+                                           detail::pending_ptr operation);
+    static std::uint64_t close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation);
     static void cancel(detail::engine& inside, std::uint64_t ticket);
-    std::shared_ptr<detail::feed_control> make_feed(std::string_view noun, const bind_options& options);
+    static std::shared_ptr<detail::feed_control> make_feed(const std::shared_ptr<detail::engine>& inside,
+                                                           std::string_view noun, const bind_options& options);
+    [[nodiscard]] bool on_strand() const noexcept;
 
     std::shared_ptr<detail::engine> engine_;
+    bool pooled_; ///< it has made a strand of a pool
 };
 
 } // namespace cles

@@ -78,6 +78,8 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     [[nodiscard]] const std::string& head() const noexcept { return head_; }
     [[nodiscard]] time_point started() const noexcept { return started_; }
 
+    [[nodiscard]] const std::shared_ptr<node>& host() const noexcept { return node_; }
+
     // For its owner.
     /// Cuts it off: nothing it says is heard any more.
     void detach() noexcept;

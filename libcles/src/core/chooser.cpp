@@ -22,9 +22,12 @@ void chooser::gather(const protocol::request_line& r, const std::vector<std::str
     const auto was_asked = [&](std::string_view name) {
         return std::find(asked.begin(), asked.end(), name) != asked.end();
     };
+    const bool here = may_be_here && !was_asked(node_.name);
+    if (here) {
+        here_.hears(node_.load_now()); // the program's own, which may ask for something: before there is a list
+    }
     all_.clear();
-    if (may_be_here && !was_asked(node_.name)) {
-        here_.hears(node_.load_now());
+    if (here) {
         all_.push_back(&here_);
     }
     if (r.hops == 0) {

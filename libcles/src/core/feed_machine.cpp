@@ -8,10 +8,11 @@
 
 namespace cles::core {
 
-feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
-                           std::string path, bool thinned, std::uint32_t seed)
+feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, completion_queue& completions,
+                           const limits& bounds, std::string target, std::string path, bool thinned, std::uint32_t seed)
     : subscription(std::move(target), std::move(path), thinned, bounds.publishers), host_(host), deadlines_(deadlines),
-      longest_(bounds.line), mail_(bounds), backoff_(seed), renewal_(*this, deadlines, ~seed) {}
+      longest_(bounds.line), completions_(completions), mail_(bounds, completions), backoff_(seed),
+      renewal_(*this, deadlines, ~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);
@@ -41,7 +42,7 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
         on_event({.kind = feed_event::current, .body = body, .checked = true});
     }
     if (first_) {
-        first_.release()->offer(body);
+        completions_.succeed(std::move(first_), body);
     }
 }
 
@@ -92,7 +93,7 @@ void feed_machine::on_refused(boost::system::error_code why, std::string_view me
         auto operation = std::move(first_);
         const std::string text{message};
         close(errc::cancelled);
-        operation.release()->fail(why, text);
+        completions_.fail(std::move(operation), why, text);
         return;
     }
     pause(now);
@@ -126,7 +127,7 @@ void feed_machine::on_deadline(time_point) {
     }
 }
 
-void feed_machine::close(errc why) { abandon().fail(why); }
+void feed_machine::close(errc why) { abandon().fail(completions_, why); }
 
 feed_machine::waiting feed_machine::abandon() {
     if (state_ != state::closed) {
@@ -138,12 +139,12 @@ feed_machine::waiting feed_machine::abandon() {
     return {.first = std::move(first_), .next = mail_.close()};
 }
 
-void feed_machine::waiting::fail(errc why) {
-    if (auto* operation = first.release()) {
-        operation->fail(why, "the feed was closed");
+void feed_machine::waiting::fail(completion_queue& completions, errc why) {
+    if (first != nullptr) {
+        completions.fail(std::move(first), why, "the feed was closed");
     }
-    if (auto* operation = next.release()) {
-        operation->fail(why, "the feed was closed");
+    if (next != nullptr) {
+        completions.fail(std::move(next), why, "the feed was closed");
     }
 }
 

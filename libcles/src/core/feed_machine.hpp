@@ -49,8 +49,8 @@ class feed_machine final : public subscription, private deadline, private renewa
   public:
     using event_ptr = feed_mailbox::event_ptr;
 
-    feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target, std::string path,
-                 bool thinned, std::uint32_t seed);
+    feed_machine(feed_host& host, deadline_queue& deadlines, completion_queue& completions, const limits& bounds,
+                 std::string target, std::string path, bool thinned, std::uint32_t seed);
     ~feed_machine() = default;
 
     /// Binds for the first time. The operation ends with the answer; where it fails, the feed is closed.
@@ -80,12 +80,14 @@ class feed_machine final : public subscription, private deadline, private renewa
     struct waiting {
         detail::pending_ptr first;
         event_ptr next;
-        void fail(errc why);
+        void fail(completion_queue& completions, errc why);
     };
     /// Closes it and leaves telling those who wait to the caller.
     [[nodiscard]] waiting abandon();
     [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
     [[nodiscard]] bool is_bound() const noexcept override { return state_ == state::bound; }
+    /// Who waits for the answer to the first BIND has not been told yet.
+    [[nodiscard]] bool is_starting() const noexcept { return first_ != nullptr; }
 
   private:
     enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
@@ -99,6 +101,7 @@ class feed_machine final : public subscription, private deadline, private renewa
     feed_host& host_;
     deadline_queue& deadlines_;
     std::size_t longest_; // line that may be passed on
+    completion_queue& completions_;
     feed_mailbox mail_;
     backoff backoff_;
     renewal renewal_;

@@ -7,22 +7,28 @@
 
 namespace cles::core {
 
-bool feed_mailbox::put(const detail::raw_event& event) {
+bool feed_mailbox::put(const detail::raw_event& event, hand_over when) {
     if (closed_) {
         return true;
     }
-    if (waiter_ != nullptr && queue_.empty()) {
+    const bool waited_for = waiter_ != nullptr && queue_.empty();
+    if (waited_for && event.kind == feed_event::update && when == hand_over::now) {
         auto* operation = waiter_.release();
-        if (!operation->deliver(event)) {
+        bool taken = true; // what is thrown comes from its handler
+        completions_.now([&] { taken = operation->deliver(event); });
+        if (!taken) {
             waiter_.reset(operation);
-            return false;
         }
-        return true;
+        return taken;
     }
     if (!event.has_json()) {
         return false;
     }
-    queue_.push(event);
+    if (waited_for) {
+        completions_.deliver(std::move(waiter_), event);
+    } else {
+        queue_.push(event);
+    }
     return true;
 }
 
@@ -39,8 +45,8 @@ void feed_mailbox::pump() {
 }
 
 void feed_mailbox::cancel() {
-    if (auto* operation = waiter_.release()) {
-        operation->fail(errc::cancelled, "the wait was cancelled");
+    if (waiter_ != nullptr) {
+        completions_.fail(std::move(waiter_), errc::cancelled, "the wait was cancelled");
     }
 }
 

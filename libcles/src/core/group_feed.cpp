@@ -5,9 +5,9 @@
 
 namespace cles::core {
 
-bool group_feed::take(const protocol::request_line& update) {
+bool group_feed::take(const protocol::request_line& update, feed_mailbox::hand_over when) {
     return take_in(publishers_.of(update.noun.target), update, false,
-                   [this](const detail::raw_event& event) { return mail_.put(event); });
+                   [this, when](const detail::raw_event& event) { return mail_.put(event, when); });
 }
 
 } // namespace cles::core

@@ -19,8 +19,9 @@ namespace cles::core {
 class group_feed {
   public:
     /// `target`: a node's name, or "all".
-    group_feed(const limits& bounds, std::string target, std::string path)
-        : target_(std::move(target)), path_(std::move(path)), mail_(bounds), publishers_(bounds.publishers) {}
+    group_feed(const limits& bounds, completion_queue& completions, std::string target, std::string path)
+        : target_(std::move(target)), path_(std::move(path)), mail_(bounds, completions),
+          publishers_(bounds.publishers) {}
     group_feed(const group_feed&) = delete;
     group_feed& operator=(const group_feed&) = delete;
 
@@ -31,6 +32,7 @@ class group_feed {
     bool take(const protocol::request_line& update);
     /// The next update of that node is the first.
     void forget(std::string_view node) { publishers_.forget(node); }
+    bool take(const protocol::request_line& update, feed_mailbox::hand_over when = feed_mailbox::hand_over::now);
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
     [[nodiscard]] std::size_t publishers() const noexcept { return publishers_.size(); }
 

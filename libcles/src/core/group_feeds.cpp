@@ -160,16 +160,28 @@ bool group_feeds::take(const protocol::request_line& update) {
     if (found == by_path_.end()) {
         return false;
     }
+    // User code may close feeds and make new ones. So the last feed gets the update when nothing here is looked at any
+    // more (mostly it is the only one), and the others later, unless their operations are the library's own.
     const auto& feeds = found->second;
-    const handing_out on{*this};
-    bool taken = false;
-    // NOLINTNEXTLINE(modernize-loop-convert): what is added meanwhile may move the others
-    for (std::size_t i = 0, end = feeds.size(); i < end; ++i) {
-        if (auto* feed = feeds[i]; feed != nullptr && feed->wants(update.noun.target)) {
-            taken = feed->take(update) || taken;
-        }
+    const auto wants = [&](const group_feed* feed) { return feed != nullptr && feed->wants(update.noun.target); };
+    const auto behind_last = std::find_if(feeds.rbegin(), feeds.rend(), wants).base();
+    if (behind_last == feeds.begin()) {
+        return false;
     }
-    return taken;
+    const auto last_at = static_cast<std::size_t>(behind_last - feeds.begin()) - 1;
+    bool taken = false;
+    group_feed* last = nullptr;
+    {
+        const handing_out on{*this};
+        // NOLINTNEXTLINE(modernize-loop-convert): what is added meanwhile may move the others
+        for (std::size_t i = 0; i < last_at; ++i) {
+            if (wants(feeds[i])) {
+                taken = feeds[i]->take(update, feed_mailbox::hand_over::later) || taken;
+            }
+        }
+        last = feeds[last_at];
+    }
+    return (last != nullptr && last->take(update)) || taken;
 }
 
 } // namespace cles::core

@@ -14,6 +14,7 @@ class ignored_reply final : public detail::pending {
     }
     void fail(boost::system::error_code, std::string_view) override { delete this; }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 };
 
 } // namespace cles::core

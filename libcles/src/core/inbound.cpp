@@ -123,7 +123,7 @@ void inbound::withdraw_all() {
     }
 }
 
-void inbound::lose() {
+void inbound::drop_all() {
     auto calls = std::exchange(calls_, {});
     auto anonymous = std::exchange(anonymous_, nullptr);
     waiting_.clear();
@@ -229,8 +229,8 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
         replies_.fail(r, shutting_down(*node_));
         return;
     }
-    if (const auto why = objection(*node_, peer_, r)) {
-        replies_.fail(r, *why);
+    if (const auto why = objection(*node_, peer_, r); why || lost_) { // lost: by the access rules, a program's own code
+        replies_.fail(r, why.value_or(protocol::failure{.code = errc::unavailable, .message = {}}));
         return;
     }
     if (is_for(*node_, r)) {

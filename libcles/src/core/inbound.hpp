@@ -46,7 +46,10 @@ class inbound final : private call_owner, private call_opener {
     /// The peer sends no more: what has an id is withdrawn, the rest is still answered, then the link finishes.
     void end(time_point now);
     /// The link is gone.
-    void lose();
+    void lose() {
+        lost_ = true;
+        drop_all();
+    }
     /// Nothing is begun any more: what comes, and what waits for its turn, is `busy`. What runs is still answered.
     void begin_nothing() noexcept { begins_nothing_ = true; }
     /// Answers what still runs with `unavailable`, and tells it to stop.
@@ -85,6 +88,7 @@ class inbound final : private call_owner, private call_opener {
     void follow_waiting();
     void serve_waiting(time_point now);
     void withdraw_all();
+    void drop_all();
     void finish_if_done();
 
     void withdraw(std::uint64_t id);
@@ -110,6 +114,7 @@ class inbound final : private call_owner, private call_opener {
     bool closing_ = false; // the link ends whatever is bound
     bool finished_ = false;
     bool begins_nothing_ = false; // this node leaves
+    bool lost_ = false;           // there is no link any more
 };
 
 } // namespace cles::core

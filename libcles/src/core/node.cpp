@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/node.hpp"
 
+#include <cles/json_reader.hpp>
 #include <cles/version.hpp>
 
 #include "protocol/message.hpp"
@@ -46,16 +47,49 @@ node::node(node_setup setup, const core::clock& source, std::function<void()> wa
     : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
       bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)),
       metrics(std::move(setup.metrics)), load(std::move(setup.load)), time(source), started(source.now()),
-      others(name, setup.epoch, deadlines, bounds.peers),
+      completions(std::move(setup.complete)), others(name, setup.epoch, deadlines, bounds.peers),
       published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)),
       remembered{.limit = bounds.remembered} {
     others.begin(setup.pool, started);
 }
 
 // What is handed on to other nodes is work of theirs.
-node_load node::load_now() const {
-    return load ? load() : node_load{.running = static_cast<std::uint32_t>(counts.handlers_running - counts.routed)};
+node_load node::load_now() const noexcept {
+    try {
+        if (load) {
+            return load();
+        }
+    } catch (...) { // as where there is no function
+    }
+    return {.running = static_cast<std::uint32_t>(counts.handlers_running - counts.routed)};
 }
+
+void node::say(log_level level, const log_entry& what) const noexcept {
+    try {
+        if (log) {
+            log(level, what);
+        }
+    } catch (...) { // there is nobody to tell
+    }
+}
+
+namespace {
+
+// What the program counts, as members of an object; empty where its function throws or writes no JSON.
+std::string own_metrics(const node& n) {
+    std::string text;
+    try {
+        json_writer w{text};
+        w.begin_object();
+        n.metrics(w);
+        w.end_object();
+    } catch (...) {
+        return {};
+    }
+    return is_valid_json(text, n.bounds.depth) ? text.substr(1, text.size() - 2) : std::string{};
+}
+
+} // namespace
 
 void write_tasks(json_writer& w, const node& n) {
     w.begin_array();
@@ -176,7 +210,9 @@ void write_metrics(json_writer& w, const node& n) {
     quantile("p999", 0.999);
     w.end_object();
     if (n.metrics) {
-        n.metrics(w);
+        if (const auto members = own_metrics(n); !members.empty()) {
+            w.raw(members);
+        }
     }
     w.end_object();
 }

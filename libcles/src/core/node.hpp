@@ -7,6 +7,7 @@
 #include <cles/log.hpp>
 
 #include "core/clock.hpp"
+#include "core/completion_queue.hpp"
 #include "core/counters.hpp"
 #include "core/deadlines.hpp"
 #include "core/dedup.hpp"
@@ -37,6 +38,7 @@ struct node_setup {
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< what the program counts
     std::function<node_load()> load{};           ///< how much it has to do; empty: its handlers that run
+    completion_queue::runner complete{};         ///< how completions are called
 };
 
 class router;
@@ -57,6 +59,7 @@ struct node {
     const core::clock& time;
     const time_point started;
 
+    completion_queue completions;
     std::vector<std::string> endpoints;
     registry tasks;
     deadline_queue deadlines;
@@ -71,12 +74,9 @@ struct node {
     std::uint64_t next_id = 1; ///< of requests that this node sends
     router* way = nullptr;     ///< what serves requests for `any`, `all` and other nodes; null: nothing does
 
-    [[nodiscard]] node_load load_now() const;
-    void say(log_level level, const log_entry& what) const {
-        if (log) {
-            log(level, what);
-        }
-    }
+    // What the user's functions throw stays inside these.
+    [[nodiscard]] node_load load_now() const noexcept;
+    void say(log_level level, const log_entry& what) const noexcept;
 };
 
 /// What it offers: the value of `tasks` in the reply to `PULL self:cles`.

@@ -90,8 +90,9 @@ void outbound::recycle(std::unique_ptr<entry> e) {
 void outbound::fail(std::uint64_t id, errc why, std::string_view message) {
     if (auto e = take(id)) {
         auto operation = std::move(e->operation);
+        auto progress = std::move(e->progress);
         recycle(std::move(e));
-        operation.release()->fail(why, message);
+        node_.completions.fail(std::move(operation), why, message, std::move(progress));
     }
 }
 
@@ -142,22 +143,25 @@ void outbound::on_reply(const protocol::reply_line& reply) {
             e->reported = std::max(e->reported, *reply.progress);
             go_on(std::move(e), due);
             if (!late) {
-                report(*reply.progress, reply.body);
+                node_.completions.now([&] { report(*reply.progress, reply.body); });
             }
             return;
         }
     } else if (protocol::is_failure(reply.body)) {
         protocol::failure why;
         if (protocol::parse_failure(reply.body, why)) {
-            auto operation = std::move(e->operation);
+            auto* operation = e->operation.release();
             recycle(std::move(e));
-            operation.release()->refuse(why.code, why.message, reply.body);
+            node_.completions.now([&] { operation->refuse(why.code, why.message, reply.body); });
             return;
         }
     } else {
         auto* operation = e->operation.release();
-        ended = (reply.mark ? operation->offer_marked(reply.body, *reply.mark) : operation->offer(reply.body)) ==
-                detail::pending::verdict::completed;
+        ended = true; // what is thrown comes from its handler
+        node_.completions.now([&] {
+            ended = (reply.mark ? operation->offer_marked(reply.body, *reply.mark) : operation->offer(reply.body)) ==
+                    detail::pending::verdict::completed;
+        });
         if (!ended) {
             e->operation.reset(operation);
         }
@@ -178,9 +182,10 @@ void outbound::on_overlong(const protocol::reply_line& reply) {
 void outbound::refuse(const std::string& answer) {
     protocol::failure why;
     protocol::parse_failure(answer, why);
-    for (const auto& [id, e] : std::exchange(waiting_, {})) {
+    const auto lost = std::exchange(waiting_, {});
+    for (const auto& [id, e] : lost) {
         node_.deadlines.disarm(*e);
-        e->operation.release()->refuse(why.code, why.message, answer);
+        node_.completions.refuse(std::move(e->operation), why, answer, std::move(e->progress));
     }
 }
 
@@ -189,7 +194,7 @@ void outbound::lose(errc why, std::string_view message) {
     const std::string text{message};
     for (const auto& [id, e] : lost) {
         node_.deadlines.disarm(*e);
-        e->operation.release()->fail(why, text);
+        node_.completions.fail(std::move(e->operation), why, text, std::move(e->progress));
     }
 }
 

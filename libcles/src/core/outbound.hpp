@@ -39,7 +39,8 @@ class outbound {
     /// an id that is not in flight; how long is left is filled in here.
     void send(protocol::request_text request, time_point deadline, time_point now, detail::pending_ptr operation,
               progress_function progress = {});
-    /// Withdraws a request at the peer; its operation fails with `cancelled` at once. False where it has ended.
+    /// Withdraws a request at the peer; its operation fails with `cancelled`, without waiting for anybody. False where
+    /// it has ended.
     bool cancel(std::uint64_t id);
     /// Forgets a request without a word to anybody.
     void drop(std::uint64_t id);

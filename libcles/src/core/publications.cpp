@@ -122,15 +122,32 @@ void publications::mark(topic& t) {
     }
 }
 
-bool publications::publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation) {
+bool publications::publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation,
+                                     std::uint64_t ticket) {
     auto& t = open(path);
     if (!t.waiters().empty() || !t.has_room()) {
-        t.waiters().push_back({std::string{body}, std::move(operation)});
+        t.waiters().push_back({std::string{body}, std::move(operation), ticket});
         return false;
     }
     publish_body(path, body);
     keep({.operation = std::move(operation)});
     return true;
+}
+
+bool publications::cancel(std::uint64_t ticket) {
+    for (auto& [path, t] : topics_) {
+        auto& waiting = t->waiters();
+        const auto found =
+            std::find_if(waiting.begin(), waiting.end(), [ticket](const auto& w) { return w.ticket == ticket; });
+        if (found != waiting.end()) {
+            publication_result result{
+                .operation = std::move(found->operation), .code = errc::cancelled, .why = "the update was withdrawn"};
+            waiting.erase(found);
+            keep(std::move(result));
+            return true;
+        }
+    }
+    return false;
 }
 
 // Told later, one by one: a publisher that goes on at once may publish again, or throw, or end it all.

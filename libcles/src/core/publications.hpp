@@ -10,6 +10,7 @@
 #include "core/topic_source.hpp"
 
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <functional>
 #include <memory>
@@ -35,7 +36,11 @@ class publications final : public topic_source {
     void publish_body(std::string_view path, std::string_view body);
     /// Publishes a body of any kind now, or once every binder has room, and takes the operation: what comes of it is
     /// among the results. True: now. \throws as `publish`; the operation is left then
-    bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation);
+    bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation,
+                           std::uint64_t ticket = 0);
+    /// Withdraws what waits for room: it is not published, and its operation fails with `cancelled`. False where
+    /// nothing of that number waits.
+    bool cancel(std::uint64_t ticket);
     /// The next that has come of `publish_when_room`, to be told by the caller, of each noun in order. None: nobody
     /// waits for any.
     [[nodiscard]] std::optional<publication_result> next_result();

@@ -114,6 +114,7 @@ class topic {
     struct waiter {
         std::string body;
         detail::pending_ptr operation;
+        std::uint64_t ticket = 0; ///< to withdraw it by
     };
     /// Updates that are to be published when there is room, oldest first.
     std::deque<waiter>& waiters() noexcept { return waiters_; }

@@ -71,6 +71,18 @@ void connection::on_line(std::string_view line) {
     if (++lines_ % lines_per_write == 0 || link_->output().size() > engine_->bounds().unread) {
         flush();
     }
+    throw_on();
+}
+
+// What a handler has thrown, past the link: which hands the other lines over later, and may not end this batch.
+void connection::throw_on() {
+    if (engine_->completions().has_thrown()) {
+        const auto keep = shared_from_this();
+        now_.reset();
+        engine_->turns().flush_soon(*this);
+        engine_->settle();
+        engine_->completions().rethrow();
+    }
 }
 
 void connection::on_overlong(std::string_view head) {
@@ -240,6 +252,7 @@ void connection::on_idle(time_point now) {
 }
 
 void connection::on_stall(time_point now) {
+    const auto keep = shared_from_this();
     if (gone_ || link_->unsent() == 0) {
         return;
     }

@@ -114,6 +114,7 @@ class connection final : public link_events,
     time_point now();
     /// The peer has said something. False where it has been turned away with it.
     bool hears(std::string_view text);
+    void throw_on();
     void on_quiet() override;
     void on_silence() override;
     void on_probe() override;

@@ -4,15 +4,14 @@
 #include "core/raised.hpp"
 #include "shell/engine.hpp"
 
-#include <boost/asio/post.hpp>
-
 #include <algorithm>
 #include <utility>
 
 namespace cles::shell {
 
-departure::departure(detail::engine& host, std::chrono::milliseconds limit, detail::pending_ptr done)
-    : engine_(host), done_(std::move(done)) {
+departure::departure(detail::engine& host, std::uint64_t ticket, std::chrono::milliseconds limit,
+                     detail::pending_ptr done)
+    : engine_(host), ticket_(ticket), done_(std::move(done)) {
     const auto longest = std::chrono::milliseconds{std::chrono::hours{24}};
     engine_.deadlines().arm(*this, engine_.now() + std::clamp(limit, std::chrono::milliseconds{0}, longest));
 }
@@ -66,7 +65,7 @@ void departure::on_deadline(time_point) {
 
 void departure::end() {
     engine_.deadlines().disarm(*this);
-    boost::asio::post(engine_.executor(), [done = std::move(done_)]() mutable { done.release()->offer("{}"); });
+    engine_.node().completions.succeed(std::move(done_), "{}");
 }
 
 detail::pending_ptr departure::give_up() {

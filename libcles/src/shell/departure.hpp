@@ -6,6 +6,7 @@
 #include "core/deadlines.hpp"
 
 #include <chrono>
+#include <cstdint>
 
 namespace cles::detail {
 class engine;
@@ -19,11 +20,13 @@ class departure final : private core::deadline {
   public:
     /// What has not been answered after `limit` is cut short. `done` ends when the links have, soon after that at the
     /// latest, or fails in `give_up`.
-    departure(detail::engine& host, std::chrono::milliseconds limit, detail::pending_ptr done);
+    departure(detail::engine& host, std::uint64_t ticket, std::chrono::milliseconds limit, detail::pending_ptr done);
     ~departure() = default;
 
     /// To be called whenever something has happened.
     void look();
+    /// Of the operation, while it waits; else 0.
+    [[nodiscard]] std::uint64_t ticket() const noexcept { return done_ ? ticket_ : 0; }
     /// Gives the operation back, which has ended if it is null; nothing happens any more.
     [[nodiscard]] detail::pending_ptr give_up();
 
@@ -34,6 +37,7 @@ class departure final : private core::deadline {
     void end();
 
     detail::engine& engine_;
+    std::uint64_t ticket_;
     detail::pending_ptr done_;
     bool looking_ = false;
     bool ending_ = false; // all that was begun has been answered

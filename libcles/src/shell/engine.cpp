@@ -23,7 +23,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-core::node_setup setup_of(service_options& options) {
+core::node_setup setup_of(service_options& options, const asio::any_io_executor& executor) {
     std::random_device source;
     // Room for as many ids as a run may draw, and short enough for clients that read numbers as doubles.
     constexpr std::uint64_t apart = 1U << 20U;
@@ -36,7 +36,10 @@ core::node_setup setup_of(service_options& options) {
             .authorise = std::move(options.authorise),
             .log = std::move(options.log),
             .metrics = std::move(options.metrics),
-            .load = std::move(options.load)};
+            .load = std::move(options.load),
+            // Each as a function of its own: the executor calls the others whatever one of them throws, in a loop that
+            // one of them runs too; and what waits there owns nothing but itself, so that it goes with the context.
+            .complete = [executor](core::completion due) { asio::post(executor, std::move(due)); }};
 }
 
 void check_pool_name(const std::string& pool) {
@@ -68,7 +71,7 @@ engine::engine(asio::any_io_executor executor, service_options options)
     for (const auto& [name, where] : options.peers) {
         routes_.set_peer(name, where);
     }
-    node_ = std::make_shared<core::node>(setup_of(options), clock_, [this] { turns_.ask(); });
+    node_ = std::make_shared<core::node>(setup_of(options, executor_), clock_, [this] { turns_.ask(); });
     connections_.start();
     neighbours_ = std::make_unique<shell::neighbours>(*this, std::random_device{}());
 }
@@ -101,13 +104,21 @@ void engine::start(const std::vector<std::string>& listen_at) {
     listeners_.open_local_doors();
 }
 
+void engine::say_soon(log_level level, std::string what) const {
+    node_->completions.call([host = node_, level, what = std::move(what)] { host->say(level, what); });
+}
+
 void engine::expire(bool was_away) {
+    struct settling {
+        engine& by;
+        ~settling() { by.settle(); }
+    };
+    const settling afterwards{*this}; // whatever happens: without the timer no deadline would come any more
     const auto at = now();
     if (was_away) {
         node_->others.excuse(at);
     }
     node_->deadlines.expire(at);
-    settle();
 }
 
 void engine::settle() {
@@ -183,9 +194,7 @@ void engine::route_on(time_point now) {
 // -- asking --------------------------------------------------------------------------------------------------------
 
 void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message) {
-    asio::post(executor_, [operation = std::move(operation), code, message = std::move(message)]() mutable {
-        operation.release()->fail(code, message);
-    });
+    node_->completions.put(core::completion{core::completion::failure{std::move(operation), code, std::move(message)}});
 }
 
 std::uint64_t engine::send(const outgoing& request, const call_options& options, pending_ptr operation) {
@@ -227,8 +236,10 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
 
 void engine::cancel(std::uint64_t ticket) {
     const auto keep = shared_from_this();
-    if (!routes_.cancel(ticket)) {
-        connections_.cancel(ticket);
+    if (departure_ && departure_->ticket() == ticket) {
+        node_->completions.fail(departure_->give_up(), errc::cancelled, "the service is not waited for");
+    } else if (!routes_.cancel(ticket) && !connections_.cancel(ticket)) {
+        node_->published.cancel(ticket);
     }
 }
 
@@ -307,16 +318,18 @@ std::shared_ptr<update_sink> engine::outside_updates() {
     return outside_updates_;
 }
 
-void engine::publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation) {
+std::uint64_t engine::publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation) {
     if (stopped_) {
         fail_later(std::move(operation), errc::stopped, "the service has been stopped");
-        return;
+        return 0;
     }
+    const auto ticket = draw_id();
+    bool waits = false;
     try {
         if (node_->published.find(noun) == nullptr) {
             check_path(noun);
         }
-        turns_.let([&] { node_->published.publish_when_room(noun, json, operation); });
+        turns_.let([&] { waits = !node_->published.publish_when_room(noun, json, operation, ticket); });
         settle();
     } catch (const error& e) {
         if (operation == nullptr) { // it has been taken, and is told of its end elsewhere
@@ -324,21 +337,24 @@ void engine::publish_when_room(std::string_view noun, std::string_view json, pen
         }
         fail_later(std::move(operation), e.code(), e.message());
     }
+    return waits ? ticket : 0;
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------
 
-void engine::close(std::chrono::milliseconds limit, pending_ptr operation) {
+std::uint64_t engine::close(std::chrono::milliseconds limit, pending_ptr operation) {
     if (stopped_ || departure_) {
         fail_later(std::move(operation), errc::stopped, "the service ends already");
-        return;
+        return 0;
     }
     const auto keep = shared_from_this();
+    const auto ticket = draw_id();
     neighbours_->leave();
-    departure_ = std::make_unique<shell::departure>(*this, limit, std::move(operation));
+    departure_ = std::make_unique<shell::departure>(*this, ticket, limit, std::move(operation));
     listeners_.turn_away();
     connections_.begin_nothing();
     settle();
+    return ticket;
 }
 
 void engine::stop() {

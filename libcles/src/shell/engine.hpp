@@ -49,7 +49,7 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     std::string listen(std::string_view where);
     void stop();
     /// Ends in order what is to be ended; the operation ends when the links have. `stop` is to follow.
-    void close(std::chrono::milliseconds limit, pending_ptr operation);
+    std::uint64_t close(std::chrono::milliseconds limit, pending_ptr operation);
     /// Nothing is begun any more for others.
     [[nodiscard]] bool closing() const noexcept { return departure_ != nullptr; }
 
@@ -58,12 +58,16 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     [[nodiscard]] const std::shared_ptr<core::node>& shared_node() const noexcept { return node_; }
     [[nodiscard]] const limits& bounds() const noexcept { return node_->bounds; }
     [[nodiscard]] core::deadline_queue& deadlines() noexcept { return node_->deadlines; }
+    /// By which the user's code is called.
+    [[nodiscard]] core::completion_queue& completions() noexcept { return node_->completions; }
     [[nodiscard]] time_point now() const { return clock_.now(); }
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
     /// The address of a peer that might be another than it says, for which there is a limit on what is sent there;
     /// empty for others.
     [[nodiscard]] std::string stranger(const identity& peer) const;
     void say(log_level level, const log_entry& what) const { node_->say(level, what); }
+    /// The same from inside a loop over what the log's reader could change.
+    void say_soon(log_level level, std::string what) const;
     [[nodiscard]] shell::connections& connections() noexcept { return connections_; }
     [[nodiscard]] shell::listeners& listeners() noexcept { return listeners_; }
     [[nodiscard]] shell::routes& routes() noexcept { return routes_; }
@@ -93,7 +97,8 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
     /// Where updates go that come from other threads.
     std::shared_ptr<detail::update_sink> outside_updates();
-    void publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation);
+    /// Returns a ticket by which it can be withdrawn while it waits; 0 where it does not.
+    std::uint64_t publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation);
     std::uint64_t send(const outgoing& request, const call_options& options, pending_ptr operation);
     void cancel(std::uint64_t ticket);
     /// Completes an operation that failed while it began; not from inside the call.

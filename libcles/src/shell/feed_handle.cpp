@@ -29,7 +29,8 @@ class refused_feed final : public detail::feed_control {
             operation.release()->fail(code, message);
         });
     }
-    void cancel() override {}
+    void cancel_start() override {}
+    void cancel(const detail::pending_event*) override {}
     void close() override {}
     [[nodiscard]] const asio::any_io_executor& executor() const override { return host_->executor(); }
 
@@ -42,10 +43,14 @@ class refused_feed final : public detail::feed_control {
 } // namespace
 
 feed_handle::feed_handle(std::shared_ptr<detail::engine> host, std::string target, std::string path, bool thinned)
-    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->bounds(), std::move(target),
-                                       std::move(path), thinned, seed()) {}
+    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
+                                       std::move(target), std::move(path), thinned, seed()) {}
 
-feed_handle::~feed_handle() { host_->feeds().leave(machine_); }
+feed_handle::~feed_handle() {
+    if (!left_) {
+        host_->feeds().leave(machine_);
+    }
+}
 
 void feed_handle::start(detail::pending_ptr bound) { machine_.start(std::move(bound)); }
 
@@ -53,11 +58,16 @@ void feed_handle::next(detail::event_ptr operation) {
     fetch_next(machine_.mail(), executor(), shared_from_this(), std::move(operation));
 }
 
-void feed_handle::cancel() { machine_.mail().cancel(); }
+void feed_handle::cancel_start() {
+    if (machine_.is_starting()) {
+        close();
+    }
+}
 
 void feed_handle::close() {
     machine_.close(errc::cancelled);
     host_->feeds().leave(machine_);
+    left_ = true;
     // The feed may be closed from inside its own event: what is up the stack still needs it.
     asio::post(host_->executor(), [self = shared_from_this()] {});
 }

@@ -21,13 +21,15 @@ class feed_handle final : public detail::feed_control, public std::enable_shared
 
     void start(detail::pending_ptr bound) override;
     void next(detail::event_ptr operation) override;
-    void cancel() override;
+    void cancel_start() override;
+    void cancel(const detail::pending_event* operation) override { machine_.mail().cancel(operation); }
     void close() override;
     [[nodiscard]] const boost::asio::any_io_executor& executor() const override { return host_->executor(); }
 
   private:
     std::shared_ptr<detail::engine> host_;
     core::feed_machine machine_;
+    bool left_ = false; // and may be destroyed on any thread
 };
 
 /// A feed that could not even begin; its `start` fails with the reason.

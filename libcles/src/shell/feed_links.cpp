@@ -76,6 +76,7 @@ class bind_reply final : public detail::pending {
         }
     }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     verdict take(std::string_view json, const std::optional<update_mark>& mark) {
@@ -132,6 +133,7 @@ class renewal_reply final : public detail::pending {
         }
     }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     std::weak_ptr<detail::engine> host_;
@@ -354,8 +356,7 @@ void feed_links::stop() {
     for (const auto& [feed, e] : feeds) {
         if (const auto handle = e.handle.lock()) {
             // Taken out of the feed, which they may own: else neither would go if the context goes without running.
-            boost::asio::post(engine_.executor(),
-                              [waiting = feed->abandon()]() mutable { waiting.fail(errc::stopped); });
+            feed->abandon().fail(engine_.completions(), errc::stopped);
         }
     }
 }

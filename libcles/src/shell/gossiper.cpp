@@ -41,6 +41,7 @@ class table_reply final : public detail::pending {
         }
     }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     [[nodiscard]] std::shared_ptr<detail::engine> running_host() const {

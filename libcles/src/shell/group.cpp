@@ -4,8 +4,6 @@
 #include "protocol/datagram.hpp"
 #include "shell/engine.hpp"
 
-#include <boost/asio/post.hpp>
-
 #include <algorithm>
 #include <cstdint>
 #include <random>
@@ -58,9 +56,8 @@ void group::start() { port_->start(*this); }
 void group::stop() {
     for (auto* feed : session_.feeds().remove_all()) {
         if (auto waiting = feed->mail().close()) {
-            boost::asio::post(engine_.executor(), [waiting = std::move(waiting)]() mutable {
-                waiting.release()->fail(errc::stopped, "the service has been stopped");
-            });
+            engine_.completions().put(core::completion{
+                core::completion::event_failure{std::move(waiting), errc::stopped, "the service has been stopped"}});
         }
     }
     session_.unbind_all();
@@ -90,6 +87,7 @@ bool group::put(std::string_view lines) {
 void group::on_datagram(const transport::group_datagram& datagram) {
     const auto keep = engine_.shared_from_this();
     session_.on_message(source_of(datagram.from), datagram.said, engine_.now());
+    keep->completions().rethrow();
 }
 
 void group::on_batch() { engine_.settle(); }

@@ -12,12 +12,12 @@ namespace cles::shell {
 namespace asio = boost::asio;
 
 group_feed_handle::group_feed_handle(std::shared_ptr<detail::engine> host, std::string target, std::string path)
-    : host_(std::move(host)), feed_(host_->bounds(), std::move(target), std::move(path)) {}
+    : host_(std::move(host)), feed_(host_->bounds(), host_->completions(), std::move(target), std::move(path)) {}
 
 group_feed_handle::~group_feed_handle() { leave(); }
 
 void group_feed_handle::leave() {
-    if (auto* group = host_->group()) {
+    if (auto* group = std::exchange(left_, true) ? nullptr : host_->group()) {
         group->session().feeds().remove(feed_);
         host_->settle();
     }
@@ -31,7 +31,9 @@ void group_feed_handle::start(detail::pending_ptr bound) {
     }
     host_->group()->session().feeds().add(feed_, host_->now());
     host_->settle();
+    starting_ = true;
     asio::post(host_->executor(), [bound = std::move(bound), self = shared_from_this()]() mutable {
+        self->starting_ = false;
         if (self->feed_.mail().closed()) {
             const bool stopped = self->host_->stopped();
             bound.release()->fail(stopped ? errc::stopped : errc::cancelled, "the feed was closed");
@@ -45,12 +47,17 @@ void group_feed_handle::next(detail::event_ptr operation) {
     fetch_next(feed_.mail(), executor(), shared_from_this(), std::move(operation));
 }
 
-void group_feed_handle::cancel() { feed_.mail().cancel(); }
+void group_feed_handle::cancel_start() {
+    if (starting_) {
+        close();
+    }
+}
 
 void group_feed_handle::close() {
     leave();
     if (auto waiting = feed_.mail().close()) {
-        waiting.release()->fail(errc::cancelled, "the feed was closed");
+        host_->completions().put(core::completion{
+            core::completion::event_failure{std::move(waiting), errc::cancelled, "the feed was closed"}});
     }
     // The feed may be closed from inside its own event: what is up the stack still needs it.
     asio::post(host_->executor(), [self = shared_from_this()] {});

@@ -21,7 +21,8 @@ class group_feed_handle final : public detail::feed_control, public std::enable_
     /// Completes as soon as the BIND has been sent, for nobody answers it.
     void start(detail::pending_ptr bound) override;
     void next(detail::event_ptr operation) override;
-    void cancel() override;
+    void cancel_start() override;
+    void cancel(const detail::pending_event* operation) override { feed_.mail().cancel(operation); }
     void close() override;
     [[nodiscard]] const boost::asio::any_io_executor& executor() const override { return host_->executor(); }
 
@@ -30,6 +31,8 @@ class group_feed_handle final : public detail::feed_control, public std::enable_
 
     std::shared_ptr<detail::engine> host_;
     core::group_feed feed_;
+    bool starting_ = false;
+    bool left_ = false; // and may be destroyed on any thread
 };
 
 /// The feed that was asked for, or one whose `start` fails with the reason why there can be none.

@@ -212,27 +212,28 @@ void neighbours::on_announcement(const core::group_source& from, const protocol:
     }
 }
 
+// Told from inside a search through all nodes.
 void neighbours::on_peer(std::string_view node, core::presence::change what, std::string_view where) {
     const std::string name{node};
     const auto place =
         where.empty() ? std::string{", at no address that can be used from here"} : ", at " + std::string{where};
     switch (what) {
-    case core::presence::change::appeared: engine_.say(log_level::info, name + " is there" + place); break;
-    case core::presence::change::moved: engine_.say(log_level::info, name + " is elsewhere now" + place); break;
-    case core::presence::change::silent: engine_.say(log_level::debug, name + " is not heard any more"); break;
-    case core::presence::change::returned: engine_.say(log_level::debug, name + " is heard again"); break;
-    case core::presence::change::left: engine_.say(log_level::info, name + " has left"); break;
+    case core::presence::change::appeared: engine_.say_soon(log_level::info, name + " is there" + place); break;
+    case core::presence::change::moved: engine_.say_soon(log_level::info, name + " is elsewhere now" + place); break;
+    case core::presence::change::silent: engine_.say_soon(log_level::debug, name + " is not heard any more"); break;
+    case core::presence::change::returned: engine_.say_soon(log_level::debug, name + " is heard again"); break;
+    case core::presence::change::left: engine_.say_soon(log_level::info, name + " has left"); break;
     case core::presence::change::gone:
-        engine_.say(log_level::info, name + " is gone");
+        engine_.say_soon(log_level::info, name + " is gone");
         if (gossiper_) {
             gossiper_->on_gone(node, where, engine_.now());
         }
         break;
     case core::presence::change::clash:
-        engine_.say(log_level::warning,
-                    name == engine_.node().name
-                        ? "another node calls itself '" + name + "' too, on " + std::string{where}
-                        : "there is a second '" + name + "', on " + std::string{where} + ", and it is not asked");
+        engine_.say_soon(log_level::warning,
+                         name == engine_.node().name
+                             ? "another node calls itself '" + name + "' too, on " + std::string{where}
+                             : "there is a second '" + name + "', on " + std::string{where} + ", and it is not asked");
         if (name != engine_.node().name) {
             engine_.routes().on_whereabouts(name);
         }

@@ -69,7 +69,7 @@ bool route::cancel(std::uint64_t id) {
     }
     auto operation = std::move((*found)->operation);
     requests_.erase(found);
-    operation.release()->fail(errc::cancelled, "the request was withdrawn");
+    engine_->completions().fail(std::move(operation), errc::cancelled, "the request was withdrawn");
     return true;
 }
 
@@ -77,9 +77,11 @@ void route::waiting::on_deadline(time_point) {
     const auto& list = owner.requests_;
     const auto found = std::find_if(list.begin(), list.end(), [this](const auto& w) { return w.get() == this; });
     auto held = std::move(operation);
+    auto report = std::move(progress);
     const auto message = "no link to " + owner.address_ + " came about in time";
+    auto& completions = owner.engine_->completions();
     owner.requests_.erase(found); // ends this
-    held.release()->fail(errc::deadline, message);
+    completions.fail(std::move(held), errc::deadline, message, std::move(report));
 }
 
 void route::connect(core::feed_machine& feed, ready_function ready) {
@@ -175,7 +177,7 @@ void route::fail(boost::system::error_code code, std::string_view message) {
         engine_->deadlines().disarm(*w);
     }
     for (const auto& w : requests) {
-        w->operation.release()->fail(code, message);
+        engine_->completions().fail(std::move(w->operation), code, message, std::move(w->progress));
     }
     for (const auto& b : binders) {
         b.ready(nullptr, code, message);

@@ -28,15 +28,24 @@ void service_call::refuse(std::string_view message, std::chrono::milliseconds re
 }
 
 void service_call::on_stop(std::function<void()> callback) {
-    if (asked_ && !call_->stopped()) {
-        asked_->then = std::move(callback);
+    if (call_->stopped()) {
+        callback();
+    } else if (asked_) {
+        asked_->then = put(std::move(callback));
     } else {
-        call_->on_stop(std::move(callback));
+        call_->on_stop(put(std::move(callback)));
     }
 }
 
+// Calls are stopped while the library goes through all that a lost link has left.
+std::function<void()> service_call::put(std::function<void()> callback) const {
+    return [host = call_->host(), callback = std::move(callback)]() mutable {
+        host->completions.call(std::move(callback));
+    };
+}
+
 void service_call::log(log_level level, std::string_view text) {
-    if (!service_.expired()) { // the log may have gone with it
+    if (const auto by = service_.lock()) { // else the log may have gone with it
         call_->say(level, text);
     }
 }

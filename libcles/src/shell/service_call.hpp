@@ -51,6 +51,8 @@ class service_call final : public detail::call_control, public std::enable_share
     void send(detail::engine& by, std::string_view command, const call_options& options, answer_callback answered,
               std::chrono::milliseconds left);
     void answer_later(answer_callback answered, errc why, const char* words);
+    /// What the handler gave, to be called as its code is.
+    [[nodiscard]] std::function<void()> put(std::function<void()> callback) const;
     void follow_stop();
     void withdraw_asked();
 

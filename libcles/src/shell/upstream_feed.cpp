@@ -47,6 +47,7 @@ class upstream_feed::first_answer final : public detail::pending {
         }
     }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     std::weak_ptr<upstream_feed> to_;
@@ -54,8 +55,8 @@ class upstream_feed::first_answer final : public detail::pending {
 
 upstream_feed::upstream_feed(std::shared_ptr<detail::engine> host, std::string node, std::string path,
                              core::feed_events& to, std::function<void()> ended)
-    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->bounds(), std::move(node),
-                                       std::move(path), false, std::random_device{}()),
+    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
+                                       std::move(node), std::move(path), false, std::random_device{}()),
       to_(&to), ended_(std::move(ended)) {}
 
 upstream_feed::~upstream_feed() { host_->feeds().leave(machine_); }

@@ -32,13 +32,15 @@ class upstream_feed final : public detail::feed_control,
 
     void start(detail::pending_ptr bound) override;
     void next(detail::event_ptr operation) override;
-    void cancel() override {}
+    void cancel_start() override {}
+    void cancel(const detail::pending_event*) override {}
     [[nodiscard]] const boost::asio::any_io_executor& executor() const override { return host_->executor(); }
 
     // What waits for events: this itself, always.
     bool deliver(const detail::raw_event& event) override;
     void fail(boost::system::error_code code, std::string_view message) override;
     void discard() noexcept override {}
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
     void wait();
     void on_refused(boost::system::error_code code, std::string_view message);

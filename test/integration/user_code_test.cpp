@@ -1,0 +1,547 @@
+// SPDX-License-Identifier: BSL-1.0
+// Every kind of code of the user's that the library calls, what it may do, and where it may be called: nobody else is
+// harmed (CONTRIBUTING.md, "User code").
+
+#include <cles/service.hpp>
+
+#include "support/answer.hpp"
+#include "support/node.hpp"
+#include "support/run_until.hpp"
+#include "support/scripted_peer.hpp"
+
+#include <boost/asio/bind_cancellation_slot.hpp>
+#include <boost/asio/cancellation_signal.hpp>
+#include <boost/test/data/monomorphic.hpp>
+#include <boost/test/data/test_case.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace user_code_test {
+
+using namespace cles::test;
+using namespace std::chrono_literals;
+using cles::errc;
+namespace asio = boost::asio;
+
+/// What user code does.
+enum class deed : std::uint8_t { nothing, throws, cancels, stops_service, destroys_service, destroys_feed, begins };
+constexpr std::array every_deed{deed::nothing,          deed::throws,        deed::cancels, deed::stops_service,
+                                deed::destroys_service, deed::destroys_feed, deed::begins};
+constexpr std::array<const char*, 7> deed_names{"nothing",          "throws",        "cancels", "stops_service",
+                                                "destroys_service", "destroys_feed", "begins"};
+
+/// Where a completion comes from.
+enum class place : std::uint8_t { reply, refusal, deadline, lost, not_connected, cancelled, stop };
+constexpr std::array every_place{place::reply,         place::refusal,   place::deadline, place::lost,
+                                 place::not_connected, place::cancelled, place::stop};
+constexpr std::array<const char*, 7> place_names{"reply",         "refusal",   "deadline", "lost",
+                                                 "not_connected", "cancelled", "stop"};
+
+enum class asking : std::uint8_t { push, pull, delegate, bind };
+constexpr std::array every_asking{asking::push, asking::pull, asking::delegate, asking::bind};
+constexpr std::array<const char*, 4> asking_names{"push", "pull", "delegate", "bind"};
+
+std::ostream& operator<<(std::ostream& out, deed d) { return out << deed_names[static_cast<std::size_t>(d)]; }
+std::ostream& operator<<(std::ostream& out, place p) { return out << place_names[static_cast<std::size_t>(p)]; }
+std::ostream& operator<<(std::ostream& out, asking a) { return out << asking_names[static_cast<std::size_t>(a)]; }
+
+struct thrown_by_test {};
+
+/// A service whose user code misbehaves, with others to talk to.
+struct world {
+    explicit world(cles::service_options own = {}) {
+        own.name = "tower";
+        own.listen = {fresh_address(carrier::tcp4)};
+        own.peers = {{"car1", silent.url()},
+                     {"car2", car->endpoints().front()},
+                     {"car3", friendly->endpoints().front()},
+                     {"nowhere", "tcp://127.0.0.1:1"}};
+        tower = std::make_unique<cles::service>(io, std::move(own));
+        for (auto* each : {car.get(), friendly.get()}) {
+            each->on_pull("speed", [] { return 42; });
+            each->on_push("note", [] {});
+            each->on_delegate("work", [] { return 42; });
+            each->on_delegate("long",
+                              [this](const cles::request&, cles::responder r) { jobs.push_back(std::move(r)); });
+            for (const auto* noun : {"place", "place1", "place2", "victim"}) {
+                each->on_bind(noun);
+            }
+        }
+        tower->async_bind("car3:victim", [this](boost::system::error_code, cles::feed<cles::json_text> made) {
+            victim = std::make_unique<cles::feed<cles::json_text>>(std::move(made));
+            victim->async_next(
+                [this](boost::system::error_code, const cles::feed_item<cles::json_text>&) { ++victim_ended; });
+        });
+        tower->async_delegate("car3:long", cles::json_text{},
+                              asio::bind_cancellation_slot(patient_signal.slot(), patient.take()));
+        until([&] { return victim && jobs.size() == 1; });
+        endless = std::exchange(jobs, {});
+    }
+    ~world() {
+        jobs.clear();
+        endless.clear();
+        victim.reset();
+        tower.reset();
+    }
+
+    void act(deed d) {
+        ++acted;
+        switch (d) {
+        case deed::nothing: break;
+        case deed::throws: throw thrown_by_test{};
+        case deed::cancels:
+            for (auto* each : {&patient_signal, &first, &third}) {
+                each->emit(asio::cancellation_type::terminal);
+            }
+            break;
+        case deed::stops_service:
+            if (tower) {
+                tower->stop();
+            }
+            break;
+        case deed::destroys_service: tower.reset(); break;
+        case deed::destroys_feed: victim.reset(); break;
+        case deed::begins:
+            if (tower) {
+                tower->async_pull("car3:speed", begun.take());
+                tower->async_pull("car1:speed", cles::call_options{}.deadline(1s), [](auto, const auto&) {});
+                tower->async_bind("nowhere:place", [](auto, const auto&) {});
+                tower->async_update("own", 1, [](auto) {});
+                tower->update("own", 2);
+            }
+            break;
+        }
+    }
+
+    /// Runs, and calls again what was thrown out of.
+    template <class Condition>
+    void until(Condition holds, const std::source_location& where = std::source_location::current()) {
+        for (;;) {
+            try {
+                run_until(io, holds, patience, where);
+                return;
+            } catch (const thrown_by_test&) {
+                ++thrown;
+            }
+        }
+    }
+    void run_what_is_ready() {
+        for (;;) {
+            try {
+                run_ready(io);
+                return;
+            } catch (const thrown_by_test&) {
+                ++thrown;
+            }
+        }
+    }
+
+    /// The service lives on: it is answered, and its timer is armed.
+    void check_that_it_lives(deed d) {
+        run_what_is_ready();
+        BOOST_TEST(thrown == (d == deed::throws ? acted : 0));
+        if (tower) {
+            answer<int> alive;
+            answer<> late;
+            tower->async_pull<int>("car3:speed", alive.take());
+            tower->async_pull("car1:silence", cles::call_options{}.deadline(20ms), late.take());
+            until([&] { return alive.done() && late.done(); });
+            if (alive.code != errc::stopped) {
+                BOOST_TEST(alive.value == 42);
+                BOOST_TEST(late.code == errc::deadline);
+            }
+        }
+        if (d == deed::destroys_service || d == deed::stops_service) {
+            until([&] { return patient.done(); });
+            BOOST_TEST(patient.code == errc::stopped);
+        } else if (d == deed::cancels && acted != 0 && patient.code != errc::stopped) {
+            until([&] { return patient.done(); });
+            BOOST_TEST(patient.code == errc::cancelled);
+        } else if (d == deed::destroys_feed && acted != 0) {
+            until([&] { return victim_ended == 1; });
+        } else if (d == deed::begins && acted != 0 && tower) {
+            until([&] { return begun.done(); });
+        }
+    }
+
+    asio::io_context io;
+    scripted_listener silent{io};
+    std::unique_ptr<cles::service> car = std::make_unique<cles::service>(io, listening("car2"));
+    std::unique_ptr<cles::service> friendly = std::make_unique<cles::service>(io, listening("car3"));
+    std::vector<cles::responder> jobs;
+    std::vector<cles::responder> endless;
+    asio::cancellation_signal patient_signal; // of what waits all the time
+    asio::cancellation_signal first;          // of what ends beside the one that acts
+    asio::cancellation_signal second;
+    asio::cancellation_signal third;
+    answer<> patient;
+    answer<> begun;
+    std::unique_ptr<cles::feed<cles::json_text>> victim;
+    int victim_ended = 0;
+    int acted = 0;
+    int thrown = 0;
+    std::unique_ptr<cles::service> tower;
+};
+
+/// A completion handler that does something.
+struct handler {
+    world* in;
+    int* calls;
+    deed does;
+
+    template <class... T>
+    void operator()(boost::system::error_code, const T&...) const {
+        ++*calls;
+        in->act(does);
+    }
+};
+
+/// Does something when it is destroyed.
+struct doer {
+    doer(world& w, deed d) noexcept : in(w), does(d) {}
+    doer(const doer&) = delete;
+    doer& operator=(const doer&) = delete;
+    ~doer() { in.act(does); }
+    world& in;
+    deed does;
+};
+
+template <class Handler>
+void ask(cles::service& by, asking how, const std::string& node, int which, const cles::call_options& options,
+         Handler on_end) {
+    switch (how) {
+    case asking::push: by.async_push(node + ":note", cles::json_text{}, options, std::move(on_end)); break;
+    case asking::pull: by.async_pull(node + ":speed", options, std::move(on_end)); break;
+    case asking::delegate: by.async_delegate(node + ":work", cles::json_text{}, options, std::move(on_end)); break;
+    case asking::bind: {
+        cles::bind_options bound;
+        bound.deadline(options.deadline_);
+        by.async_bind(node + ":place" + (which == 0 ? "" : std::to_string(which)), bound, std::move(on_end));
+        break;
+    }
+    }
+}
+
+/// Begins three requests, of which the second acts, and has them end there. Whoever is asked is silent, or answers.
+template <class Act>
+void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>& calls) {
+    const std::string node = where == place::not_connected                      ? "nowhere"
+                             : where == place::reply || where == place::refusal ? "car2"
+                                                                                : "car1";
+    cles::call_options options;
+    options.deadline(where == place::deadline ? 30ms : 20s);
+    if (where == place::refusal) {
+        w.car = std::make_unique<cles::service>(w.io, listening("car2"));
+        w.tower->set_peer("car2", w.car->endpoints().front());
+    }
+    const auto bystander = [&](std::size_t i) { return handler{&w, &calls[i], deed::nothing}; };
+    ask(*w.tower, how, node, 0, options, asio::bind_cancellation_slot(w.first.slot(), bystander(0)));
+    ask(*w.tower, how, node, 1, options, asio::bind_cancellation_slot(w.second.slot(), std::move(acting)));
+    ask(*w.tower, how, node, 2, options, asio::bind_cancellation_slot(w.third.slot(), bystander(2)));
+    if (where == place::lost) {
+        auto peer = w.silent.accept();
+        peer.line();
+        peer.reset();
+    } else if (where == place::cancelled) {
+        w.second.emit(asio::cancellation_type::terminal);
+        w.first.emit(asio::cancellation_type::partial);
+        w.third.emit(asio::cancellation_type::total);
+    } else if (where == place::stop) {
+        w.tower->stop();
+    }
+    BOOST_TEST(calls[1] == 0); // never from inside the call
+}
+
+} // namespace user_code_test
+
+BOOST_AUTO_TEST_SUITE(user_code)
+
+using namespace user_code_test;
+
+namespace data = boost::unit_test::data;
+
+BOOST_DATA_TEST_CASE(a_completion_handler_may_do_anything, data::make(every_asking) * every_place * every_deed, how,
+                     where, does) {
+    world w;
+    std::array<int, 3> calls{};
+    end_three(w, how, where, handler{&w, &calls[1], does}, calls);
+    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
+    w.acted = 1; // the bystanders did nothing
+    w.check_that_it_lives(does);
+    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+}
+
+BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_asking) * every_place * every_deed, how,
+                     where, does) {
+    if (does == deed::throws) { // no destructor does
+        return;
+    }
+    world w;
+    std::array<int, 3> calls{};
+    end_three(
+        w, how, where,
+        [doing = std::make_shared<doer>(w, does), n = &calls[1]](boost::system::error_code, const auto&) { ++*n; },
+        calls);
+    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
+    w.acted = 1;
+    w.check_that_it_lives(does);
+    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+}
+
+BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_deed), does) {
+    for (const auto where : {place::reply, place::lost, place::cancelled, place::stop}) {
+        BOOST_TEST_CONTEXT("at " << where) {
+            world w;
+            std::vector<std::unique_ptr<cles::feed<cles::json_text>>> feeds;
+            for (const auto* noun : {"car2:place", "car2:place1", "car2:place2"}) {
+                w.tower->async_bind(noun, [&](boost::system::error_code, cles::feed<cles::json_text> made) {
+                    feeds.push_back(std::make_unique<cles::feed<cles::json_text>>(std::move(made)));
+                });
+            }
+            w.until([&] { return feeds.size() == 3; });
+            std::array<int, 3> calls{};
+            const std::array<asio::cancellation_signal*, 3> signals{&w.first, &w.second, &w.third};
+            for (std::size_t i = 0; i < 3; ++i) {
+                feeds[i]->async_next(asio::bind_cancellation_slot(
+                    signals[i]->slot(), handler{&w, &calls[i], i == 1 ? does : deed::nothing}));
+            }
+            if (where == place::reply) {
+                w.car->update("place", 1);
+                w.car->update("place1", 2);
+                w.car->update("place2", 3);
+            } else if (where == place::lost) {
+                w.car.reset();
+            } else if (where == place::cancelled) {
+                for (const std::size_t i : {1, 0, 2}) {
+                    signals[i]->emit(asio::cancellation_type::terminal);
+                }
+            } else {
+                w.tower->stop();
+            }
+            BOOST_TEST(calls[1] == 0);
+            w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
+            w.acted = 1;
+            w.check_that_it_lives(does);
+            BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+        }
+    }
+}
+
+BOOST_DATA_TEST_CASE(a_publisher_that_waits_may_do_anything, data::make(every_deed), does) {
+    for (const auto where : {place::reply, place::cancelled, place::stop}) {
+        BOOST_TEST_CONTEXT("at " << where) {
+            world w;
+            w.tower->on_bind("full");
+            scripted_peer slow{w.io, w.tower->endpoints().front(), buffers::small};
+            slow.ask("BIND self:full keep=1");
+            const std::string padding(50'000, '.');
+            int filled = 0;
+            if (where != place::reply) {
+                for (int i = 0; i < 300; ++i) {
+                    w.tower->async_update("full", padding, [&](boost::system::error_code) { ++filled; });
+                }
+                w.run_what_is_ready();
+                BOOST_TEST(filled < 300);
+            }
+            std::array<int, 3> calls{};
+            const std::array<asio::cancellation_signal*, 3> signals{&w.first, &w.second, &w.third};
+            for (std::size_t i = 0; i < 3; ++i) {
+                w.tower->async_update("full", static_cast<int>(i),
+                                      asio::bind_cancellation_slot(
+                                          signals[i]->slot(), handler{&w, &calls[i], i == 1 ? does : deed::nothing}));
+            }
+            if (where == place::cancelled) {
+                for (const std::size_t i : {1, 0, 2}) {
+                    signals[i]->emit(asio::cancellation_type::total);
+                }
+            } else if (where == place::stop) {
+                w.tower->stop();
+            }
+            BOOST_TEST(calls[1] == 0);
+            w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
+            w.acted = 1;
+            w.check_that_it_lives(does);
+            BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+        }
+    }
+}
+
+BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_deed), does) {
+    world w;
+    int reports = 0;
+    answer<int> a;
+    answer<int> b;
+    w.tower->async_delegate<int>("car2:long", cles::json_text{},
+                                 cles::call_options{}.on_progress([&](double, std::string_view) {
+                                     ++reports;
+                                     w.act(does);
+                                 }),
+                                 a.take());
+    w.tower->async_delegate<int>("car2:long", cles::json_text{}, b.take());
+    w.until([&] { return w.jobs.size() == 2; });
+    w.jobs[0].progress(0.25);
+    w.jobs[0].progress(0.5);
+    w.jobs[0].done(1);
+    w.jobs[1].done(2);
+    w.until([&] { return a.done() && b.done(); });
+    w.check_that_it_lives(does);
+    const bool ended = does == deed::stops_service || does == deed::destroys_service;
+    BOOST_TEST(reports == (ended ? 1 : 2));
+    BOOST_TEST(a.code.failed() == ended);
+    BOOST_TEST(b.code.failed() == ended);
+    BOOST_TEST(a.calls == 1);
+    BOOST_TEST(b.calls == 1);
+}
+
+BOOST_DATA_TEST_CASE(who_is_told_to_stop_may_do_anything, data::make(every_deed), does) {
+    for (const auto where : {place::deadline, place::lost, place::cancelled, place::stop}) {
+        BOOST_TEST_CONTEXT("at " << where) {
+            world w;
+            std::vector<cles::responder> begun;
+            std::array<int, 3> told{};
+            w.tower->on_delegate("job", [&](const cles::request&, cles::responder r) {
+                const auto i = begun.size();
+                r.on_stop([&, i] {
+                    ++told[i];
+                    w.act(i == 1 ? does : deed::nothing);
+                });
+                begun.push_back(std::move(r));
+            });
+            scripted_peer peer{w.io, w.tower->endpoints().front()};
+            for (const auto* id : {"1", "2", "3"}) {
+                peer.send("DELEGATE self:job id=" + std::string{id} +
+                          (where == place::deadline ? " deadline=30\n" : " deadline=20000\n"));
+            }
+            w.until([&] { return begun.size() == 3; });
+            if (where == place::lost) {
+                peer.reset();
+            } else if (where == place::cancelled) {
+                peer.shut();
+            } else if (where == place::stop) {
+                w.tower->stop();
+                BOOST_TEST(told[1] == 0);
+            }
+            w.until([&] { return told[0] != 0 && told[1] != 0 && told[2] != 0; });
+            w.acted = 1;
+            w.check_that_it_lives(does);
+            BOOST_TEST(told == (std::array{1, 1, 1}), boost::test_tools::per_element());
+        }
+    }
+}
+
+// What a handler throws is its answer; the lines behind it are served.
+BOOST_DATA_TEST_CASE(a_handler_for_requests_may_do_anything, data::make(every_deed), does) {
+    for (const auto* task : {"plain", "later", "awaited"}) {
+        BOOST_TEST_CONTEXT(task) {
+            world w;
+            w.tower->on_pull("plain", [&] {
+                w.act(does);
+                return 1;
+            });
+            w.tower->on_pull("later", [&](const cles::request&, const cles::responder& r) {
+                w.act(does);
+                r.done(1);
+            });
+            w.tower->on_pull("awaited", [&]() -> asio::awaitable<int> {
+                w.act(does);
+                co_return 1;
+            });
+            int plain = 0;
+            w.tower->on_pull("quick", [&] { return ++plain; });
+            scripted_peer peer{w.io, w.tower->endpoints().front()};
+            peer.send("PULL self:" + std::string{task} + " id=1\nPULL self:quick id=2\n");
+            w.until([&] { return w.acted == 1; });
+            w.run_what_is_ready();
+            BOOST_TEST(w.thrown == 0);
+            if (w.tower && does != deed::stops_service) {
+                const auto one = peer.line();
+                const auto other = peer.line();
+                const auto& mine = one.starts_with("id=1 ") ? one : other;
+                BOOST_TEST((mine.find(does == deed::throws ? "failed" : "{\"value\":1}") != std::string::npos), mine);
+                BOOST_TEST(plain == 1);
+            }
+            w.acted = does == deed::throws ? 0 : 1;
+            w.check_that_it_lives(does);
+        }
+    }
+}
+
+// The functions that give the library something back.
+BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(every_deed), does) {
+    for (const std::string which : {"authorise", "load", "metrics", "log"}) {
+        BOOST_TEST_CONTEXT(which) {
+            world* within = nullptr;
+            bool armed = false;
+            const auto act = [&](std::string_view what) {
+                if (armed && what == which) {
+                    armed = false;
+                    within->act(does);
+                }
+            };
+            cles::service_options options;
+            options.authorise = [&](const cles::access&) {
+                act("authorise");
+                return true;
+            };
+            options.load = [&] {
+                act("load");
+                return cles::node_load{.running = 7};
+            };
+            options.metrics = [&](cles::json_writer& out) {
+                out.key("half");
+                act("metrics");
+                out.value(std::int64_t{1});
+            };
+            options.log = [&](cles::log_level, const cles::log_entry&) { act("log"); };
+            world w{std::move(options)};
+            within = &w;
+            int served = 0;
+            w.tower->on_pull("speed", [&] { return ++served; });
+            scripted_peer peer{w.io, w.tower->endpoints().front()};
+            scripted_peer other{w.io, w.tower->endpoints().front()};
+            other.ask("PULL self:speed");
+            armed = true;
+            if (which == "authorise") {
+                peer.send("PULL self:speed\n");
+            } else if (which == "load") {
+                peer.send("PULL self:cles\n");
+            } else if (which == "metrics") {
+                peer.send("PULL self:cles/metrics\n");
+            } else {
+                peer.send("GET / HTTP/1.1\n");
+            }
+            w.until([&] { return w.acted == 1; });
+            w.run_what_is_ready();
+            BOOST_TEST(w.thrown == 0);
+            const bool ended = does == deed::stops_service || does == deed::destroys_service;
+            if (ended) {
+                BOOST_TEST(served == 1); // nothing is begun that was allowed by a service that is gone
+            } else if (which == "log") {
+                BOOST_TEST(peer.rest().empty());
+            } else {
+                const auto reply = peer.line();
+                BOOST_TEST(cles::is_valid_json(reply), reply);
+                BOOST_TEST((reply.find("denied") != std::string::npos) ==
+                           (which == "authorise" && does == deed::throws));
+                BOOST_TEST((reply.find("\"half\":1") != std::string::npos) ==
+                           (which == "metrics" && does != deed::throws));
+            }
+            if (!ended) {
+                BOOST_TEST((other.ask("PULL self:speed").find("value") != std::string::npos));
+            }
+            w.acted = does == deed::throws ? 0 : 1;
+            w.check_that_it_lives(does);
+        }
+    }
+}
+
+BOOST_AUTO_TEST_SUITE_END()
