@@ -141,14 +141,16 @@ constexpr bool fits_handler() {
             return false;
         }
     } else {
-        constexpr bool many = callable_somehow<F>;
+        constexpr bool overloaded = callable_somehow<F>;
         constexpr bool member = std::is_member_pointer_v<F>;
-        static_assert(!many, "the handler's arguments are not known, since its call operator is a template (an 'auto' "
-                             "parameter) or overloaded: write the types, as [](const cles::request&, position)");
+        static_assert(!overloaded,
+                      "the handler's arguments are not known, since its call operator is a template (an 'auto' "
+                      "parameter) or overloaded: write the types, as [](const cles::request&, position)");
         static_assert(!member, "a member function is no handler without its object: use a lambda, as "
                                "[this](position to) { return steer(to); }");
-        static_assert(many || member, "the handler is not callable: it is a function, a lambda or an object with a "
-                                      "call operator");
+        static_assert(overloaded || member,
+                      "the handler is not callable: it is a function, a lambda or an object with a "
+                      "call operator");
         return false;
     }
 }

@@ -283,7 +283,7 @@ void inbound::serve_task(const protocol::request_line& r, time_point arrived, ti
     } else if (const auto failed = run_plain(r, task)) {
         refuse(r, *failed, due, now);
     }
-    release_if_large(decoded_ = std::move(storage), path_);
+    release_if_large(decoded_ = std::move(storage));
 }
 
 std::optional<protocol::failure> inbound::run_plain(const protocol::request_line& r, execution& task) {
