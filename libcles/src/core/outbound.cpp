@@ -173,6 +173,15 @@ void outbound::on_overlong(const protocol::reply_line& reply) {
          "the answer is longer than " + std::to_string(node_.bounds.line) + " bytes");
 }
 
+void outbound::refuse(const std::string& answer) {
+    protocol::failure why;
+    protocol::parse_failure(answer, why);
+    for (const auto& [id, e] : std::exchange(waiting_, {})) {
+        node_.deadlines.disarm(*e);
+        e->operation.release()->refuse(why.code, why.message, answer);
+    }
+}
+
 void outbound::lose(errc why, std::string_view message) {
     const auto lost = std::exchange(waiting_, {});
     const std::string text{message};

@@ -16,6 +16,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -45,6 +46,8 @@ class outbound {
     void on_reply(const protocol::reply_line& reply);
     /// A reply that is longer than a line may be.
     void on_overlong(const protocol::reply_line& reply);
+    /// Fails all that wait with what the peer said of the link as a whole: it has begun none of them.
+    void refuse(const std::string& answer);
     /// Fails all that wait.
     void lose(errc why, std::string_view message);
     /// Takes out all that wait, without a word.

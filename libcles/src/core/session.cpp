@@ -39,6 +39,9 @@ void session::on_line(std::string_view line, time_point now) {
         }
         return;
     }
+    if (refusal_ != refusal::ruled_out) {
+        note_refusal(line);
+    }
     if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
         on_update(found);
         return;
@@ -64,6 +67,27 @@ void session::on_line(std::string_view line, time_point now) {
         on_update(subscriptions_.find(line, request));
     } else {
         inbound_.on_request(line, request, now);
+    }
+}
+
+// It refuses the link where it is all that ever comes.
+void session::note_refusal(std::string_view line) {
+    const bool first = refusal_ == refusal::possible;
+    refusal_ = refusal::ruled_out;
+    refusal_text_.clear();
+    protocol::failure why;
+    if (first && protocol::is_failure(line) && protocol::parse_failure(line, why) && why.code == errc::busy &&
+        !why.ran) {
+        refusal_ = refusal::told;
+        refusal_text_ = line;
+    }
+}
+
+void session::lose_requests(std::string_view why) {
+    if (refusal_ == refusal::told) {
+        outbound_.refuse(refusal_text_);
+    } else {
+        outbound_.lose(errc::unavailable, why);
     }
 }
 
@@ -114,6 +138,7 @@ void session::say_busy() {
 }
 
 void session::on_overlong(std::string_view head, time_point now) {
+    refusal_ = refusal::ruled_out;
     head = protocol::trim(head);
     if (is_datagram() && is_web_datagram(head)) {
         return;
@@ -146,13 +171,13 @@ void session::on_cut(std::string_view rest, time_point now) {
 
 void session::on_end(time_point now) {
     inbound_.end(now);
-    outbound_.lose(errc::unavailable, "the peer ended the link before it answered");
+    lose_requests("the peer ended the link before it answered");
 }
 
 void session::on_lost(std::string_view why) {
     closed_ = true;
     inbound_.lose();
-    outbound_.lose(errc::unavailable, why);
+    lose_requests(why);
 }
 
 } // namespace cles::core

@@ -9,7 +9,9 @@
 #include "core/outlet.hpp"
 #include "core/subscription.hpp"
 
+#include <cstdint>
 #include <memory>
+#include <string>
 #include <string_view>
 
 namespace cles::core {
@@ -40,11 +42,15 @@ class session {
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
     [[nodiscard]] outbound& asking() noexcept { return outbound_; }
     [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }
+    /// This node made the link: the other one may refuse it as a whole, with a `busy` that answers nothing.
+    void may_be_refused() noexcept { refusal_ = refusal::possible; }
 
   private:
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
     void refuse(std::string_view text, const char* why, time_point now);
     void on_reply(std::string_view line);
+    void note_refusal(std::string_view line);
+    void lose_requests(std::string_view why);
     void on_update(const subscriptions::match& found);
 
     std::shared_ptr<node> node_;
@@ -53,6 +59,8 @@ class session {
     inbound inbound_;
     outbound outbound_;
     subscriptions subscriptions_;
+    enum class refusal : std::uint8_t { ruled_out, possible, told } refusal_ = refusal::ruled_out;
+    std::string refusal_text_; // the whole of what was told
     bool closed_ = false;
 };
 

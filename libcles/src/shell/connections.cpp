@@ -136,6 +136,9 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
         }
     }
     ++engine_.node().counts.links_open;
+    if (from == connection::origin::dialled && c->datagram() == 0) {
+        c->session().may_be_refused();
+    }
     c->start();
     return c;
 }

@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSL-1.0
+// A link whose other end has no room for it: its only line is a `busy` that answers nothing.
+#include "core/leg.hpp"
+#include "core/session.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace {
+
+using cles::errc;
+using cles::verb;
+using namespace std::chrono_literals;
+
+constexpr std::string_view busy = R"({"error":"busy","message":"car2 has as many links as it may","retry_ms":1000})";
+
+/// What a router is told of the node that it asked.
+struct client final : cles::core::leg_events {
+    void on_result(std::size_t, std::string_view) override {}
+    void on_failure(std::size_t, cles::core::leg_failure why) override { failed = std::move(why); }
+    void on_progress(std::size_t, double, std::string_view) override {}
+    std::optional<cles::core::leg_failure> failed;
+};
+
+struct fixture {
+    fixture() { link.session().may_be_refused(); }
+
+    std::shared_ptr<cles::test::outcome> send(std::uint64_t id) {
+        auto [operation, result] = cles::test::record();
+        const auto now = node.clock.now();
+        link.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = id}, now + 5s, now,
+                                     std::move(operation));
+        return result;
+    }
+
+    cles::test::test_node node;
+    cles::test::test_link link{node};
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_SUITE(refused_link, fixture)
+
+BOOST_AUTO_TEST_CASE(all_that_was_asked_on_it_is_busy_when_it_ends) {
+    const auto one = send(1);
+    const auto two = send(2);
+    link.ask(busy);
+    BOOST_TEST(!one->ended);
+    link.half_close();
+    for (const auto& each : {one, two}) {
+        BOOST_TEST((each->code == errc::busy));
+        BOOST_TEST(each->text == "car2 has as many links as it may");
+    }
+    BOOST_TEST(node.counts().replies_dropped == 1U); // it answered none of them
+}
+
+BOOST_AUTO_TEST_CASE(the_end_may_be_a_reset_too) {
+    const auto one = send(1);
+    link.ask(busy);
+    link.reset();
+    BOOST_TEST((one->code == errc::busy));
+}
+
+BOOST_AUTO_TEST_CASE(empty_lines_do_not_count) {
+    const auto one = send(1);
+    link.ask("");
+    link.ask(std::string{busy} + "\r");
+    link.ask("");
+    link.half_close();
+    BOOST_TEST((one->code == errc::busy));
+}
+
+BOOST_AUTO_TEST_CASE(a_router_knows_that_the_work_was_not_begun_and_when_to_come_again) {
+    const auto asked = std::make_shared<client>();
+    const auto now = node.clock.now();
+    link.session().asking().send({.verb = verb::delegate, .noun = "car2:work", .id = 1}, now + 5s, now,
+                                 cles::detail::pending_ptr{new cles::core::leg(asked, 0)});
+    link.ask(busy);
+    link.half_close();
+    BOOST_REQUIRE(asked->failed.has_value());
+    BOOST_TEST(!asked->failed->begun);
+    BOOST_TEST((asked->failed->told.code == errc::busy));
+    BOOST_TEST(asked->failed->told.retry_ms.value_or(0) == 1000U);
+}
+
+BOOST_AUTO_TEST_CASE(with_another_line_it_is_a_link_like_any_other) {
+    const auto before = send(1);
+    link.ask("id=9 {}");
+    link.ask(busy);
+    link.half_close();
+    BOOST_TEST((before->code == errc::unavailable));
+
+    cles::test::test_link other{node};
+    other.session().may_be_refused();
+    auto [operation, after] = cles::test::record();
+    const auto now = node.clock.now();
+    other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 5s, now,
+                                  std::move(operation));
+    other.ask(busy);
+    other.ask("PULL car1:cles id=1");
+    other.half_close();
+    BOOST_TEST((after->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_CASE(other_failures_and_those_with_an_id_refuse_no_link) {
+    for (const std::string_view line :
+         {R"({"error":"denied","message":"no"})", R"(id=7 {"error":"busy","message":"no","retry_ms":5})",
+          R"({"error":"busy","message":"no","ran":true,"retry_ms":5})", R"({"error":"busy")", "[]", "{}"}) {
+        cles::test::test_link other{node};
+        other.session().may_be_refused();
+        auto [operation, result] = cles::test::record();
+        const auto now = node.clock.now();
+        other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 5s, now,
+                                      std::move(operation));
+        other.ask(line);
+        other.half_close();
+        BOOST_TEST((result->code == errc::unavailable), line);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_link_that_came_in_cannot_be_refused) {
+    cles::test::test_link other{node};
+    auto [operation, result] = cles::test::record();
+    const auto now = node.clock.now();
+    other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 5s, now,
+                                  std::move(operation));
+    other.ask(busy);
+    other.half_close();
+    BOOST_TEST((result->code == errc::unavailable));
+}
+
+BOOST_AUTO_TEST_SUITE_END()
