@@ -7,6 +7,7 @@
 #include "feed_command.hpp"
 #include "feed_events.hpp"
 #include "printer.hpp"
+#include "terminal.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -14,6 +15,8 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace tool {
 namespace {
@@ -28,10 +31,12 @@ struct bind_command {
 // Of `all:` it is told whose update it is.
 void show(printer& out, const bind_command& wanted, const cles::feed_item<cles::json_text>& item) {
     const auto seq = item.kind == cles::feed_event::update ? std::to_string(item.seq) : "-";
+    std::vector<json_cell> leading{{"seq", seq, true}};
     if (!wanted.feed.noun.starts_with("all:")) {
-        out.print(item.value.text, seq);
+        out.print(item.value.text, std::move(leading));
     } else if (resolved(wanted.format) == output_format::table) {
-        out.print(item.value.text, item.publisher + " " + seq);
+        leading.insert(leading.begin(), {"NODE", printable(item.publisher), false});
+        out.print(item.value.text, std::move(leading));
     } else {
         out.print(R"({"node":")" + item.publisher + R"(","seq":)" + seq + R"(,"update":)" + item.value.text + "}");
     }
@@ -71,6 +76,7 @@ void add_bind(CLI::App& app, context& shared) {
     command->callback([wanted, &shared] {
         wanted->feed.check();
         client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.is_multicast()};
+        asker.explain_failures_of(wanted->feed.noun);
         wanted->feed.arm(asker);
         shared.exit_code = asker.run(follow(asker, *wanted));
     });

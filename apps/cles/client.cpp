@@ -4,8 +4,11 @@
 #include "diagnostics.hpp"
 #include "exit_code.hpp"
 #include "failure.hpp"
+#include "json_node.hpp"
 #include "logging.hpp"
+#include "noun.hpp"
 #include "output.hpp"
+#include "suggestion.hpp"
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -14,7 +17,9 @@
 #include <csignal>
 #include <cstdlib>
 #include <exception>
+#include <map>
 #include <utility>
+#include <vector>
 
 #include <unistd.h>
 
@@ -41,14 +46,39 @@ cles::service_options options_of(const address_book& addresses, int verbosity, b
     return options;
 }
 
-bool is_no_target(const std::exception_ptr& thrown) {
+bool is(const std::exception_ptr& thrown, cles::errc code) {
+    if (!thrown) {
+        return false;
+    }
     try {
         std::rethrow_exception(thrown);
     } catch (const cles::error& e) {
-        return e.code() == cles::errc::no_target;
+        return e.code() == code;
     } catch (...) {
         return false;
     }
+}
+
+std::string without_digits(std::string_view name) {
+    std::string out{name};
+    std::erase_if(out, [](char c) { return c >= '0' && c <= '9'; });
+    return out;
+}
+
+// The verbs by which a node offers each of its tasks, from its answer to `PULL self:cles`.
+std::map<std::string, std::string> tasks_in(const std::string& description) {
+    std::map<std::string, std::string> verbs_of;
+    const auto about = parse_json(description);
+    const auto* tasks = about.find("tasks");
+    for (const auto& entry : tasks != nullptr ? tasks->elements : std::vector<json_node>{}) {
+        const auto* verb = entry.find("verb");
+        const auto* task = entry.find("task");
+        if (verb != nullptr && task != nullptr) {
+            auto& verbs = verbs_of[task->text];
+            verbs.append(verbs.empty() ? "" : ", ").append(verb->text);
+        }
+    }
+    return verbs_of;
 }
 
 } // namespace
@@ -87,10 +117,13 @@ int client::run(asio::awaitable<void> work) {
     std::exception_ptr thrown;
     wait_for_signal();
     watch_output();
-    asio::co_spawn(io_, std::move(work),
+    asio::co_spawn(io_, run_explained(std::move(work)),
                    asio::bind_cancellation_slot(cancel_.slot(), [this, &thrown](std::exception_ptr failure) {
                        finished_ = true;
                        thrown = std::move(failure);
+                       if (is(thrown, cles::errc::no_target)) {
+                           look_for_node();
+                       }
                        // What was sent to withdraw a request still leaves; nothing else is waited for.
                        node_.stop();
                        signals_.cancel();
@@ -105,10 +138,71 @@ int client::run(asio::awaitable<void> work) {
         return exit_code::success;
     }
     const auto code = report_failure(thrown);
-    if (code == exit_code::not_found && addresses_.finds_by_name() && is_no_target(thrown)) {
-        note("cles ls shows who is there; --at URL or --peer NAME=URL says where else to ask");
+    if (code == exit_code::not_found && addresses_.finds_by_name() && is(thrown, cles::errc::no_target)) {
+        const auto node = target_of(noun_);
+        hint_ += hint_.empty() ? "" : " ";
+        hint_ += node == "any" || node == "all"
+                     ? "any: and all: take a node that routes, such as clesd; --at URL says where one is"
+                     : "cles ls shows who is there; --at URL or --peer NAME=URL says where else to ask";
+    }
+    if (!hint_.empty()) {
+        note(hint_);
     }
     return code;
+}
+
+asio::awaitable<void> client::run_explained(asio::awaitable<void> work) {
+    std::exception_ptr thrown;
+    try {
+        co_await std::move(work);
+    } catch (...) {
+        thrown = std::current_exception();
+    }
+    if (!thrown) {
+        co_return;
+    }
+    if (!early_ && is(thrown, cles::errc::no_task)) {
+        co_await look_for_task();
+    }
+    std::rethrow_exception(thrown);
+}
+
+asio::awaitable<void> client::look_for_task() {
+    const std::string node{target_of(noun_)};
+    if (node.empty() || node == "any" || node == "all") {
+        co_return;
+    }
+    const auto task = noun_.substr(node.size() + 1, noun_.find('/') - node.size() - 1);
+    try {
+        const auto options = options_for(node, 500ms);
+        const cles::json_text about = co_await node_.async_pull(node + ":cles", options);
+        const auto offered = tasks_in(about.text);
+        std::vector<std::string> names;
+        for (const auto& [name, verbs] : offered) {
+            names.push_back(name);
+        }
+        if (const auto near = closest(task, names); !near.empty()) {
+            hint_ = "did you mean '" + node + ":" + near + "' (" + offered.at(near) + ")?";
+        }
+    } catch (const std::exception&) {
+        hint_.clear(); // the failure itself is what counts
+    }
+}
+
+void client::look_for_node() {
+    std::vector<std::string> names;
+    for (const auto& other : node_.peers()) {
+        names.push_back(other.node);
+    }
+    for (const auto& [name, url] : addresses_.peers()) {
+        names.push_back(name);
+    }
+    // car9 is another node than car1, not a mistyped one.
+    const auto typed = without_digits(target_of(noun_));
+    std::erase_if(names, [&](const std::string& name) { return without_digits(name) == typed; });
+    if (const auto near = closest(target_of(noun_), names); !near.empty()) {
+        hint_ = "did you mean '" + near + "'?";
+    }
 }
 
 std::string client::where_is(std::string_view node) const {

@@ -36,6 +36,10 @@ class client {
     /// The URL at which that node is asked, once it has answered.
     [[nodiscard]] std::string where_is(std::string_view node) const;
 
+    /// Where a request for this noun fails because there is no such task, the node is asked what it offers, so that the
+    /// task that was probably meant can be named.
+    void explain_failures_of(std::string_view noun) { noun_ = noun; }
+
     /// Ends the work, with this exit code.
     void end(int code) { end_early(code); }
     /// Ends the work, with success, when so much time has gone.
@@ -48,6 +52,9 @@ class client {
     int run(boost::asio::awaitable<void> work);
 
   private:
+    boost::asio::awaitable<void> run_explained(boost::asio::awaitable<void> work);
+    boost::asio::awaitable<void> look_for_task();
+    void look_for_node();
     void end_early(int code);
     void wait_for_signal();
     void watch_output();
@@ -60,6 +67,8 @@ class client {
     boost::asio::steady_timer sleep_timer_;
     boost::asio::cancellation_signal cancel_;
     cles::service node_;
+    std::string noun_;
+    std::string hint_; ///< what was probably meant
     std::optional<int> early_;
     bool finished_ = false; // what has expired or come in by then cannot be cancelled any more
 };

@@ -23,5 +23,6 @@ void add_top(CLI::App& app, context& shared);
 void add_doctor(CLI::App& app, context& shared);
 void add_completion(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);
+void add_help(CLI::App& app, context& shared);
 
 } // namespace tool

@@ -12,7 +12,7 @@
 namespace tool {
 
 void add_noun(CLI::App& command, std::string& noun) {
-    command.add_option("noun", noun, "NODE:TASK or NODE:TASK/PARAMETER...; NODE may be self: whoever listens there")
+    command.add_option("noun", noun, "NODE:TASK or NODE:TASK/PARAMETER...; NODE may be self, any or all")
         ->required()
         ->type_name("");
 }

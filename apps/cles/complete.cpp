@@ -74,7 +74,7 @@ class live_search {
         const auto colon = here_.typed.find(':');
         if (colon == std::string::npos) {
             auto out = names(":");
-            out.push_back({"self:", "whoever listens there"});
+            out.push_back({"self:", "the node at the address that is asked"});
             out.push_back({"any:", "one that offers the task"});
             out.push_back({"all:", "all that offer the task"});
             return out;

@@ -29,8 +29,9 @@ const net_interface* better_than_loopback(const std::vector<net_interface>& all)
 
 // What two machines take, by this interface of this one.
 std::string for_other_hosts(const net_interface& by, const cles::multicast_options& where) {
-    return "to reach other hosts: CLES_MULTICAST=" + by.name + " (there their own interface), nodes with --listen tcp://" +
-           by.address + " --insecure, and UDP port " + std::to_string(where.port) + " open";
+    return "to reach other hosts: CLES_MULTICAST=" + by.name +
+           " (there their own interface), nodes with --listen tcp://" + by.address + " --insecure, and UDP port " +
+           std::to_string(where.port) + " open";
 }
 
 void check_chosen(const cles::multicast_options& where, const std::vector<net_interface>& all, findings& found) {

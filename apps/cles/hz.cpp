@@ -189,6 +189,7 @@ void add_hz(CLI::App& app, context& shared) {
     command->callback([wanted, &shared] {
         wanted->feed.check();
         client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.is_multicast()};
+        asker.explain_failures_of(wanted->feed.noun);
         wanted->feed.arm(asker);
         rate_meter meter{asker, *wanted};
         shared.exit_code = asker.run(meter.run());

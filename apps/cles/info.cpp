@@ -119,8 +119,7 @@ asio::awaitable<void> show(client& asker, const info_command& wanted) {
 void add_info(CLI::App& app, context& shared) {
     auto wanted = std::make_shared<info_command>();
     auto* command = app.add_subcommand("info", "Show what a node is and what it offers");
-    command->add_option("node", wanted->node, "A node's name or a URL (default: whoever listens at --at)")
-        ->type_name("");
+    command->add_option("node", wanted->node, "A node's name or a URL (default: the node at --at)")->type_name("");
     wanted->addresses.add_options(*command);
     add_timeout(*command, wanted->timeout, "5s");
     add_output_option(*command, wanted->format);

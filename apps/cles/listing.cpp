@@ -220,7 +220,7 @@ std::string to_table(const std::vector<listed_node>& nodes, bool tasks) {
         out.row();
         out.set(0, printable(node.node));
         out.set(1, printable(node.state));
-        out.set(2, to_text(node.load));
+        out.set(2, to_text(node.load), true);
         out.set(3, node.age_ms ? to_text(std::chrono::milliseconds{*node.age_ms}) + " ago" : "now");
         out.set(4, node.endpoints.empty() ? "-" : joined(node.endpoints));
         if (tasks) {

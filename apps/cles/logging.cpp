@@ -2,6 +2,7 @@
 #include "logging.hpp"
 
 #include "terminal.hpp"
+#include "wire_log.hpp"
 
 #include <spdlog/logger.h>
 #include <spdlog/sinks/ansicolor_sink.h>
@@ -36,17 +37,24 @@ cles::log_sink make_log(spdlog::level::level_enum least) {
     };
 }
 
+cles::log_sink with_wire(cles::log_sink log, int verbosity) {
+    if (verbosity >= 2) {
+        log_wire(log);
+    }
+    return log;
+}
+
 } // namespace
 
 cles::log_sink log_of_client(int verbosity) {
     if (verbosity == 0) {
         return {};
     }
-    return make_log(verbosity == 1 ? spdlog::level::info : spdlog::level::debug);
+    return with_wire(make_log(verbosity == 1 ? spdlog::level::info : spdlog::level::debug), verbosity);
 }
 
 cles::log_sink log_of_server(int verbosity) {
-    return make_log(verbosity == 0 ? spdlog::level::info : spdlog::level::debug);
+    return with_wire(make_log(verbosity == 0 ? spdlog::level::info : spdlog::level::debug), verbosity);
 }
 
 } // namespace tool

@@ -7,10 +7,11 @@ namespace tool {
 
 // The library's words go to stderr, in colour where that is a terminal and NO_COLOR is not set.
 
-/// A client tells nothing unless asked (-v: what happens, -vv: everything), since failures are reported anyway.
+/// A client logs nothing unless asked, since failures are reported anyway. -v: what happens. -vv: everything, and from
+/// now on each line that is sent or received on links.
 cles::log_sink log_of_client(int verbosity);
 
-/// A server says what happens, and everything with -v.
+/// A server logs what happens, with -v everything, and with -vv the lines too.
 cles::log_sink log_of_server(int verbosity);
 
 } // namespace tool

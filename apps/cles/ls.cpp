@@ -92,7 +92,7 @@ void check_offered(const std::string& text) {
 
 void add_ls(CLI::App& app, context& shared) {
     auto wanted = std::make_shared<ls_command>();
-    auto* command = app.add_subcommand("ls", "List the nodes that are there");
+    auto* command = app.add_subcommand("ls", "List the nodes on the network");
     command->add_flag("-l,--tasks", wanted->tasks, "Ask each node what it offers");
     command->add_option("--offers", wanted->offered, "Only nodes that offer this task: TASK, or VERB:TASK")
         ->type_name("TASK");

@@ -8,6 +8,7 @@
 #include "diagnostics.hpp"
 #include "exit_code.hpp"
 #include "failure.hpp"
+#include "help.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -15,6 +16,7 @@
 
 #include <csignal>
 #include <exception>
+#include <iostream>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -42,9 +44,23 @@ int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
     } catch (const CLI::Success& asked) { // --help, --version
         return app.exit(asked);
     } catch (const CLI::ParseError& wrong) {
-        const auto unknown = app.get_subcommands().empty() ? app.remaining() : std::vector<std::string>{};
-        tool::complain(unknown.empty() ? std::string{wrong.what()} : "there is no command '" + unknown.front() + "'");
-        tool::note("cles --help, or cles COMMAND --help, says what there is");
+        const auto commands = app.get_subcommands();
+        const auto unknown = app.remaining(true);
+        if (commands.empty() && unknown.empty()) {
+            tool::complain(wrong.what());
+            std::cerr << '\n' << tool::overview_of(app);
+            return tool::exit_code::usage;
+        }
+        if (commands.empty()) {
+            tool::refuse_command(app, unknown.front());
+        } else {
+            tool::complain(wrong.what());
+            for (const auto& word : unknown) {
+                tool::suggest_option(app, *commands.front(), word);
+            }
+        }
+        tool::note(commands.empty() ? "cles help lists the commands"
+                                    : "cles help " + commands.front()->get_name() + " shows its options");
         return tool::exit_code::usage;
     }
 }
@@ -61,7 +77,7 @@ int main(int argc, char** argv) {
         app.fallthrough();
         app.require_subcommand(1);
         app.set_version_flag("--version", "cles " + std::string{cles::version});
-        app.add_flag("-v,--verbose", shared.verbosity, "Say more on stderr; twice: everything");
+        app.add_flag("-v,--verbose", shared.verbosity, "Say more on stderr; twice: also every line sent and received");
         tool::add_pull(app, shared);
         tool::add_push(app, shared);
         tool::add_delegate(app, shared);
@@ -75,6 +91,7 @@ int main(int argc, char** argv) {
         tool::add_doctor(app, shared);
         tool::add_completion(app, shared);
         tool::add_serve(app, shared);
+        tool::add_help(app, shared);
 #ifdef CLES_WITH_BENCH
         tool::add_bench(app, shared.exit_code);
 #endif

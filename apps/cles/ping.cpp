@@ -194,8 +194,7 @@ void aim(ping_command& wanted) {
 void add_ping(CLI::App& app, context& shared) {
     auto wanted = std::make_shared<ping_command>();
     auto* command = app.add_subcommand("ping", "Measure round trips of a small PULL");
-    command->add_option("target", wanted->target, "A URL, or a node's name (default: whoever listens at --at)")
-        ->type_name("");
+    command->add_option("target", wanted->target, "A URL, or a node's name (default: the node at --at)")->type_name("");
     wanted->addresses.add_options(*command);
     add_timeout(*command, wanted->timeout, "5s");
     add_count(*command, wanted->count, "How often; 0: until interrupted (default 4)");

@@ -12,6 +12,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 
 namespace tool {
 
@@ -33,11 +34,11 @@ output_format resolved(output_format format) {
     return is_terminal(stream::out) ? output_format::table : output_format::json;
 }
 
-void printer::print(std::string_view json, std::string_view seq) {
+void printer::print(std::string_view json, std::vector<json_cell> leading) {
     std::string text;
     switch (format_) {
     case output_format::raw: text.append(json).append("\n"); break;
-    case output_format::table: text = stream_ ? rows_.add(json, seq) : to_table(json); break;
+    case output_format::table: text = stream_ ? rows_.add(json, std::move(leading)) : to_table(json); break;
     case output_format::json:
     case output_format::automatic:
         cles::append_compact_json(json, text);

@@ -4,6 +4,7 @@
 #include "table.hpp"
 
 #include <string_view>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -25,8 +26,8 @@ class printer {
     /// `stream`: several documents are to come, so a table has one header, and a row for each.
     printer(output_format format, bool stream) : format_(resolved(format)), stream_(stream) {}
 
-    /// `seq`, where not empty, is put in front of a row of a table.
-    void print(std::string_view json, std::string_view seq = {});
+    /// `leading` is put in front of a row of a table.
+    void print(std::string_view json, std::vector<json_cell> leading = {});
 
   private:
     output_format format_;

@@ -7,17 +7,50 @@
 #include "context.hpp"
 #include "noun.hpp"
 #include "progress_line.hpp"
+#include "router_search.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
+#include <exception>
 #include <memory>
+#include <utility>
+#include <vector>
 
 namespace tool {
 
 namespace asio = boost::asio;
 
 struct request_loop {
+    /// By the first node that routes, where one has to be found: the others refuse before anything is begun.
+    static asio::awaitable<cles::json_text> ask(client& asker, const std::string& command, cles::call_options& options,
+                                                std::vector<std::string>& routers) {
+        std::exception_ptr first_failure; // of the one that most likely routes
+        const auto candidates = std::exchange(routers, {});
+        for (const auto& url : candidates) {
+            options.at(url); // and from now on, where it answers
+            try {
+                cles::json_text answer = co_await asker.node().async_request(command, options);
+                co_return answer;
+            } catch (const cles::error& e) {
+                if (!is_refused_by_route(e)) {
+                    throw;
+                }
+                first_failure = first_failure ? first_failure : std::current_exception();
+            }
+        }
+        if (first_failure) {
+            std::rethrow_exception(first_failure);
+        }
+        cles::json_text answer = co_await asker.node().async_request(command, options);
+        co_return answer;
+    }
+
+    /// The node does not route, or is not there: another one may.
+    static bool is_refused_by_route(const cles::error& e) {
+        return e.code() == cles::errc::no_target || e.code().category() != cles::error_category();
+    }
+
     static asio::awaitable<void> run(client& asker, const request_command& wanted, std::string command) {
         printer out{wanted.format_, wanted.count_ != 1};
         progress_line progress{wanted.progress_};
@@ -27,13 +60,18 @@ struct request_loop {
             options.on_progress(
                 [&progress](double fraction, std::string_view details) { progress.show(fraction, details); });
         }
+        std::vector<std::string> routers;
+        if (needs_router(wanted.addresses_, wanted.noun_)) {
+            auto found = co_await possible_routers(asker);
+            routers = std::move(found);
+        }
         auto next = std::chrono::steady_clock::now();
         for (std::uint64_t i = 0; wanted.count_ == 0 || i < wanted.count_; ++i) {
             if (i > 0 && wanted.interval_.count() > 0) {
                 next += wanted.interval_;
                 co_await asker.sleep_until(next);
             }
-            const cles::json_text answer = co_await asker.node().async_request(command, options);
+            const cles::json_text answer = co_await ask(asker, command, options, routers);
             progress.clear();
             out.print(answer.text);
         }
@@ -69,6 +107,7 @@ int request_command::run() {
         command.append(" ").append(read_body(*body_));
     }
     client asker{addresses_, shared_.verbosity};
+    asker.explain_failures_of(noun_);
     return asker.run(request_loop::run(asker, *this, std::move(command)));
 }
 

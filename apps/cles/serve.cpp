@@ -111,7 +111,7 @@ int serve(const serve_command& wanted, int verbosity) {
 
 void add_serve(CLI::App& app, context& shared) {
     auto wanted = std::make_shared<serve_command>();
-    auto* command = app.add_subcommand("serve", "Run a node to play with");
+    auto* command = app.add_subcommand("serve", "Run a node to experiment with");
     command->add_option("--name", wanted->name, "What the node is called (default car1)")->type_name("NAME");
     command->add_option("--pool", wanted->pool, "To which pool it belongs; others are not known (default CLES_POOL)")
         ->type_name("NAME");

@@ -25,17 +25,29 @@ void append_line(std::string& out, std::string line, bool is_header) {
     out.append(is_header ? bold(stream::out, line) : line).append("\n");
 }
 
+// Values are aligned as a column is: at the right where all are numbers.
 std::string key_value_lines(const std::vector<json_cell>& cells) {
     std::size_t width = 0;
+    std::size_t value_width = 0;
+    bool numbers = true;
     for (const auto& cell : cells) {
         width = std::max(width, width_of(cell.path));
+        value_width = std::max(value_width, width_of(cell.text));
+        numbers = numbers && cell.is_number;
     }
     std::string out;
     for (const auto& cell : cells) {
-        out.append(bold(stream::out, cell.path)).append(width - width_of(cell.path) + gap, ' ').append(cell.text);
-        out.append("\n");
+        out.append(bold(stream::out, cell.path)).append(width - width_of(cell.path) + gap, ' ');
+        out.append(numbers ? padded(cell.text, value_width, true) : cell.text).append("\n");
     }
     return out;
+}
+
+// What follows may be somewhat longer: a decimal with more digits, a counter that has grown.
+std::size_t room_for(const json_cell& cell) {
+    constexpr std::size_t more_digits = 3;
+    const bool grows = cell.text.find('.') != std::string::npos || cell.text.size() > 2 * more_digits;
+    return width_of(cell.text) + (cell.is_number && grows ? more_digits : 0);
 }
 
 std::string object_text(json_node object) {
@@ -126,7 +138,21 @@ std::string to_table(std::string_view json) {
     return out;
 }
 
-std::string row_view::add(std::string_view json, std::string_view first) {
+bool row_view::fits(const std::vector<json_cell>& cells) const {
+    return std::equal(
+        cells.begin(), cells.end(), heads_.begin(), heads_.end(),
+        [](const json_cell& cell, const head& h) { return cell.path == h.title && width_of(cell.text) <= h.width; });
+}
+
+std::string row_view::line_of(const std::vector<json_cell>& cells) const {
+    std::string line;
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+        line += padded(cells[i].text, heads_[i].width, heads_[i].numbers) + std::string(gap, ' ');
+    }
+    return line;
+}
+
+std::string row_view::add(std::string_view json, std::vector<json_cell> leading) {
     auto node = parse_json(json);
     if (node.kind != json_node::type::object) {
         json_node holder{.kind = json_node::type::object};
@@ -137,29 +163,25 @@ std::string row_view::add(std::string_view json, std::string_view first) {
     if (cells.empty()) {
         return std::string{json} + "\n";
     }
-    if (!first.empty()) {
-        cells.insert(cells.begin(), {"seq", std::string{first}, true});
-    }
+    cells.insert(cells.begin(), std::make_move_iterator(leading.begin()), std::make_move_iterator(leading.end()));
 
     std::string out;
-    const bool same = std::equal(cells.begin(), cells.end(), heads_.begin(), heads_.end(),
-                                 [](const json_cell& cell, const head& h) { return cell.path == h.title; });
-    if (!same) {
+    if (!fits(cells)) {
         out.append(heads_.empty() ? "" : "\n");
-        heads_.clear();
-        std::string line;
+        std::vector<json_cell> titles;
+        std::vector<head> heads;
         for (const auto& cell : cells) {
-            heads_.push_back({cell.path, std::max(width_of(cell.path), width_of(cell.text))});
-            line += padded(cell.path, heads_.back().width + gap, false);
+            // A column that has been wider stays so, or rows of several publishers would repeat the header for ever.
+            const auto before =
+                std::find_if(heads_.begin(), heads_.end(), [&](const head& h) { return h.title == cell.path; });
+            const auto width = before == heads_.end() ? 0 : before->width;
+            heads.push_back({cell.path, std::max({width_of(cell.path), room_for(cell), width}), cell.is_number});
+            titles.push_back({cell.path, cell.path, false});
         }
-        append_line(out, std::move(line), true);
+        heads_ = std::move(heads);
+        append_line(out, line_of(titles), true);
     }
-    std::string line;
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-        heads_[i].width = std::max(heads_[i].width, width_of(cells[i].text));
-        line += padded(std::move(cells[i].text), heads_[i].width + gap, false);
-    }
-    append_line(out, std::move(line), false);
+    append_line(out, line_of(cells), false);
     return out;
 }
 

@@ -37,17 +37,22 @@ table table_of(const json_node& objects);
 /// A JSON document for people: an object as "key  value" lines, and arrays of objects, in it or alone, as tables.
 std::string to_table(std::string_view json);
 
-/// Documents that follow each other as rows under one header, which is repeated when their keys change.
+/// Documents that follow each other as rows under one header, which is repeated when their keys change, and when a
+/// value is wider than its column.
 class row_view {
   public:
-    /// The document's lines. `first` is put before its values under the title "seq" where it is not empty.
-    std::string add(std::string_view json, std::string_view first = {});
+    /// The document's lines, with these cells before its own values.
+    std::string add(std::string_view json, std::vector<json_cell> leading = {});
 
   private:
     struct head {
         std::string title;
-        std::size_t width;
+        std::size_t width = 0;
+        bool numbers = false; ///< aligned at the right
     };
+
+    [[nodiscard]] bool fits(const std::vector<json_cell>& cells) const;
+    [[nodiscard]] std::string line_of(const std::vector<json_cell>& cells) const;
 
     std::vector<head> heads_;
 };

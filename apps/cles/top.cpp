@@ -152,7 +152,7 @@ asio::awaitable<void> watch(client& asker, const top_command& wanted) {
 
 void add_top(CLI::App& app, context& shared) {
     auto wanted = std::make_shared<top_command>();
-    auto* command = app.add_subcommand("top", "Watch what the nodes have to do");
+    auto* command = app.add_subcommand("top", "Watch the load of the nodes");
     command
         ->add_option_function<std::string>(
             "-i,--interval",

@@ -27,6 +27,17 @@ double work_per_worker(const top_row& row) {
 
 std::string or_dash(const std::optional<double>& value, int digits) { return value ? fixed(*value, digits) : "-"; }
 
+// With the unit that keeps it short: "6.1 us", "3.22 s".
+std::string span_or_dash(const std::optional<double>& us) {
+    if (!us) {
+        return "-";
+    }
+    if (*us < 999.95) {
+        return fixed(*us, 1) + " us";
+    }
+    return *us < 999'995 ? fixed(*us / 1e3, 2) + " ms" : fixed(*us / 1e6, 2) + " s";
+}
+
 void add(cles::json_writer& w, std::string_view name, const std::optional<double>& value) {
     if (value) {
         w.key(name);
@@ -63,7 +74,7 @@ std::string summary_of(const std::vector<top_row>& rows) {
 std::string to_table(const std::vector<top_row>& rows) {
     table out;
     for (const char* title :
-         {"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50 us", "P99 us", "HEARD"}) {
+         {"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50", "P99", "HEARD"}) {
         out.column(title);
     }
     const auto number = [&](std::size_t column, std::string text) { out.set(column, std::move(text), true); };
@@ -77,8 +88,8 @@ std::string to_table(const std::vector<top_row>& rows) {
         number(4, node.load ? std::to_string(node.load->queued) : "-");
         number(5, or_dash(row.rate.requests, 0));
         number(6, or_dash(row.rate.errors, 0));
-        number(7, or_dash(row.rate.p50_us, 1));
-        number(8, or_dash(row.rate.p99_us, 1));
+        number(7, span_or_dash(row.rate.p50_us));
+        number(8, span_or_dash(row.rate.p99_us));
         auto heard = node.age_ms ? to_text(std::chrono::milliseconds{*node.age_ms}) + " ago" : std::string{"now"};
         out.set(9, node.error.empty() ? std::move(heard) : heard + " (" + printable(node.error) + ")");
     }

@@ -35,8 +35,8 @@ link_transport* find_transport(std::string_view scheme) {
     return found == transports().end() ? nullptr : found->second.get();
 }
 
-void register_transport(std::string_view scheme, std::unique_ptr<link_transport> carrier) {
-    transports().insert_or_assign(std::string{scheme}, std::move(carrier));
+std::unique_ptr<link_transport> register_transport(std::string_view scheme, std::unique_ptr<link_transport> carrier) {
+    return std::exchange(transports()[std::string{scheme}], std::move(carrier));
 }
 
 } // namespace cles

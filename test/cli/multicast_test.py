@@ -63,7 +63,8 @@ class Loopback(Processes):
         self.assertIn("utc", json.loads(out.splitlines()[0]))
         code, out, _ = cles("bind", "all:localization", "--multicast", self.where(), "-n", "1", "-o", "table")
         self.assertEqual(code, 0)
-        self.assertRegex(out.splitlines()[1], r"^car[12] \d+ ")
+        self.assertEqual(out.splitlines()[0].split()[:3], ["NODE", "seq", "utc"])
+        self.assertRegex(out.splitlines()[1], r"^car[12] +\d+ ")
 
     def test_hz(self):
         self.serve("car1", "--multicast", self.where(), "--rate", "50")

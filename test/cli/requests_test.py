@@ -93,9 +93,35 @@ class Answers(NodeTest):
         self.assertEqual(self.run_ok("push", "car1:echo", "-o", "table"), "{}\n")
         out = self.run_ok("push", "car1:echo", "-d", '{"key":"abc","n":7}', "-o", "table", "-n", "2", "-i", "0")
         self.assertEqual(out, "key  n\nabc  7\nabc  7\n")
+        out = self.run_ok("push", "car1:echo", "-d", '{"a":7,"bc":1234.5,"d":-3}', "-o", "table")
+        self.assertEqual(out, "a        7\nbc  1234.5\nd       -3\n")  # nothing but numbers
+
+    def test_the_wire_is_shown(self):
+        code, out, err = self.run_at("pull", "car1:echo/x", "-vv")
+        self.assertEqual((code, out), (0, '{"parameters":["x"]}\n'))
+        self.assertRegex(err, rf"debug   > {self.node.url} PULL car1:echo/x id=1( .*)?\n")
+        self.assertRegex(err, rf'debug   < {self.node.url} id=1 {{"parameters":\["x"\]}}\n')
+        code, out, err = cles("push", "car1:echo", "-d", '{"a":"%s"}' % ("x" * 5000), "-vv", "--at", self.node.unix)
+        self.assertEqual(code, 0)
+        self.assertRegex(err, r"> unix://\S+ PUSH car1:echo .*x\.\.\. and \d+ more bytes\n")
+        self.assertNotIn("> ", self.run_at("pull", "car1:echo/x", "-v")[2])
 
 
 class Failures(NodeTest):
+    def test_the_task_that_was_probably_meant(self):
+        for verb, task, says in (("pull", "localisation", "did you mean 'car1:localization' (PULL, BIND)?"),
+                                 ("bind", "notic", "did you mean 'car1:notice' (BIND, UPDATE)?")):
+            code, out, err = self.run_at(verb, f"car1:{task}")
+            self.assertEqual((code, out), (3, ""))
+            self.assertIn("cles: no_task: ", err)
+            self.assertIn(f"\ncles: {says}\n", err)
+        self.assertEqual(self.run_at("pull", "car1:speed")[2].count("\n"), 1)
+
+    def test_the_node_that_was_probably_meant(self):
+        code, _, err = cles("pull", "cra1:echo", "--peer", f"car1={self.node.url}", "--at", self.node.url)
+        self.assertEqual(code, 3)
+        self.assertIn("did you mean 'car1'?", err)
+
     def check(self, arguments, code, start_of_error):
         got, out, err = self.run_at(*arguments)
         self.assertEqual((got, out), (code, ""), err)

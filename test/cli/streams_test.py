@@ -105,6 +105,26 @@ class Feeds(unittest.TestCase):
             process.send_signal(signal.SIGINT)
             self.assertEqual(finish(process)[0], 130)
 
+    def test_a_table_is_as_wide_as_what_comes(self):
+        values = ('{"name":"a","v":1.5}', '{"name":"b","v":-22.25}', '{"name":"longer","v":3}', '{"name":"c","v":4.125}')
+
+        def answer(line, send):
+            if line.startswith("BIND"):
+                send(id_of(line) + "{}")
+                for n, value in enumerate(values, 9):
+                    send(f"UPDATE car1:x seq={n} epoch=00000001 {value}")
+
+        with ScriptedNode(answer) as node:
+            code, out, _ = cles("bind", "car1:x", "-n", "4", "-o", "table", "--at", node.url)
+        self.assertEqual(code, 0)
+        self.assertEqual(out, "seq  name       v\n"
+                              "  9  a        1.5\n"
+                              " 10  b     -22.25\n"
+                              "\n"
+                              "seq  name         v\n"
+                              " 11  longer       3\n"
+                              " 12  c        4.125\n")
+
     def test_refused(self):
         with ScriptedNode(lambda line, send: send(id_of(line) + '{"error":"busy","message":"full"}')) as node:
             code, out, err = cles("bind", "car1:x", "--at", node.url)

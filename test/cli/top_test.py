@@ -6,7 +6,7 @@ import json
 import signal
 import unittest
 
-from support import Node, cles, environment, finish, free_port, on_terminal, read_line, start
+from support import Node, ScriptedNode, cles, environment, finish, free_port, id_of, on_terminal, read_line, start
 
 
 GROUP = f"lo,239.255.25.37:{free_port()}"
@@ -77,7 +77,7 @@ class Top(unittest.TestCase):
         self.assertEqual((code, err), (0, ""))
         first, second = out.split("\n\n")
         self.assertEqual(first.splitlines()[0].split(), ["NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S",
-                                                         "ERR/S", "P50", "us", "P99", "us", "HEARD"])
+                                                         "ERR/S", "P50", "P99", "HEARD"])
         self.assertRegex(first.splitlines()[1], r"^car1 +live +- +0 +0 +- +- ")
         self.assertRegex(second.splitlines()[1], r"^car1 +live +- +0 +0 +0 +0 ")
 
@@ -98,6 +98,26 @@ class Top(unittest.TestCase):
         code, shown = on_terminal("top", "-n", "1", env={**ENVIRONMENT, "TERM": "dumb"})
         self.assertEqual(code, 0)
         self.assertTrue(shown.startswith("NODE "), shown)
+
+
+class Spans(unittest.TestCase):
+    def show(self, p99):
+        """The table of a node whose handlers took so many microseconds."""
+        handlers = {"samples": 2, "p50": 6.143, "p99": p99}
+
+        def answer(line, send):
+            replies = {"metrics": {"requests": {"PULL": 1}, "errors": 0, "handler_us": handlers}, "peers": {"peers": []},
+                       "cles": {"node": "car9", "epoch": "00000001", "endpoints": [node.url]}}
+            send(id_of(line) + json.dumps(next(reply for word, reply in replies.items() if word in line)))
+
+        with ScriptedNode(answer) as node:
+            code, out, err = cles("top", "-n", "1", "-o", "table", "--at", node.url)
+        self.assertEqual(code, 0, err)
+        return out
+
+    def test_a_span_has_the_unit_that_keeps_it_short(self):
+        for p99, shown in ((3221225.5, "3.22 s"), (12345.6, "12.35 ms"), (999.9, "999.9 us")):
+            self.assertRegex(self.show(p99), rf" 6\.1 us +{shown} ")
 
 
 class Failures(unittest.TestCase):

@@ -99,6 +99,30 @@ class Usage(unittest.TestCase):
             self.assertIn(f"cles {command}", text)
         self.assertIn("Exit codes:", out)
 
+    def test_help_as_a_command(self):
+        self.assertEqual(cles("help"), cles("--help"))
+        for command in (*COMMANDS, "help"):
+            self.assertEqual(cles("help", command), cles(command, "--help"))
+        self.refused("help", "pul", says="did you mean 'cles pull'?")
+
+    def test_nothing_at_all_shows_what_there_is(self):
+        code, out, err = cles()
+        self.assertEqual((code, out), (2, ""))
+        for command in COMMANDS:
+            self.assertIn(f"  {command} ", err)
+
+    def test_what_was_probably_meant(self):
+        for typed, meant in (("pul", "pull"), ("bnid", "bind"), ("subscribe", None), ("del", "delegate"), ("lst", "ls")):
+            code, _, err = cles(typed, "car1:a")
+            self.assertEqual(code, 2)
+            self.assertEqual(f"did you mean 'cles {meant}'?" in err, meant is not None, err)
+        for command, typed, meant in (("bind", "--ever", "--every"), ("pull", "--timout=2s", "--timeout"),
+                                      ("ls", "--verbos", "--verbose")):
+            self.refused(command, "car1:a", typed, says=f"did you mean '{meant}'?")
+        code, _, err = cles("pull", "car1:a", "--colour")
+        self.assertEqual(code, 2)
+        self.assertNotIn("did you mean", err)
+
     def test_version(self):
         code, out, err = cles("--version")
         self.assertEqual((code, err), (0, ""))

@@ -258,6 +258,7 @@ false
 ```
 """
 BAD = [("```console\n$ echo one\ntwo\n```\n", "+one"), ("```console any-numbers\n$ echo 1 b\n1 c\n```\n", "+1 b"),
+       ("```console any-numbers\n$ echo version 1.0.0\nversion 0.1.0\n```\n", "+version 1.0.0"),
        ("```sh\nfalse\n```\n", "ended with 1"),
        ("```sh no-test\ntrue\n```\n", "needs a reason"), ("```sh host-1\ntrue\n```\n```sh\ntrue\n```\n", "on which host"), ("```console\necho\n```\n", "begins with '$ '")]
 

@@ -124,6 +124,7 @@ class link_transport {
 /// The transport of a scheme, or null.
 link_transport* find_transport(std::string_view scheme);
 /// Adds a transport for the life of the process. To be called before any service is made.
-void register_transport(std::string_view scheme, std::unique_ptr<link_transport> carrier);
+/// \return the one whose place it takes, which it may wrap; null where there was none
+std::unique_ptr<link_transport> register_transport(std::string_view scheme, std::unique_ptr<link_transport> carrier);
 
 } // namespace cles
