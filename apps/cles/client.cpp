@@ -178,6 +178,7 @@ asio::awaitable<void> client::look_for_task() {
         const cles::json_text about = co_await node_.async_pull(node + ":cles", options);
         const auto offered = tasks_in(about.text);
         std::vector<std::string> names;
+        names.reserve(offered.size());
         for (const auto& [name, verbs] : offered) {
             names.push_back(name);
         }

@@ -15,9 +15,9 @@
  *
  * - Text is UTF-8, a pointer and a length, not ended by a zero. JSON is text that holds one value. What is handed to a
  *   function is borrowed until that function returns; whoever wants to keep it copies it. That holds both ways.
- * - Functions of the host may be called from any thread, but for `add_task`, which is for `start` alone, and `refuse` and
- *   `refuse_setting`, which are for `start` and `check`.
- *   The host and its functions stay valid until the process ends, and so does the loaded library.
+ * - Functions of the host may be called from any thread, but for `add_task`, which is for `start` alone, and `refuse`
+ * and `refuse_setting`, which are for `start` and `check`. The host and its functions stay valid until the process
+ * ends, and so does the loaded library.
  * - A handle of a job that has been answered, or never was, is harmless: the call does nothing and is counted.
  * - No exception may leave a function of the plugin. (One that does is caught where the compilers allow it.)
  * - A structure begins with its size as whoever filled it knew it, so that later versions append members: read none
@@ -126,11 +126,11 @@ typedef struct cles_ask {
     int64_t deadline_ms; /* 0, and at most: what is left of the job's own */
     cles_text at;        /* a link's URL, instead of asking the directory; may be empty */
     /*
-     * Called once, from a thread of the host, and never before `delegate` returns: also where the job was withdrawn meanwhile ("cancelled") or the node
-     * stops ("unavailable", also after the plugin's `stop`). The job's own code alone can keep it from being called:
-     * it comes after `start` of its job, and after callbacks that came first, once these have returned. `code` is
-     * empty on success; otherwise the error's name on the wire ("busy", "deadline", "no_task" ...), `json` is {} then,
-     * and `message` the peer's own words.
+     * Called once, from a thread of the host, and never before `delegate` returns: also where the job was withdrawn
+     * meanwhile ("cancelled") or the node stops ("unavailable", also after the plugin's `stop`). The job's own code
+     * alone can keep it from being called: it comes after `start` of its job, and after callbacks that came first, once
+     * these have returned. `code` is empty on success; otherwise the error's name on the wire ("busy", "deadline",
+     * "no_task" ...), `json` is {} then, and `message` the peer's own words.
      */
     void (*answered)(void* user, cles_text code, cles_text json, cles_text message);
     /* Null, or called for each report of a DELEGATE's progress before it is answered: a fraction from 0 to 1. */
@@ -204,8 +204,8 @@ typedef struct cles_plugin {
     /* Since 1.1. */
     /*
      * Looks whether `start` could do with this configuration, and does nothing else: it opens nothing and adds no task.
-     * 0; or not 0, after `refuse_setting` or `refuse`. May be null. Called in a process of its own, before `start` and by
-     * `clesd --check`; of the host's functions it may call those two and `log`.
+     * 0; or not 0, after `refuse_setting` or `refuse`. May be null. Called in a process of its own, before `start` and
+     * by `clesd --check`; of the host's functions it may call those two and `log`.
      */
     int32_t (*check)(const cles_host* host, cles_text config);
 } cles_plugin;
