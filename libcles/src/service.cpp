@@ -74,6 +74,8 @@ void service::publish(std::string_view noun, const std::function<void(json_write
     engine_->publish(noun, write);
 }
 
+bool service::retire(std::string_view noun) { return engine_->node().published.retire(noun); }
+
 void service::publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation) {
     engine_->publish_when_room(noun, json, std::move(operation));
 }

@@ -249,7 +249,7 @@ void inbound::serve_task(const protocol::request_line& r, time_point arrived, ti
         replies_.fail(r, no_such_task(*node_, r));
         return;
     }
-    if (r.verb == verb::update && !node_->published.can_open(protocol::canonical_path(r.noun, path_))) {
+    if (r.verb == verb::update && !node_->published.can_publish(protocol::canonical_path(r.noun, path_))) {
         replies_.fail(r, busy(node_->name + ": '" + std::string{r.noun.task} + "' has as many nouns as it may"));
         return;
     }

@@ -46,7 +46,7 @@ void local_request::run(const protocol::request_line& r, const identity& peer, t
         std::string scratch;
         publish_path_ = protocol::canonical_path(r.noun, scratch);
         append_compact_json(data.body, publish_body_);
-        if (!node_->published.can_open(publish_path_)) {
+        if (!node_->published.can_publish(publish_path_)) {
             fail({.code = errc::busy,
                   .message = node_->name + ": '" + std::string{r.noun.task} + "' has as many nouns as it may"},
                  false);

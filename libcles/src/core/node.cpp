@@ -123,6 +123,7 @@ void write_metrics(json_writer& w, const node& n) {
     number("requests_resent", c.requests_resent);
     number("replies_dropped", c.replies_dropped);
     number("updates_published", c.updates_published);
+    number("nouns_retired", c.nouns_retired);
     number("updates_delivered", c.updates_delivered);
     number("updates_shed", c.updates_shed);
     number("updates_too_large", c.updates_too_large);
