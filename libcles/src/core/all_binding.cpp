@@ -88,7 +88,12 @@ void all_binding::on_told(const std::string& node, topic* t, std::string_view la
     auto& p = parts_[node];
     p.asked = false;
     if (t != nullptr) {
-        p.last = last.empty() ? std::string{"{}"} : std::string{last};
+        if (call_ && call_->hold_more(last.size())) {
+            p.last = last.empty() ? std::string{"{}"} : std::string{last};
+        } else if (call_) {
+            p.failure = protocol::failure{.code = errc::busy,
+                                          .message = node + ": no memory is left for its last value (limits.memory)"};
+        }
         place_.take_part(*t, wanted_);
     } else {
         p.failure = why;
@@ -121,6 +126,9 @@ void all_binding::answer() {
         } else {
             text.add_failure(node, late(node));
         }
+    }
+    for (auto& [node, p] : parts_) { // which go on for long
+        p.last.reset();
     }
     c->done(text.whole());
 }

@@ -9,8 +9,8 @@ namespace cles::core {
 
 feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, const limits& bounds, std::string target,
                            std::string path, bool thinned, std::uint32_t seed)
-    : subscription(std::move(target), std::move(path), thinned, bounds.publishers), host_(host), deadlines_(deadlines), mail_(bounds),
-      backoff_(seed), renewal_(*this, deadlines, ~seed) {}
+    : subscription(std::move(target), std::move(path), thinned, bounds.publishers), host_(host), deadlines_(deadlines),
+      mail_(bounds), backoff_(seed), renewal_(*this, deadlines, ~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);

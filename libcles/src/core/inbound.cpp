@@ -27,7 +27,7 @@ constexpr std::size_t bytes_per_turn = 65536;
 } // namespace
 
 inbound::inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
-    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out),
+    : node_(std::move(host)), out_(out), peer_(peer), memory_(out.memory()), waiting_(memory_), replies_(*node_, out),
       bound_(node_, out, updates, peer, replies_) {
     if (out_.datagram() != 0) {
         datagrams_.emplace(*node_, out_, replies_);
@@ -56,11 +56,12 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
         return;
     }
     if (r.id == 0 && must_wait()) {
-        if (in_flight() < node_->bounds.in_flight) {
-            waiting_.push_line(line, now);
+        const bool too_many = in_flight() >= node_->bounds.in_flight;
+        if (!too_many && waiting_.push_line(line, now, r.noun.task == "cles")) {
             follow_waiting();
         } else if (r.wants_reply) {
-            answer_in_turn(failure_text(busy(node_->name + ": too many requests wait on this link")), now);
+            const auto why = too_many ? busy(node_->name + ": too many requests wait on this link") : no_memory(*node_);
+            answer_in_turn(failure_text(why), now);
         } else {
             ++node_->counts.errors_unsent;
         }
@@ -245,8 +246,8 @@ void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, ti
 
 void inbound::serve_task(const protocol::request_line& r, time_point arrived, time_point now) {
     const auto* h = node_->tasks.find(r.verb, r.noun.task);
-    if (h == nullptr) {
-        replies_.fail(r, no_such_task(*node_, r));
+    if (h == nullptr || (memory_ && !memory_->has_room(1))) {
+        replies_.fail(r, h == nullptr ? no_such_task(*node_, r) : no_memory(*node_));
         return;
     }
     if (r.verb == verb::update && !node_->published.can_publish(protocol::canonical_path(r.noun, path_))) {
@@ -292,11 +293,7 @@ void inbound::run_plain(const protocol::request_line& r, const handler& h, const
 
 void inbound::run_later(const protocol::request_line& r, const handler& h, const cles::request& request,
                         time_point now) {
-    call::terms wanted{.verb = r.verb,
-                       .id = r.id,
-                       .wants_reply = r.wants_reply,
-                       .wants_progress = r.wants_progress,
-                       .urgent = r.urgent};
+    auto wanted = call::terms_of(r);
     if (r.verb == verb::update) {
         wanted.publish_path = protocol::canonical_path(r.noun, path_);
         append_compact_json(request.body(), wanted.publish_body);
@@ -319,6 +316,10 @@ std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call:
         return nullptr;
     }
     auto c = std::make_shared<call>(node_, static_cast<call_owner&>(*this), std::move(wanted), now);
+    if (!c->hold(memory_, r.text.size())) {
+        replies_.fail(r, no_memory(*node_));
+        return nullptr;
+    }
     if (r.id != 0) {
         if (datagrams_ && (r.verb == verb::pull || r.verb == verb::bind)) {
             datagrams_->begin_repeatable(r);
@@ -332,14 +333,9 @@ std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call:
 }
 
 std::shared_ptr<call> inbound::open_call(const protocol::request_line& r, time_point due, time_point now) {
-    return begin_call(r,
-                      {.verb = r.verb,
-                       .id = r.id,
-                       .wants_reply = r.wants_reply,
-                       .wants_progress = r.wants_progress,
-                       .urgent = r.urgent,
-                       .routed = true},
-                      due, now);
+    auto wanted = call::terms_of(r);
+    wanted.routed = true;
+    return begin_call(r, std::move(wanted), due, now);
 }
 
 // -- calls ---------------------------------------------------------------------------------------------------------

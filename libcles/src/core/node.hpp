@@ -11,6 +11,7 @@
 #include "core/deadlines.hpp"
 #include "core/dedup.hpp"
 #include "core/latency_histogram.hpp"
+#include "core/memory_budget.hpp"
 #include "core/presence.hpp"
 #include "core/publications.hpp"
 #include "core/reflection_limit.hpp"
@@ -18,6 +19,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -57,6 +59,9 @@ struct node {
     const time_point started;
 
     std::vector<std::string> endpoints;
+    memory_budget memory;                                ///< of what is held for peers
+    const std::shared_ptr<memory_account> kept_values;   ///< last values, and updates that are queued
+    const std::shared_ptr<memory_account> kept_requests; ///< of this node's own and of clients, which wait for a link
     registry tasks;
     deadline_queue deadlines;
     presence others;

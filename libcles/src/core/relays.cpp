@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/relays.hpp"
 
+#include "core/refusals.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -9,7 +11,10 @@ namespace cles::core {
 class relays::relay final : public feed_events {
   public:
     relay(relays& owner, const std::string& noun)
-        : owner_(owner), topic_({owner.node_.deadlines, owner.counts_, owner.node_.bounds.binding_bytes}, noun) {}
+        : owner_(owner),
+          topic_({owner.node_.deadlines, owner.counts_, owner.node_.bounds.binding_bytes, owner.node_.kept_values},
+                 noun),
+          held_last_(owner.node_.kept_values) {}
 
     void start(std::string_view node, std::string_view path, std::string_view adverbs) {
         ticket_ = owner_.out_.bind(node, path, adverbs, *this);
@@ -30,6 +35,7 @@ class relays::relay final : public feed_events {
     void on_bound(std::string_view last) override {
         bound_ = true;
         last_ = last;
+        held_last_.resize(last_.size());
         fresh_ = true;
         telling_ = true;
         for (auto& tell : std::exchange(waiting_, {})) {
@@ -49,6 +55,11 @@ class relays::relay final : public feed_events {
     }
     void on_update(std::string_view line, std::string_view body) override {
         topic_.begin().append(line);
+        if (!topic_.hold()) { // the newest goes on all the same: nobody would send it again
+            topic_.shed();
+        }
+        last_ = {};
+        held_last_.resize(0);
         topic_.commit(line.size() - body.size());
         fresh_ = false;
         owner_.mark(topic_);
@@ -64,6 +75,7 @@ class relays::relay final : public feed_events {
     bool telling_ = false;
     bool fresh_ = false;
     std::string last_;
+    memory_reservation held_last_;
     std::vector<told> waiting_;
 };
 
@@ -80,6 +92,10 @@ void relays::join(std::string_view node, std::string_view path, std::string_view
     }
     if (all_.size() >= node_.bounds.nouns || stopped_) {
         tell(nullptr, {}, {.code = errc::busy, .message = "as many nouns are passed on as may be"});
+        return;
+    }
+    if (!node_.kept_values->has_room(1)) {
+        tell(nullptr, {}, no_memory(node_));
         return;
     }
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
