@@ -27,12 +27,10 @@ decoded_parameters decode(const protocol::noun_view& noun, std::string& storage)
     return result;
 }
 
-void release_if_large(std::string& decoded, std::string& path) {
+void release_if_large(std::string& decoded) {
     constexpr std::size_t kept = 4096;
-    for (auto* text : {&decoded, &path}) {
-        if (text->capacity() > kept) {
-            std::string{}.swap(*text);
-        }
+    if (decoded.capacity() > kept) {
+        std::string{}.swap(decoded);
     }
 }
 

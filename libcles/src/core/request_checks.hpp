@@ -22,8 +22,8 @@ using decoded_parameters = boost::container::static_vector<std::string_view, pro
 /// The parameters decoded: what holds escapes into `storage`, the others as views of the line.
 decoded_parameters decode(const protocol::noun_view& noun, std::string& storage);
 
-/// Gives back the memory of texts that a link reuses for each request's noun, where one has been unusually long.
-void release_if_large(std::string& decoded, std::string& path);
+/// Gives back the memory of the text that a link reuses for each request's noun, where one has been unusually long.
+void release_if_large(std::string& decoded);
 
 /// Whether `name` is in a comma-separated list.
 bool passes(std::string_view via, std::string_view name);

@@ -138,62 +138,63 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
     ++engine_.node().counts.links_open;
     if (from == connection::origin::dialled && c->datagram() == 0) {
         c->session().may_be_refused();
-        if (engine_.closing()) {
-            begin_nothing(*c);
-        }
-        c->start();
-        return c;
     }
-
-    void connections::begin_nothing() {
-        for (const auto& [key, c] : open_) {
-            begin_nothing(*c);
-        }
+    if (engine_.closing()) {
+        begin_nothing(*c);
     }
+    c->start();
+    return c;
+}
 
-    // In this process it is asked by its own handlers too, which are to come to their end.
-    void connections::begin_nothing(connection & c) {
-        if (c.from() != connection::origin::local) {
-            c.session().serving().begin_nothing();
-        }
+void connections::begin_nothing() {
+    for (const auto& [key, c] : open_) {
+        begin_nothing(*c);
     }
+}
 
-    bool connections::forget(connection & c, std::uint64_t received, std::uint64_t sent) {
-        if (open_.erase(&c) == 0) {
-            return false;
-        }
-        if (c.from() == connection::origin::accepted) {
-            if (c.datagram() != 0) {
-                --sources_;
-            } else {
-                admission_->leave(c);
-            }
-        }
-        auto& counts = engine_.node().counts;
-        --counts.links_open;
-        ++counts.links_lost;
-        counts.bytes_received += received;
-        counts.bytes_sent += sent;
-        return true;
+// In this process it is asked by its own handlers too, which are to come to their end.
+void connections::begin_nothing(connection& c) {
+    if (c.from() != connection::origin::local) {
+        c.session().serving().begin_nothing();
     }
+}
 
-    bool connections::cancel(std::uint64_t id) {
-        for (const auto& [key, c] : open_) {
-            const auto held = c;
-            if (held->session().asking().cancel(id)) {
-                return true;
-            }
-        }
+bool connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
+    if (open_.erase(&c) == 0) {
         return false;
     }
-
-    std::vector<std::shared_ptr<connection>> connections::all() const {
-        std::vector<std::shared_ptr<connection>> result;
-        result.reserve(open_.size());
-        for (const auto& [key, c] : open_) {
-            result.push_back(c);
+    if (c.from() == connection::origin::accepted) {
+        if (c.datagram() != 0) {
+            --sources_;
+        } else {
+            admission_->leave(c);
         }
-        return result;
     }
+    auto& counts = engine_.node().counts;
+    --counts.links_open;
+    ++counts.links_lost;
+    counts.bytes_received += received;
+    counts.bytes_sent += sent;
+    return true;
+}
+
+bool connections::cancel(std::uint64_t id) {
+    for (const auto& [key, c] : open_) {
+        const auto held = c;
+        if (held->session().asking().cancel(id)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+std::vector<std::shared_ptr<connection>> connections::all() const {
+    std::vector<std::shared_ptr<connection>> result;
+    result.reserve(open_.size());
+    for (const auto& [key, c] : open_) {
+        result.push_back(c);
+    }
+    return result;
+}
 
 } // namespace cles::shell
