@@ -140,6 +140,10 @@ void service::publish(std::string_view noun, const std::function<void(json_write
     run_on(strand_of(pooled_, get_executor()), [&] { engine_->publish(noun, write); });
 }
 
+bool service::retire(std::string_view noun) {
+    return run_on(strand_of(pooled_, get_executor()), [this, noun] { return engine_->node().published.retire(noun); });
+}
+
 std::uint64_t service::publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
                                          detail::pending_ptr operation) {
     return inside.publish_when_room(noun, json, std::move(operation));

@@ -89,6 +89,7 @@ const mistake mistakes[] = {
     {"limits: {publishers: 0}\n", "clesd.yaml:1: limits.publishers: ", "is not a number from 1 to 1000000"},
     {"limits: {lease: 61s}\n", "clesd.yaml:1: limits.lease: ", "is too long: 1min at most"},
     {"limits: {lease: 19ms}\n", "clesd.yaml:1: limits.lease: ", "is too short: 20ms at least"},
+    {"limits: {memory: 1KiB}\n", "clesd.yaml:1: limits.memory: ", "is not a number from 65536 to"},
     {"busy_poll: 50\n", "clesd.yaml:1: busy_poll: ", "is no time"},
     {"wake_within: 7\n", "clesd.yaml:1: wake_within: ", "is no time"},
     {"wake_within: 0\n", "clesd.yaml:1: wake_within: ", "write off, or 0us"},

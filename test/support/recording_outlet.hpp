@@ -3,6 +3,7 @@
 
 #include "core/outlet.hpp"
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,11 +13,16 @@ namespace cles::test {
 /// A link as a session sees it, which keeps what is sent and remembers what was asked of it.
 class recording_outlet : public core::outlet {
   public:
-    explicit recording_outlet(std::size_t datagram = 0) : datagram_bytes(datagram) {}
+    explicit recording_outlet(std::size_t datagram = 0, std::shared_ptr<core::memory_account> memory = nullptr)
+        : datagram_bytes(datagram), account(std::move(memory)), held_(account) {}
 
     std::string& output() override { return text_; }
     std::string& urgent_output() override { return datagram_bytes == 0 ? urgent_ : text_; }
     [[nodiscard]] std::size_t datagram() const noexcept override { return datagram_bytes; }
+    [[nodiscard]] std::shared_ptr<core::memory_account> memory() const override { return account; }
+    [[nodiscard]] bool reserve(std::size_t more) override {
+        return held_.try_resize(text_.size() + urgent_.size() + more);
+    }
     void wake() override { ++wakes; }
     [[nodiscard]] bool is_behind() const override { return behind; }
     void pause(bool stop) override {
@@ -28,7 +34,14 @@ class recording_outlet : public core::outlet {
     void retire() override { ++retires; }
 
     /// What has been sent since the last time.
-    std::string take() { return std::exchange(urgent_, {}) + std::exchange(text_, {}); }
+    std::string take() {
+        held_.resize(0);
+        return std::exchange(urgent_, {}) + std::exchange(text_, {});
+    }
+    /// What waits to be taken.
+    [[nodiscard]] std::size_t unsent() const { return text_.size() + urgent_.size(); }
+    /// What a link does after each batch: takes note of what the peer has not taken.
+    void settle() { held_.resize(unsent()); }
     /// The same, line by line and without LF. A last line that is not ended shows as "... <no LF>".
     std::vector<std::string> take_lines() {
         std::vector<std::string> lines;
@@ -52,7 +65,8 @@ class recording_outlet : public core::outlet {
     int retires = 0;
     bool paused = false;
     bool behind = false;
-    std::size_t datagram_bytes = 0; ///< 0: a stream
+    std::size_t datagram_bytes = 0;                ///< 0: a stream
+    std::shared_ptr<core::memory_account> account; ///< null: nobody counts
 
   protected:
     ~recording_outlet() = default;
@@ -60,6 +74,7 @@ class recording_outlet : public core::outlet {
   private:
     std::string text_;
     std::string urgent_; // goes before it
+    core::memory_reservation held_;
 };
 
 } // namespace cles::test

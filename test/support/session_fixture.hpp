@@ -100,7 +100,8 @@ class test_link final : public recording_outlet, public core::binder {
     explicit test_link(test_node& at) : test_link(at, 0) {}
     /// Over datagrams of so many bytes, where it is not 0.
     test_link(test_node& at, std::size_t datagram)
-        : recording_outlet(datagram), at_(at), session_(at.host, *this, *this, peer_) {}
+        : recording_outlet(datagram, std::make_shared<core::memory_account>(at.host->memory)), at_(at),
+          session_(at.host, *this, *this, peer_) {}
 
     /// Feeds a line and tells what was sent meanwhile.
     std::string ask(std::string_view line) {

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/all_binding.hpp"
+#include "core/memory_budget.hpp"
 #include "support/routing_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
+#include <memory>
 #include <string>
 
 BOOST_FIXTURE_TEST_SUITE(all_binding, cles::test::routing_fixture)
@@ -61,6 +63,25 @@ BOOST_AUTO_TEST_CASE(who_refuses_is_among_the_errors) {
     BOOST_TEST(link.take() ==
                R"(id=7 {"results":{},"errors":{"car2":{"error":"denied","message":"car2 does not allow it"}}})"
                "\n");
+}
+
+BOOST_AUTO_TEST_CASE(without_memory_for_its_last_value_a_node_is_bound_all_the_same) {
+    offer("car2", task("BIND", "pose"));
+    link.ask("BIND all:pose id=7");
+    cles::core::memory_reservation others{std::make_shared<cles::core::memory_account>(node.host->memory)};
+    others.resize(node.host->memory.limit());
+    ways.bound("car2:pose").binds("{\"x\":1}");
+    others.resize(0);
+    const auto reply = link.take();
+    BOOST_TEST(reply.starts_with(R"(id=7 {"results":{},"errors":{"car2":{"error":"busy")"), reply);
+    const auto line = ways.bound("car2:pose").publishes("{\"x\":2}");
+    drain();
+    BOOST_TEST(link.take() == line);
+    leave("car2");
+    offer("car3", task("BIND", "pose")); // makes it look who is there
+    ways.bound("car3:pose").binds("{}");
+    BOOST_TEST(link.kind("BIND all:pose lease=0 id=8") == "id=8 ok");
+    BOOST_TEST(ways.count_bound() == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(it_is_answered_before_the_time_runs_out) {

@@ -302,4 +302,19 @@ BOOST_FIXTURE_TEST_CASE(leases_are_bounded_for_a_source_and_in_all, small) {
     BOOST_TEST(say(3, "BIND all:a"));
 }
 
+BOOST_AUTO_TEST_CASE(a_noun_with_a_lease_does_not_retire) {
+    fixture few{cles::limits{.nouns = 2}};
+    few.node.publish_now("job/1", "[1]");
+    BOOST_TEST(few.say(1, "BIND all:job/1"));
+    for (int i = 2; i < 9; ++i) {
+        few.node.publish_now("job/" + std::to_string(i), "[1]");
+    }
+    BOOST_TEST(few.node.host->published.find("job/1") != nullptr);
+    BOOST_TEST(few.node.host->published.find("job/7") == nullptr);
+    few.node.pass(11s); // the lease has run out
+    few.node.publish_now("job/9", "[1]");
+    few.node.publish_now("job/10", "[1]");
+    BOOST_TEST(few.node.host->published.find("job/1") == nullptr);
+}
+
 BOOST_AUTO_TEST_SUITE_END()

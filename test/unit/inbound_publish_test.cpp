@@ -133,6 +133,8 @@ BOOST_AUTO_TEST_CASE(a_noun_past_the_limit_is_busy_before_the_handler_runs) {
     small.on(verb::update, "notice", [&](const cles::request&, cles::json_writer&) { ++runs; });
     small.on_later(verb::update, "slow");
     cles::test::test_link to{small};
+    BOOST_TEST(to.kind("BIND car1:notice/a") == "ok"); // those that are bound do not retire
+    BOOST_TEST(to.kind("BIND car1:notice/b") == "ok");
     BOOST_TEST(to.kind("UPDATE car1:notice/a [1]") == "ok");
     BOOST_TEST(to.kind("UPDATE car1:notice/b [1]") == "ok");
     const auto third = to.reply("UPDATE car1:notice/c [1]");
@@ -140,8 +142,11 @@ BOOST_AUTO_TEST_CASE(a_noun_past_the_limit_is_busy_before_the_handler_runs) {
     BOOST_TEST(third.retry_ms.value_or(0) > 0U);
     BOOST_TEST(runs == 2);
     BOOST_TEST(to.kind("UPDATE car1:notice/b [2]") == "ok");
+    to.ask("BIND car1:slow/a");
+    to.ask("BIND car1:slow/b");
     small.publish_now("slow/a", "[1]");
     small.publish_now("slow/b", "[1]");
+    to.take();
     BOOST_TEST(to.kind("UPDATE car1:slow/c [1]") == "busy");
     BOOST_TEST(small.started.empty());
 }

@@ -96,6 +96,12 @@ BOOST_FIXTURE_TEST_CASE(a_request_that_is_too_large_to_be_sent_has_not_begun, fi
     BOOST_TEST(!errand->failure.unreachable);
 }
 
+BOOST_FIXTURE_TEST_CASE(a_request_for_which_this_node_has_no_memory_is_busy, fixture) {
+    BOOST_TEST(!fails(errc::busy).begun);
+    BOOST_TEST(!errand->failure.unreachable);
+    BOOST_TEST((errand->failure.told.code == errc::busy));
+}
+
 BOOST_FIXTURE_TEST_CASE(who_refuses_has_not_begun_unless_it_says_so, fixture) {
     for (const std::string code : {"busy", "no_task", "no_target", "denied", "bad_request"}) {
         BOOST_TEST(!refuses(code).begun, code);

@@ -149,9 +149,11 @@ BOOST_AUTO_TEST_CASE(a_writer_that_throws_publishes_nothing) {
 
 BOOST_AUTO_TEST_CASE(a_task_has_so_many_nouns_at_most) {
     fixture small{cles::limits{.nouns = 3}};
-    small.all.publish_body("speed", "{}");
-    small.all.publish_body("speed/a", "{}");
-    small.all.publish_body("speed/b", "{}");
+    recording_binder b;
+    for (const auto* path : {"speed", "speed/a", "speed/b"}) {
+        small.bind(b, path);
+        small.all.publish_body(path, "{}");
+    }
     BOOST_CHECK_EXCEPTION(small.all.publish_body("speed/c", "{}"), cles::error, is_busy);
     BOOST_CHECK_EXCEPTION(small.all.open("speed/c"), cles::error, is_busy);
     small.all.publish_body("speed/a", "[]"); // what is there goes on
@@ -178,6 +180,204 @@ BOOST_AUTO_TEST_CASE(a_noun_that_was_published_is_remembered) {
     all.publish_body("speed", "[1]");
     all.tidy(*all.find("speed"));
     BOOST_TEST(all.find("speed")->last_body() == "[1]");
+}
+
+// -- nouns that retire -----------------------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(a_new_noun_takes_the_place_of_the_one_used_longest_ago) {
+    fixture small{cles::limits{.nouns = 3}};
+    for (const auto* path : {"job/1", "job/2", "job/3", "job/1"}) {
+        small.all.publish_body(path, "[1]");
+    }
+    small.all.publish_body("job/4", "[4]");
+    BOOST_TEST(small.all.find("job/2") == nullptr);
+    BOOST_TEST(small.all.find("job/1") != nullptr);
+    small.all.publish_body("job/5", "[5]");
+    BOOST_TEST(small.all.find("job/3") == nullptr);
+    BOOST_TEST(small.all.find("job/1")->last_body() == "[1]");
+    BOOST_TEST(small.counts.nouns_retired == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(sessions_come_and_go_for_ever) {
+    fixture small{cles::limits{.nouns = 16}};
+    for (int i = 0; i < 100'000; ++i) {
+        small.all.publish_body("session/" + std::to_string(i), "[1]");
+    }
+    BOOST_TEST(small.counts.nouns_retired == 100'000U - 16U);
+    BOOST_TEST(small.all.find("session/99999") != nullptr);
+    BOOST_TEST(small.all.find("session/99983") == nullptr);
+}
+
+BOOST_AUTO_TEST_CASE(a_noun_that_is_bound_does_not_retire_and_one_that_was_is_as_if_used) {
+    fixture small{cles::limits{.nouns = 2}};
+    recording_binder b;
+    small.all.publish_body("job/1", "[1]");
+    small.bind(b, "job/1");
+    small.all.publish_body("job/2", "[2]");
+    small.all.publish_body("job/3", "[3]"); // for 2, though 1 was used before
+    BOOST_TEST(small.all.find("job/2") == nullptr);
+    small.bind(b, "job/3");
+    BOOST_CHECK_EXCEPTION(small.all.publish_body("job/4", "[4]"), cles::error, is_busy);
+    BOOST_TEST(!small.all.can_publish("job/4"));
+    for (const auto* path : {"job/3", "job/1"}) {
+        auto& noun = *small.all.find(path);
+        noun.unbind(b);
+        small.all.release(noun);
+    }
+    BOOST_TEST(small.all.can_publish("job/4"));
+    small.all.publish_body("job/4", "[4]");
+    BOOST_TEST(small.all.find("job/3") == nullptr);
+    BOOST_TEST(small.all.find("job/1")->last_body() == "[1]");
+}
+
+BOOST_AUTO_TEST_CASE(to_bind_never_makes_a_noun_retire) {
+    fixture small{cles::limits{.nouns = 1}};
+    small.all.publish_body("job/1", "[1]");
+    BOOST_CHECK_EXCEPTION(small.all.open("job/2"), cles::error, is_busy);
+    BOOST_TEST(!small.all.can_open("job/2"));
+    BOOST_TEST(small.all.can_publish("job/2"));
+    BOOST_TEST(small.all.find("job/1")->last_body() == "[1]");
+}
+
+BOOST_AUTO_TEST_CASE(a_noun_that_returns_is_numbered_on_above_all_that_retired) {
+    fixture small{cles::limits{.nouns = 2}};
+    for (int i = 0; i < 7; ++i) {
+        small.all.publish_body("job/1", "[1]");
+    }
+    small.all.publish_body("job/2", "[2]");
+    BOOST_TEST(small.all.find("job/2")->seq() == 1U); // nothing has retired yet
+    small.all.publish_body("job/3", "[3]");           // for 1
+    BOOST_TEST(small.all.find("job/3")->seq() == 8U);
+    small.all.publish_body("job/1", "[1]"); // for 2
+    BOOST_TEST(small.all.find("job/1")->seq() == 8U);
+    small.all.publish_body("job/1", "[1]");
+    BOOST_TEST(small.all.retire("job/1"));
+    small.all.publish_body("job/1", "[1]");
+    BOOST_TEST(small.all.find("job/1")->seq() == 10U);
+    BOOST_TEST(std::string{small.all.find("job/1")->last_line()}.find(" seq=10 ") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(to_retire_forgets_the_value_but_leaves_binders_bound) {
+    recording_binder b;
+    bind(b, "job/1");
+    b.room = 0;
+    all.publish_body("job/1", "[1]");
+    all.publish_body("job/2", "[2]");
+    BOOST_TEST(all.retire("job/1"));
+    BOOST_TEST(all.retire("job/2"));
+    BOOST_TEST(!all.retire("job/2"));
+    BOOST_TEST(!all.retire("job/3"));
+    BOOST_TEST(all.find("job/2") == nullptr);
+    BOOST_TEST(all.find("job/1")->last_body().empty());
+    BOOST_TEST(all.find("job/1")->last_line().empty());
+    b.room = 100;
+    drain();
+    BOOST_TEST(b.take().find("seq=1 ") != std::string::npos); // it was published before
+    all.publish_body("job/1", "[3]");
+    drain();
+    BOOST_TEST(b.take().find("seq=2 ") != std::string::npos);
+    BOOST_TEST(all.find("job/1")->last_body() == "[3]");
+    BOOST_TEST(all.knows("job")); // a task that was published stays open
+    BOOST_TEST((all.tasks() == std::vector<std::string>{"job"}));
+}
+
+BOOST_AUTO_TEST_CASE(a_noun_cannot_retire_or_be_published_while_a_value_of_it_is_written) {
+    fixture small{cles::limits{.nouns = 2}};
+    small.all.publish_body("job/1", "[1]");
+    small.all.publish("job/1", [&](json_writer& w) {
+        BOOST_TEST(!small.all.retire("job/1"));
+        BOOST_CHECK_EXCEPTION(small.all.publish_body("job/1", "[9]"), cles::error, is_failed);
+        for (int i = 2; i < 9; ++i) {
+            small.all.publish_body("job/" + std::to_string(i), "[9]");
+        }
+        w.raw("[2]");
+    });
+    BOOST_TEST(small.all.find("job/1")->last_body() == "[2]");
+    BOOST_TEST(small.all.find("job/1")->seq() == 2U);
+}
+
+// -- memory ----------------------------------------------------------------------------------------------------------
+
+struct bounded : fixture {
+    bounded() {
+        all_ = std::make_unique<cles::core::publications>(
+            cles::core::topic_context{deadlines, counts, bounds.binding_bytes, values}, bounds, "car1", "5f3a09c1",
+            [] {});
+    }
+    static std::string large(std::size_t bytes) { return "[\"" + std::string(bytes, 'x') + "\"]"; }
+
+    cles::core::memory_budget memory{2'000'000};
+    std::shared_ptr<cles::core::memory_account> values = std::make_shared<cles::core::memory_account>(memory);
+    std::unique_ptr<cles::core::publications> all_;
+};
+
+BOOST_FIXTURE_TEST_CASE(values_past_the_memory_take_the_place_of_those_used_longest_ago, bounded) {
+    for (int i = 0; i < 100; ++i) {
+        all_->publish_body("map/" + std::to_string(i), large(100'000));
+        BOOST_TEST(memory.used() <= memory.limit() / 2);
+    }
+    BOOST_TEST(counts.nouns_retired > 80U);
+    BOOST_TEST(counts.nouns_retired < 97U);
+    BOOST_TEST(all_->find("map/99") != nullptr);
+    all_.reset();
+    BOOST_TEST(memory.used() == 0U);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_value_that_stays_takes_little_more_than_its_length, bounded) {
+    for (int i = 0; i < 10; ++i) {
+        all_->publish_body("map", large(200'000));
+    }
+    BOOST_TEST(memory.used() < 270'000U);
+    all_->publish_body("map", large(100));
+    all_->publish_body("map", large(100));
+    BOOST_TEST(memory.used() < 10'000U);
+    all_->retire("map");
+    BOOST_TEST(memory.used() == 0U);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_value_for_which_nothing_can_go_is_busy_and_the_one_before_stays, bounded) {
+    all_->publish_body("other", large(700'000)); // of another task
+    all_->publish_body("map", "[1]");
+    BOOST_CHECK_EXCEPTION(all_->publish_body("map", large(700'000)), cles::error, is_busy);
+    BOOST_TEST(all_->find("map")->last_body() == "[1]");
+    BOOST_TEST(memory.used() < 900'000U);
+    all_->publish_body("map", "[2]");
+    BOOST_TEST(all_->find("map")->seq() == 2U);
+    BOOST_TEST(all_->retire("other"));
+    all_->publish_body("map", large(700'000));
+}
+
+BOOST_FIXTURE_TEST_CASE(past_the_memory_a_slow_binder_misses_updates_before_a_publisher_is_refused, bounded) {
+    recording_binder slow;
+    slow.room = 0;
+    all_->open("map").bind(slow, {.keep = 64});
+    for (int i = 0; i < 50; ++i) {
+        all_->publish_body("map", large(100'000));
+        BOOST_TEST(memory.used() <= memory.limit() / 2 + 400'000);
+    }
+    slow.room = 100;
+    all_->drain(clock.now());
+    BOOST_TEST(counts.updates_shed > 0U);
+    BOOST_TEST(slow.take().find(" seq=50 ") != std::string::npos);
+}
+
+BOOST_FIXTURE_TEST_CASE(what_waits_for_room_is_busy_rather_than_shed, bounded) {
+    recording_binder slow;
+    slow.room = 0;
+    all_->open("map").bind(slow, {.keep = 64});
+    bool refused = false;
+    for (int i = 0; i < 50 && !refused; ++i) {
+        auto [operation, result] = cles::test::record();
+        try {
+            all_->publish_when_room("map", large(100'000), operation);
+        } catch (const cles::error& e) {
+            refused = is_busy(e);
+        }
+    }
+    BOOST_TEST(refused);
+    slow.room = 100;
+    all_->drain(clock.now());
+    BOOST_TEST(counts.updates_shed == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(it_asks_to_be_drained_once) {

@@ -3,9 +3,12 @@
 
 #include <cles/limits.hpp>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <string_view>
 
 namespace cles {
@@ -32,13 +35,15 @@ inline constexpr std::size_t kibi = 1U << 10U;
 inline constexpr std::size_t mebi = 1U << 20U;
 inline constexpr std::size_t gibi = 1U << 30U;
 inline constexpr std::size_t many = 1'000'000;
+inline constexpr std::size_t most_memory =
+    static_cast<std::size_t>(std::min<std::uint64_t>(std::uint64_t{1} << 40U, std::numeric_limits<std::size_t>::max()));
 inline constexpr std::chrono::milliseconds instant{1};
 inline constexpr std::chrono::milliseconds day = std::chrono::hours{24};
 
 } // namespace detail
 
 /// All members of `limits`, for programs that read them from somewhere.
-inline constexpr std::array<count_range, 16> count_ranges{{
+inline constexpr std::array<count_range, 17> count_ranges{{
     {"line", &limits::line, 256, 64 * detail::mebi},
     {"depth", &limits::depth, 1, 64},
     {"links", &limits::links, 1, detail::many},
@@ -55,6 +60,7 @@ inline constexpr std::array<count_range, 16> count_ranges{{
     {"group_leases", &limits::group_leases, 1, detail::many},
     {"publishers", &limits::publishers, 1, detail::many},
     {"feed", &limits::feed, 1, detail::many},
+    {"memory", &limits::memory, 64 * detail::kibi, detail::most_memory},
 }};
 
 inline constexpr std::array<time_range, 6> time_ranges{{

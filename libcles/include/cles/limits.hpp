@@ -22,7 +22,7 @@ struct limits {
     std::size_t links_per_address = 0;
     std::size_t in_flight = 4096; ///< requests per link that wait or run
     std::size_t bindings = 1024;  ///< bindings per link
-    std::size_t nouns = 4096;     ///< nouns per task that are published or bound
+    std::size_t nouns = 4096;     ///< nouns per task that are published or bound; see `service::retire`
     std::size_t running = 16384;  ///< handlers of the service that have not ended
     /// Bytes of replies that a peer leaves unread before its link is not read; 1 to 1 GiB.
     std::size_t unread = 1U << 20U;
@@ -36,6 +36,10 @@ struct limits {
     std::size_t group_leases = 4096; ///< bindings by multicast; of one source at most `bindings`
     std::size_t publishers = 1024;   ///< whose updates of one noun a feed of `all:` tells apart
     std::size_t feed = 1024;         ///< updates that a feed holds for a caller who does not fetch them
+    /// Bytes that the node holds for its peers at once: requests that wait or run, results and requests that a peer has
+    /// not taken yet, last values, updates that are queued. Past it new work is `busy`, and no link holds more than is
+    /// left for others. 64 KiB to 1 TiB.
+    std::size_t memory = 256U << 20U;
     /// A link whose peer takes nothing for so long is closed; 1 ms to a day.
     std::chrono::milliseconds stall{30'000};
     /// What feeds ask for by datagram; they renew at a third of it; 20 ms to a minute.

@@ -190,12 +190,20 @@ class service : public registrar {
     /// Opens the task for BIND. Never blocks: what a slow binder does not take in time is dropped for it, and it is
     /// told. One alone, 100 us or more behind the last, is written in this call; those that come together are written
     /// together, soon after, and what a handler publishes before it first waits behind an answer that it gives then.
-    /// \throws cles::error: `invalid_name`, `too_large`, `busy` (too many nouns), `failed` (begins like a
-    /// failure), `conversion` (text that is not UTF-8)
+    /// \throws cles::error: `invalid_name`, `too_large`, `busy` (all the nouns there may be are bound, or no memory is
+    /// left), `failed` (begins like a failure, or is written while a value of the noun is), `conversion` (text that is
+    /// not UTF-8)
     template <class T>
     void update(std::string_view noun, const T& value) {
         publish(noun, [&](json_writer& w) { write_json(w, value); });
     }
+
+    /// Forgets the last value of what was published there; who binds it next is answered `{}`. Those that are bound
+    /// stay bound, and have what was published before. False where there is no value.
+    ///
+    /// A task whose nouns come and go ("session/17") need not retire them: past `limits::nouns`, or the memory that
+    /// there is for values, the nouns that nobody is bound to retire by themselves, the one used longest ago first.
+    bool retire(std::string_view noun);
 
     /// Publishes once every binder's queue has room, so that nothing is dropped: `void(error_code)`. It completes when
     /// the update is in those queues, in the order of the calls. Withdrawn before, it is not published.

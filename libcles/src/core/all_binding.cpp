@@ -77,7 +77,7 @@ void all_binding::follow() {
         // Who is known no more is bound anew when it is back; until then its feed binds again by itself.
         std::erase_if(parts_, [&](const auto& entry) {
             const auto& [name, p] = entry;
-            return p.failure && name != routing_->host().name &&
+            return p.failure && !p.bound && name != routing_->host().name &&
                    std::find(there.begin(), there.end(), name) == there.end();
         });
     }
@@ -99,8 +99,14 @@ void all_binding::on_told(const std::string& node, topic* t, std::string_view la
     auto& p = parts_[node];
     p.asked = false;
     if (t != nullptr) {
-        p.last = last.empty() ? std::string{"{}"} : std::string{last};
-        p.mark = place_.from()->mark_of(*t);
+        if (call_ && call_->hold_more(last.size())) {
+            p.last = last.empty() ? std::string{"{}"} : std::string{last};
+            p.mark = place_.from()->mark_of(*t);
+        } else if (call_) {
+            p.failure = protocol::failure{.code = errc::busy,
+                                          .message = node + ": no memory is left for its last value (limits.memory)"};
+        }
+        p.bound = true;
         place_.take_part(*t, wanted_);
     } else {
         p.failure = why;
@@ -143,6 +149,9 @@ void all_binding::answer() {
         } else {
             text.add_failure(node, late(node));
         }
+    }
+    for (auto& [node, p] : parts_) { // which go on for long
+        p.last.reset();
     }
     c->done(text.whole());
 }

@@ -36,7 +36,8 @@ class all_binding final : public routing::errand, private deadline, public std::
         std::optional<std::string> last{};
         std::optional<update_mark> mark{};
         std::optional<protocol::failure> failure{};
-        bool asked = true; // until it has answered
+        bool asked = true;  // until it has answered
+        bool bound = false; // with a failure too, where there was no memory for its last value
     };
 
     void bind_whom_is_known(time_point now);

@@ -4,6 +4,7 @@
 #include "core/bind_decision.hpp"
 #include "core/handler_failure.hpp"
 #include "core/later.hpp"
+#include "core/refusals.hpp"
 #include "core/request_checks.hpp"
 
 #include <chrono>
@@ -28,9 +29,9 @@ binding::terms terms_of(const protocol::request_line& r) {
 
 } // namespace
 
-bind_requests::bind_requests(std::shared_ptr<node> host, const outlet& out, binder& updates, const identity& peer,
+bind_requests::bind_requests(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer,
                              reply_writer& replies)
-    : shared_node_(std::move(host)), node_(*shared_node_), peer_(peer), replies_(replies), updates_(updates),
+    : shared_node_(std::move(host)), node_(*shared_node_), peer_(peer), out_(out), replies_(replies), updates_(updates),
       bound_(node_.published, updates) {
     if (out.datagram() != 0) {
         leases_.emplace(node_.deadlines, [this](const std::string& path) {
@@ -132,6 +133,12 @@ void bind_requests::serve(const protocol::request_line& r, time_point due, time_
 topic& bind_requests::open(std::string_view path) {
     if (!bound_.has(path) && bound_.size() >= node_.bounds.bindings) {
         throw error(errc::busy, node_.name + ": too many bindings on this link");
+    }
+    // Before it is bound: what could not be answered has to be no binding.
+    constexpr std::size_t head = 64;
+    const auto* known = node_.published.find(path);
+    if (!out_.reserve((known != nullptr ? known->last_body().size() : 0) + head)) {
+        throw error(errc::busy, no_memory(node_).message);
     }
     return node_.published.open(path);
 }

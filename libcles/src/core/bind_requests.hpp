@@ -28,7 +28,7 @@ void ask_bind_handler(const node& host, const identity& peer, const protocol::re
 /// Serves BIND for one link, and holds what has come of it.
 class bind_requests {
   public:
-    bind_requests(std::shared_ptr<node> host, const outlet& out, binder& updates, const identity& peer,
+    bind_requests(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer,
                   reply_writer& replies);
 
     void serve(const protocol::request_line& request, time_point due, time_point now, call_opener& from);
@@ -57,6 +57,7 @@ class bind_requests {
     std::shared_ptr<node> shared_node_;
     node& node_;
     const identity& peer_;
+    outlet& out_;
     reply_writer& replies_;
     binder& updates_;
     link_bindings bound_;

@@ -19,6 +19,20 @@ call::~call() {
     node_->counts.routed -= terms_.routed ? 1 : 0;
 }
 
+call::terms call::terms_of(const protocol::request_line& r) {
+    return {.verb = r.verb,
+            .id = r.id,
+            .wants_reply = r.wants_reply,
+            .wants_progress = r.wants_progress,
+            .urgent = r.urgent};
+}
+
+bool call::hold(const std::shared_ptr<memory_account>& memory, std::size_t text) {
+    constexpr std::size_t around = 512; // itself and its handler's part, about
+    held_ = memory_reservation{memory};
+    return held_.try_resize(text + terms_.publish_body.size() + around);
+}
+
 void call::done(std::string_view json) {
     if (owner_ != nullptr) {
         owner_->answer(*this, json);

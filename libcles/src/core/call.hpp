@@ -6,8 +6,10 @@
 #include <cles/verb.hpp>
 
 #include "core/deadlines.hpp"
+#include "core/memory_budget.hpp"
 #include "protocol/message.hpp"
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -31,6 +33,8 @@ class call_owner {
     virtual void refuse(call& c, const protocol::failure& why) = 0;
     /// How far it is; never less than before.
     virtual void report(call& c, double fraction, std::string_view json) = 0;
+    /// Whether the memory of the node allows an answer of so many bytes.
+    [[nodiscard]] virtual bool can_answer(std::size_t /*bytes*/) { return true; }
     /// Who asked, as a URL; empty where it was this node itself.
     [[nodiscard]] virtual std::string_view peer_address() const noexcept { return {}; }
 
@@ -56,6 +60,9 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
         std::string publish_body{};
     };
 
+    /// What a request wants, as far as its line says.
+    static terms terms_of(const protocol::request_line& r);
+
     call(std::shared_ptr<node> host, call_owner& owner, terms wanted, time_point started);
     ~call();
 
@@ -69,6 +76,12 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     std::function<void()> forget_on_stop() noexcept { return std::exchange(on_stop_, nullptr); }
     /// The handler's words for the log, with the request's id, and the peer while it waits.
     void say(log_level level, std::string_view text) const;
+    /// Holds the memory that its request and itself take, until its handler lets go of it. False where there is none.
+    [[nodiscard]] bool hold(const std::shared_ptr<memory_account>& memory, std::size_t text);
+    /// Whether so many bytes more may be held for it; they are from then on.
+    [[nodiscard]] bool hold_more(std::size_t bytes) noexcept { return held_.try_resize(held_.size() + bytes); }
+    /// Whether an answer of so many bytes may wait for the peer.
+    [[nodiscard]] bool can_answer(std::size_t bytes) { return owner_ != nullptr && owner_->can_answer(bytes); }
     [[nodiscard]] bool ended() const noexcept { return owner_ == nullptr; }
     [[nodiscard]] bool stopped() const noexcept { return stopped_; }
 
@@ -93,6 +106,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     call_owner* owner_;
     terms terms_;
     time_point started_;
+    memory_reservation held_; // after the node, which it is of
     double reported_ = 0;
     std::string head_;
     std::function<void()> on_stop_;

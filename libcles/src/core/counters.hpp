@@ -20,6 +20,7 @@ struct counters {
     std::uint64_t requests_resent = 0; ///< copies, by datagram
     std::uint64_t replies_dropped = 0; ///< malformed, or answering nothing in flight
     std::uint64_t updates_published = 0;
+    std::uint64_t nouns_retired = 0;     ///< last values that were forgotten
     std::uint64_t updates_delivered = 0; ///< to binders on links
     std::uint64_t updates_shed = 0;      ///< dropped for binders that were slow
     std::uint64_t updates_too_large = 0; ///< not sent by datagram

@@ -29,11 +29,14 @@ execution::execution(node& host, const protocol::request_line& r, const identity
                                                   .deadline = due},
       request_(data_) {}
 
-std::optional<protocol::failure> execution::refusal() {
+std::optional<protocol::failure> execution::refusal(const memory_account* held) {
     if (handler_ == nullptr) {
         return no_such_task(node_, line_);
     }
-    if (line_.verb == verb::update && !node_.published.can_open(publish_path())) {
+    if (held != nullptr && !held->has_room(1)) {
+        return no_memory(node_);
+    }
+    if (line_.verb == verb::update && !node_.published.can_publish(publish_path())) {
         return busy(node_.name + ": '" + std::string{line_.noun.task} + "' has as many nouns as it may");
     }
     return is_plain() ? std::nullopt : no_room_to_run(node_);
@@ -62,11 +65,7 @@ void execution::run(json_writer& w) {
 }
 
 call::terms execution::terms() {
-    call::terms wanted{.verb = line_.verb,
-                       .id = line_.id,
-                       .wants_reply = line_.wants_reply,
-                       .wants_progress = line_.wants_progress,
-                       .urgent = line_.urgent};
+    auto wanted = call::terms_of(line_);
     if (line_.verb == verb::update) {
         wanted.publish_path = publish_path();
         append_compact_json(request_.body(), wanted.publish_body);

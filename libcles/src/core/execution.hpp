@@ -6,6 +6,7 @@
 #include <cles/request.hpp>
 
 #include "core/call.hpp"
+#include "core/memory_budget.hpp"
 #include "core/node.hpp"
 #include "core/registry.hpp"
 #include "core/request_checks.hpp"
@@ -27,8 +28,9 @@ class execution {
     execution& operator=(const execution&) = delete;
     ~execution() = default;
 
-    /// Why it is not begun; nothing where it may be.
-    [[nodiscard]] std::optional<protocol::failure> refusal();
+    /// Why it is not begun; nothing where it may be. `held` is what counts the memory of the asker; null: nobody, or
+    /// what it is part of holds memory already.
+    [[nodiscard]] std::optional<protocol::failure> refusal(const memory_account* held = nullptr);
     /// Without a refusal: whether its handler answers at once, by `run`, or later, by `start`.
     [[nodiscard]] bool is_plain() const noexcept { return static_cast<bool>(handler_->plain); }
     /// Runs the handler, which writes its result. What it throws passes through.

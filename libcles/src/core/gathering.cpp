@@ -80,6 +80,14 @@ void gathering::on_result(std::size_t leg, std::string_view json) {
     if (ended_) {
         return;
     }
+    if (!call_->hold_more(json.size())) {
+        call_->fail({.code = errc::busy,
+                     .message = "no memory is left for the answers of all (limits.memory)",
+                     .retry_ms = 1000,
+                     .ran = true});
+        withdraw_open();
+        return;
+    }
     parts_[leg].result = json;
     bytes_ += json.size();
     --open_;

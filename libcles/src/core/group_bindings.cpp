@@ -100,7 +100,7 @@ void group_bindings::attach(topic& t) { bound_.bind(t, group_terms); }
 
 void group_bindings::repeat_soon(noun& n, bool put_off, time_point now) {
     const auto* t = node_.published.find(n.path);
-    if (t == nullptr || t->seq() == 0) {
+    if (t == nullptr || !t->has_value()) {
         return;
     }
     n.repeat_of = t->seq();

@@ -26,7 +26,7 @@ constexpr std::size_t bytes_per_turn = 65536;
 } // namespace
 
 inbound::inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer)
-    : node_(std::move(host)), out_(out), peer_(peer), replies_(*node_, out),
+    : node_(std::move(host)), out_(out), peer_(peer), memory_(out.memory()), waiting_(memory_), replies_(*node_, out),
       bound_(node_, out, updates, peer, replies_) {
     if (out_.datagram() != 0) {
         datagrams_.emplace(*node_, out_, replies_);
@@ -59,11 +59,12 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
         return;
     }
     if (r.id == 0 && must_wait()) {
-        if (in_flight() < node_->bounds.in_flight) {
-            waiting_.push_line(line, now);
+        const bool too_many = in_flight() >= node_->bounds.in_flight;
+        if (!too_many && waiting_.push_line(line, now, r.noun.task == "cles")) {
             follow_waiting();
         } else {
-            refuse_in_turn(r, busy(node_->name + ": too many requests wait on this link"), now);
+            refuse_in_turn(
+                r, too_many ? busy(node_->name + ": too many requests wait on this link") : no_memory(*node_), now);
         }
         return;
     }
@@ -276,12 +277,16 @@ void inbound::serve_task(const protocol::request_line& r, time_point arrived, ti
     const auto due = later(arrived, std::chrono::milliseconds{r.deadline_ms});
     auto storage = std::exchange(decoded_, {}); // the handler may have other requests served meanwhile
     execution task{*node_, r, peer_, due, storage};
-    if (const auto why = task.refusal()) {
+    if (const auto why = task.refusal(memory_.get())) {
         refuse(r, *why, due, now);
-    } else if (!task.is_plain()) {
-        task.start(begin_call(r, task.terms(), due, now));
-    } else if (const auto failed = run_plain(r, task)) {
-        refuse(r, *failed, due, now);
+    } else if (task.is_plain()) {
+        if (const auto failed = run_plain(r, task)) {
+            refuse(r, *failed, due, now);
+        }
+    } else if (const auto c = begin_call(r, task.terms(), due, now)) {
+        task.start(c);
+    } else {
+        refuse(r, no_memory(*node_), due, now);
     }
     release_if_large(decoded_ = std::move(storage));
 }
@@ -307,6 +312,9 @@ void inbound::refuse(const protocol::request_line& r, const protocol::failure& w
 std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call::terms wanted, time_point due,
                                           time_point now) {
     auto c = std::make_shared<call>(node_, static_cast<call_owner&>(*this), std::move(wanted), now);
+    if (!c->hold(memory_, r.text.size())) {
+        return nullptr;
+    }
     if (r.id != 0) {
         if (datagrams_ && (r.verb == verb::pull || r.verb == verb::bind)) {
             datagrams_->begin_repeatable(r);
@@ -324,14 +332,13 @@ std::shared_ptr<call> inbound::open_call(const protocol::request_line& r, time_p
         replies_.fail(r, *why);
         return nullptr;
     }
-    return begin_call(r,
-                      {.verb = r.verb,
-                       .id = r.id,
-                       .wants_reply = r.wants_reply,
-                       .wants_progress = r.wants_progress,
-                       .urgent = r.urgent,
-                       .routed = true},
-                      due, now);
+    auto wanted = call::terms_of(r);
+    wanted.routed = true;
+    auto c = begin_call(r, std::move(wanted), due, now);
+    if (!c) {
+        replies_.fail(r, no_memory(*node_));
+    }
+    return c;
 }
 
 // -- calls ---------------------------------------------------------------------------------------------------------

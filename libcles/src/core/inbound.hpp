@@ -71,6 +71,8 @@ class inbound final : private call_owner, private call_opener {
     [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
 
   private:
+    static constexpr std::size_t longest_frame = 64; // of an answer: "id=7 ", and what closes it
+
     void serve(const protocol::request_line& request, time_point arrived, time_point now);
     void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
     void serve_here(const protocol::request_line& request, time_point arrived, time_point now);
@@ -78,6 +80,7 @@ class inbound final : private call_owner, private call_opener {
     std::optional<protocol::failure> run_plain(const protocol::request_line& request, execution& task);
     void refuse(const protocol::request_line& request, const protocol::failure& why, time_point due, time_point now);
 
+    /// Null where no memory is left for it; nothing has been answered then.
     std::shared_ptr<call> begin_call(const protocol::request_line& request, call::terms wanted, time_point due,
                                      time_point now);
     std::shared_ptr<call> open_call(const protocol::request_line& request, time_point due, time_point now) override;
@@ -94,6 +97,7 @@ class inbound final : private call_owner, private call_opener {
     void withdraw(std::uint64_t id);
     void answer(call& c, std::string_view json) override;
     void refuse(call& c, const protocol::failure& why) override;
+    [[nodiscard]] bool can_answer(std::size_t bytes) override { return out_.reserve(bytes + longest_frame); }
     void report(call& c, double fraction, std::string_view json) override;
     [[nodiscard]] std::string_view peer_address() const noexcept override { return peer_.address; }
     void detach(call& c);
@@ -103,6 +107,7 @@ class inbound final : private call_owner, private call_opener {
     const identity& peer_;
     boost::unordered_flat_map<std::uint64_t, std::shared_ptr<call>> calls_;
     std::shared_ptr<call> anonymous_;
+    std::shared_ptr<memory_account> memory_; // null: nobody counts
     waiting_requests waiting_;
     reply_writer replies_;
     std::optional<datagram_requests> datagrams_; // where it is no stream

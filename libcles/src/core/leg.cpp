@@ -30,6 +30,11 @@ leg_failure on_the_way(boost::system::error_code code, std::string_view message)
         why.begun = code != errc::too_large;
         return why;
     }
+    if (code == errc::busy) { // this node's own word: it holds too much already
+        why.told.code = errc::busy;
+        why.begun = false;
+        return why;
+    }
     if (code == errc::no_target) {
         why.told.code = errc::no_target;
     }

@@ -47,8 +47,10 @@ node::node(node_setup setup, const core::clock& source, std::function<void()> wa
     : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
       bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)),
       metrics(std::move(setup.metrics)), load(std::move(setup.load)), time(source), started(source.now()),
-      completions(std::move(setup.complete)), others(name, setup.epoch, deadlines, bounds.peers),
-      published({deadlines, counts, bounds.binding_bytes}, bounds, name, epoch, std::move(wake)),
+      completions(std::move(setup.complete)), memory(bounds.memory),
+      kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
+      kept_requests(std::make_shared<memory_account>(memory)), others(name, setup.epoch, deadlines, bounds.peers),
+      published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, name, epoch, std::move(wake)),
       remembered{.limit = bounds.remembered} {
     others.begin(setup.pool, started);
 }
@@ -169,6 +171,7 @@ void write_metrics(json_writer& w, const node& n) {
     number("requests_resent", c.requests_resent);
     number("replies_dropped", c.replies_dropped);
     number("updates_published", c.updates_published);
+    number("nouns_retired", c.nouns_retired);
     number("updates_delivered", c.updates_delivered);
     number("updates_shed", c.updates_shed);
     number("updates_too_large", c.updates_too_large);
@@ -198,6 +201,14 @@ void write_metrics(json_writer& w, const node& n) {
     number("links_lost", c.links_lost);
     number("bytes_received", c.bytes_received);
     number("bytes_sent", c.bytes_sent);
+    w.key("memory");
+    w.begin_object();
+    number("limit", n.memory.limit());
+    number("used", n.memory.used());
+    number("values", n.kept_values->used());
+    number("requests", n.kept_requests->used());
+    number("refused", n.memory.refusals());
+    w.end_object();
     w.key("handler_us");
     w.begin_object();
     number("samples", n.handler_time.count());

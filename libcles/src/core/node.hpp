@@ -12,6 +12,7 @@
 #include "core/deadlines.hpp"
 #include "core/dedup.hpp"
 #include "core/latency_histogram.hpp"
+#include "core/memory_budget.hpp"
 #include "core/presence.hpp"
 #include "core/publications.hpp"
 #include "core/reflection_limit.hpp"
@@ -19,6 +20,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -61,6 +63,9 @@ struct node {
 
     completion_queue completions;
     std::vector<std::string> endpoints;
+    memory_budget memory;                                ///< of what is held for peers
+    const std::shared_ptr<memory_account> kept_values;   ///< last values, and updates that are queued
+    const std::shared_ptr<memory_account> kept_requests; ///< of this node's own and of clients, which wait for a link
     registry tasks;
     deadline_queue deadlines;
     presence others;

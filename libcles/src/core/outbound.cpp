@@ -28,13 +28,18 @@ void outbound::send(protocol::request_text request, time_point deadline, time_po
     request.id += first_id_;
     auto& out = out_.output();
     const auto line = out.size();
+    e->no_memory = !has_memory_for(request);
     protocol::append_request(out, request);
     e->operation = std::move(operation);
     e->progress = std::move(progress);
     if (out.size() - line > longest()) {
         e->too_large = true;
+        e->no_memory = false;
         out.resize(line);
         node_.deadlines.arm(*e, now); // fails when the caller has gone on: no operation ends while it begins
+    } else if (e->no_memory) {
+        out.resize(line);
+        node_.deadlines.arm(*e, now);
     } else if (is_datagram()) {
         e->copies.emplace(out.substr(line), now, deadline,
                           static_cast<std::uint32_t>((e->id + first_id_) * 2654435761U));
@@ -47,6 +52,13 @@ void outbound::send(protocol::request_text request, time_point deadline, time_po
     out_.wake();
 }
 
+// What keeps a network together is asked whatever else waits.
+bool outbound::has_memory_for(const protocol::request_text& r) {
+    constexpr std::size_t always_fits = 1024;
+    const auto bytes = r.noun.size() + r.adverbs.size() + r.body.size();
+    return bytes <= always_fits || r.noun.find(":cles") != std::string_view::npos || out_.reserve(bytes + always_fits);
+}
+
 // On a stream too: the peer would end the link over it, and withdraw what others ask for there.
 std::size_t outbound::longest() const noexcept { return is_datagram() ? out_.datagram() : node_.bounds.line + 1; }
 
@@ -55,6 +67,8 @@ void outbound::on_due(entry& e, time_point now) {
         fail(e.id, errc::too_large,
              is_datagram() ? "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP"
                            : "a request has at most " + std::to_string(node_.bounds.line) + " bytes");
+    } else if (e.no_memory) {
+        fail(e.id, errc::busy, "too much waits for the peer or others to take it (limits.memory)");
     } else if (e.copies && !e.copies->over(now)) {
         out_.output().append(e.copies->again(now));
         ++node_.counts.requests_resent;
@@ -83,6 +97,7 @@ void outbound::recycle(std::unique_ptr<entry> e) {
         e->reported = 0;
         e->copies.reset();
         e->too_large = false;
+        e->no_memory = false;
         spare_.push_back(std::move(e));
     }
 }

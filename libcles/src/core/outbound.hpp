@@ -67,11 +67,13 @@ class outbound {
         double reported = 0;
         std::optional<resend> copies; // by datagram
         bool too_large = false;
+        bool no_memory = false;
     };
 
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
     /// What a request may have, with its LF.
     [[nodiscard]] std::size_t longest() const noexcept;
+    [[nodiscard]] bool has_memory_for(const protocol::request_text& request);
     void on_due(entry& e, time_point now);
     void go_on(std::unique_ptr<entry> e, time_point due);
     std::unique_ptr<entry> take(std::uint64_t id);

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "core/memory_budget.hpp"
+
 #include <cstddef>
+#include <memory>
 #include <string>
 
 namespace cles::core {
@@ -21,6 +24,11 @@ class outlet {
     [[nodiscard]] virtual std::size_t datagram() const noexcept { return 0; }
     /// Something was appended outside of a call that the link made: it is to be sent soon.
     virtual void wake() = 0;
+    /// Who answers for the memory that is held for the peer; null where nobody counts.
+    [[nodiscard]] virtual std::shared_ptr<memory_account> memory() const { return nullptr; }
+    /// Whether so much more output may wait for the peer than waits now, as far as the node's memory goes; it counts
+    /// from then on.
+    [[nodiscard]] virtual bool reserve(std::size_t /*more*/) { return true; }
     /// The peer does not take what it is sent: what may be left out should be.
     [[nodiscard]] virtual bool is_behind() const = 0;
     /// Stops handing over lines, or goes on.

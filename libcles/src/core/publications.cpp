@@ -4,6 +4,7 @@
 #include <cles/convert.hpp>
 #include <cles/error.hpp>
 
+#include "core/raised.hpp"
 #include "core/result_text.hpp"
 #include "protocol/message.hpp"
 
@@ -19,7 +20,7 @@ std::string_view task_of(std::string_view path) { return path.substr(0, path.fin
 
 publications::publications(topic_context shared, const cles::limits& bounds, std::string publisher, std::string epoch,
                            std::function<void()> wake)
-    : shared_(shared), bounds_(bounds), publisher_(std::move(publisher)), epoch_(std::move(epoch)),
+    : shared_(std::move(shared)), bounds_(bounds), publisher_(std::move(publisher)), epoch_(std::move(epoch)),
       wake_(std::move(wake)) {}
 
 topic* publications::find(std::string_view path) noexcept {
@@ -33,21 +34,36 @@ topic* publications::find(std::string_view path) noexcept {
 bool publications::knows(std::string_view task) const noexcept { return nouns_.contains(task); }
 
 bool publications::can_open(std::string_view path) noexcept {
-    const auto count = nouns_.find(task_of(path));
-    return count == nouns_.end() || count->second.count < bounds_.nouns || find(path) != nullptr;
+    const auto nouns = nouns_.find(task_of(path));
+    return nouns == nouns_.end() || nouns->second->count < bounds_.nouns || find(path) != nullptr;
 }
 
-topic& publications::open(std::string_view path) {
+bool publications::can_publish(std::string_view path) noexcept {
+    return can_open(path) || oldest_idle(*nouns_.find(task_of(path))->second) != nullptr;
+}
+
+topic& publications::open(std::string_view path) { return open(path, false); }
+
+topic& publications::open(std::string_view path, bool to_publish) {
     if (auto* existing = find(path)) {
         return *existing;
     }
     const auto task = task_of(path);
-    auto& count = nouns_[std::string{task}].count;
-    if (count >= bounds_.nouns) {
-        throw error(errc::busy, "'" + std::string{task} + "' has " + std::to_string(count) + " nouns already");
+    auto& nouns = nouns_[std::string{task}];
+    if (!nouns) {
+        nouns = std::make_unique<task_nouns>();
     }
-    ++count;
-    auto made = std::make_unique<topic>(shared_, std::string{path});
+    if (nouns->count >= bounds_.nouns) {
+        auto* oldest = to_publish ? oldest_idle(*nouns) : nullptr;
+        if (oldest == nullptr) {
+            throw error(errc::busy, "'" + std::string{task} + "' has " + std::to_string(nouns->count) +
+                                        (to_publish ? " nouns that are bound" : " nouns already"));
+        }
+        retire(*oldest);
+    }
+    ++nouns->count;
+    // Above all that are not remembered, so that no number of a noun that returns was there before.
+    auto made = std::make_unique<topic>(shared_, std::string{path}, highest_retired_, nouns.get());
     auto& result = *made;
     topics_.emplace(std::string{path}, std::move(made));
     if (opened_) {
@@ -56,14 +72,65 @@ topic& publications::open(std::string_view path) {
     return result;
 }
 
+// Those that somebody has bound meanwhile leave the list: they come back when their last binder has gone.
+topic* publications::oldest_idle(task_nouns& of) noexcept {
+    while (!of.idle.empty()) {
+        auto& oldest = of.idle.front();
+        if (!oldest.is_bound() && oldest.waiters().empty()) {
+            return &oldest;
+        }
+        of.idle.pop_front();
+    }
+    return nullptr;
+}
+
+void publications::use(topic& t) noexcept {
+    if (t.is_bound()) {
+        return; // and where it is in the list, it is passed over there
+    }
+    auto& idle = t.task->idle;
+    if (t.is_linked()) {
+        if (&idle.back() == &t) {
+            return;
+        }
+        t.unlink();
+    }
+    idle.push_back(t);
+}
+
 void publications::tidy(topic& t) {
-    if (t.is_bound() || t.seq() != 0 || !t.waiters().empty()) {
+    if (t.is_bound() || !t.waiters().empty()) {
         return;
     }
+    if (t.has_value()) {
+        use(t);
+    } else {
+        remove(t);
+    }
+}
+
+bool publications::retire(std::string_view path) {
+    auto* t = find(path);
+    if (t == nullptr || !t->has_value() || t->is_begun()) {
+        return false;
+    }
+    retire(*t);
+    return true;
+}
+
+void publications::retire(topic& t) {
+    ++shared_.counts.nouns_retired;
+    t.retire();
+    tidy(t);
+}
+
+void publications::remove(topic& t) {
+    highest_retired_ = std::max(highest_retired_, t.seq());
     const std::string path = t.path();
-    const auto count = nouns_.find(task_of(path));
-    if (count != nouns_.end() && --count->second.count == 0) {
-        nouns_.erase(count);
+    // A task that was published stays open for BIND, whichever of its nouns there are.
+    if (--t.task->count == 0 && !t.task->published) {
+        t.unlink();
+        nouns_.erase(std::string{task_of(path)});
     }
     std::erase(dirty_, &t);
     if (recent_ == &t) {
@@ -73,7 +140,13 @@ void publications::tidy(topic& t) {
 }
 
 void publications::publish(std::string_view path, const std::function<void(json_writer&)>& write) {
-    auto& t = open(path);
+    auto& t = open(path, true);
+    if (t.is_begun()) {
+        throw error(errc::failed, "'" + t.path() + "' is published while a value of it is being written");
+    }
+    if (t.is_linked()) {
+        t.unlink(); // it cannot retire while it is written, whatever else is published meanwhile
+    }
     auto& line = t.begin();
     const auto start = line.size();
     protocol::append_update_head(line, publisher_, t.path(), t.seq() + 1, epoch_);
@@ -91,6 +164,24 @@ void publications::publish(std::string_view path, const std::function<void(json_
     }
 }
 
+// Past the memory that there is, first updates go that slow binders have not taken, then nouns that nobody is bound to.
+void publications::take_memory(topic& t) {
+    if (t.hold()) {
+        return;
+    }
+    if (!lossless_) {
+        t.shed();
+    }
+    while (!t.hold()) {
+        auto* oldest = oldest_idle(*t.task);
+        if (oldest == nullptr) {
+            throw error(errc::busy,
+                        "an update of '" + t.path() + "' does not fit the memory that is left (limits.memory)");
+        }
+        retire(*oldest);
+    }
+}
+
 void publications::publish_body(std::string_view path, std::string_view body) {
     publish(path, [body](json_writer& w) { w.raw(body); });
 }
@@ -104,10 +195,10 @@ void publications::end(topic& t, std::size_t body_at) {
     if (protocol::begins_with_error(line.substr(body_at))) {
         throw error(errc::failed, "an update whose first key is 'error' would be taken for a failure");
     }
+    take_memory(t);
     t.commit(body_at);
-    if (t.seq() == 1) {
-        ++nouns_.find(task_of(t.path()))->second.published;
-    }
+    t.task->published = true;
+    use(t);
     recent_ = &t;
     to_binders_ += t.is_bound() ? 1U : 0U;
     mark(t);
@@ -122,14 +213,19 @@ void publications::mark(topic& t) {
     }
 }
 
+void publications::publish_lossless(std::string_view path, std::string_view body) {
+    const raised all_of_it{lossless_};
+    publish_body(path, body);
+}
+
 bool publications::publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation,
                                      std::uint64_t ticket) {
-    auto& t = open(path);
+    auto& t = open(path, true);
     if (!t.waiters().empty() || !t.has_room()) {
         t.waiters().push_back({std::string{body}, std::move(operation), ticket});
         return false;
     }
-    publish_body(path, body);
+    publish_lossless(path, body);
     keep({.operation = std::move(operation)});
     return true;
 }
@@ -172,7 +268,7 @@ void publications::admit(topic& t) {
     while (!waiting.empty() && t.has_room()) {
         publication_result result;
         try {
-            publish_body(t.path(), waiting.front().body);
+            publish_lossless(t.path(), waiting.front().body);
         } catch (const error& e) {
             result.code = e.code();
             result.why = e.message();
@@ -206,7 +302,7 @@ std::vector<detail::pending_ptr> publications::take_waiters() {
 std::vector<std::string> publications::tasks() const {
     std::vector<std::string> names;
     for (const auto& [task, nouns] : nouns_) {
-        if (nouns.published != 0) {
+        if (nouns->published) {
             names.push_back(task);
         }
     }

@@ -22,7 +22,17 @@
 
 namespace cles::core {
 
-/// All that a node publishes.
+/// The nouns of one task.
+struct task_nouns {
+    using idle_list = boost::intrusive::list<topic, boost::intrusive::constant_time_size<false>>;
+
+    std::size_t count = 0;
+    bool published = false; ///< at least one of them has been
+    idle_list idle{};       ///< nobody was bound to them when they were used last; the one used longest ago first
+};
+
+/// All that a node publishes. A task whose nouns are as many as they may be, or take as much memory, goes on with new
+/// ones: those retire for them that nobody is bound to, the one that was used longest ago first.
 class publications final : public topic_source {
   public:
     /// `wake` is called when there is something to drain or to tell, once until `drain` and until all is told.
@@ -30,7 +40,8 @@ class publications final : public topic_source {
                  std::function<void()> wake);
 
     /// Publishes what `write` writes (a body, or a scalar that is wrapped). The path is canonical.
-    /// \throws cles::error: `too_large`, `busy`, `failed`; what `write` throws. Nothing is published then.
+    /// \throws cles::error: `too_large`, `busy`, `failed`; what `write` throws. Nothing is published then, but nouns
+    /// may have retired.
     void publish(std::string_view path, const std::function<void(json_writer&)>& write);
     /// Publishes JSON that is known to be valid and without white space.
     void publish_body(std::string_view path, std::string_view body);
@@ -53,11 +64,15 @@ class publications final : public topic_source {
     [[nodiscard]] topic* find(std::string_view path) noexcept override;
     /// Whether anything of the task has been published or bound.
     [[nodiscard]] bool knows(std::string_view task) const noexcept;
-    /// The topic, made if need be.
+    /// The topic, to be bound to; made if need be. No other retires for it, since anybody may bind anything.
     /// \throws cles::error with `busy` where the task has too many nouns
     topic& open(std::string_view path);
     /// Whether `open` finds or makes it.
     [[nodiscard]] bool can_open(std::string_view path) noexcept;
+    /// Whether it can be published, as far as the number of nouns goes.
+    [[nodiscard]] bool can_publish(std::string_view path) noexcept;
+    /// Forgets the last value, and the noun with it where nobody is bound. False where there is none.
+    bool retire(std::string_view path);
     /// Forgets a topic that nobody is bound to and that was never published.
     void tidy(topic& t);
     /// Publishers that waited for this binder may go on.
@@ -81,6 +96,14 @@ class publications final : public topic_source {
     [[nodiscard]] std::vector<std::string> tasks() const;
 
   private:
+    topic& open(std::string_view path, bool to_publish);
+    [[nodiscard]] static topic* oldest_idle(task_nouns& of) noexcept;
+    void retire(topic& t);
+    void remove(topic& t);
+    static void use(topic& t) noexcept;
+    void take_memory(topic& t);
+    /// What slow binders have not taken stays, whatever it takes.
+    void publish_lossless(std::string_view path, std::string_view body);
     void end(topic& t, std::size_t body_at);
     void mark(topic& t);
     void keep(publication_result result);
@@ -91,15 +114,13 @@ class publications final : public topic_source {
     std::string epoch_;
     std::function<void()> wake_;
     std::function<void(topic&)> opened_;
+    text_map<std::unique_ptr<task_nouns>> nouns_; // per task
     text_map<std::unique_ptr<topic>> topics_;
-    struct task_nouns {
-        std::size_t count = 0;
-        std::size_t published = 0; // of them
-    };
-    text_map<task_nouns> nouns_; // per task
+    std::uint64_t highest_retired_ = 0; // the highest `seq` that is not remembered any more
     std::vector<topic*> dirty_;
     std::deque<publication_result> results_;
     std::uint64_t to_binders_ = 0;
+    bool lossless_ = false;
     topic* recent_ = nullptr; // most publish the same noun again
 };
 

@@ -7,6 +7,10 @@ namespace cles::core {
 
 protocol::failure busy(std::string message) { return {.code = errc::busy, .message = std::move(message)}; }
 
+protocol::failure no_memory(const node& n) {
+    return busy(n.name + ": too much waits or runs for this link or all of them (limits.memory)");
+}
+
 protocol::failure no_such_task(const node& n, const protocol::request_line& r) {
     return {.code = errc::no_task,
             .message = n.name + " has no " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} + "'"};

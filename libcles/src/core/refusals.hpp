@@ -13,6 +13,8 @@
 namespace cles::core {
 
 protocol::failure busy(std::string message);
+/// The node holds as much for its peers as it may, or this peer more than is left for others.
+protocol::failure no_memory(const node& n);
 protocol::failure no_such_task(const node& n, const protocol::request_line& request);
 /// A line over the limit; `datagram`: bytes of one, 0 on a stream.
 protocol::failure overlong(const node& n, std::size_t datagram);

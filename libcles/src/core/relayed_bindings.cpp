@@ -32,6 +32,10 @@ void relayed_bindings::bind(std::string_view node, std::string_view path, std::s
                         c->fail(why);
                         return;
                     }
+                    if (!c->can_answer(last.size())) {
+                        c->fail({.code = errc::busy, .message = "no memory is left for the answer (limits.memory)"});
+                        return;
+                    }
                     // Bound before the answer, which may set off what else the peer asked for; updates follow it later.
                     bound_.bind(*t, wanted);
                     if (!has(by_name_, noun)) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/relays.hpp"
 
+#include "core/refusals.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -9,7 +11,10 @@ namespace cles::core {
 class relays::relay final : public feed_events {
   public:
     relay(relays& owner, const std::string& noun)
-        : owner_(owner), topic_({owner.node_.deadlines, owner.counts_, owner.node_.bounds.binding_bytes}, noun) {}
+        : owner_(owner),
+          topic_({owner.node_.deadlines, owner.counts_, owner.node_.bounds.binding_bytes, owner.node_.kept_values},
+                 noun),
+          held_last_(owner.node_.kept_values) {}
 
     void start(std::string_view node, std::string_view path, std::string_view adverbs) {
         ticket_ = owner_.out_.bind(node, path, adverbs, *this);
@@ -32,11 +37,15 @@ class relays::relay final : public feed_events {
         bound_ = true;
         last_ = last;
         fresh_ = last_ != topic_.last_body(); // a node that says which update it is has had it told as one
+        held_last_.resize(last_.size());
         telling_ = true;
         for (auto& tell : std::exchange(waiting_, {})) {
             tell(&topic_, last_, {});
         }
         telling_ = false;
+        if (!fresh_) {
+            forget_last();
+        }
         if (!is_wanted()) {
             owner_.close(*this);
         }
@@ -50,11 +59,19 @@ class relays::relay final : public feed_events {
     }
     void on_update(std::string_view line, std::string_view body) override {
         topic_.begin().append(line);
+        if (!topic_.hold()) { // the newest goes on all the same: nobody would send it again
+            topic_.shed();
+        }
+        forget_last();
         topic_.commit(line.size() - body.size());
         fresh_ = false;
         owner_.mark(topic_);
     }
 
+    void forget_last() noexcept {
+        std::string{}.swap(last_);
+        held_last_.resize(0);
+    }
     /// Of the last update, or of the answer to BIND where that is newer.
     [[nodiscard]] std::string_view last_value() const noexcept { return fresh_ ? last_ : topic_.last_body(); }
 
@@ -65,6 +82,7 @@ class relays::relay final : public feed_events {
     bool telling_ = false;
     bool fresh_ = false;
     std::string last_;
+    memory_reservation held_last_;
     std::vector<told> waiting_;
 };
 
@@ -81,6 +99,10 @@ void relays::join(std::string_view node, std::string_view path, std::string_view
     }
     if (all_.size() >= node_.bounds.nouns || stopped_) {
         tell(nullptr, {}, {.code = errc::busy, .message = "as many nouns are passed on as may be"});
+        return;
+    }
+    if (!node_.kept_values->has_room(1)) {
+        tell(nullptr, {}, no_memory(node_));
         return;
     }
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;

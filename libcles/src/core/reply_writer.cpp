@@ -10,6 +10,7 @@ namespace cles::core {
 namespace {
 
 constexpr std::size_t longest_escape = 6; // "\u0000"
+constexpr std::size_t always_fits = 1024; // what would take its place takes about as much
 constexpr std::size_t head_room = 24;     // times as much is enough for all that stands around a failure's message
 
 // Shortens text, but not inside a character.
@@ -55,6 +56,12 @@ void reply_writer::send(reply_to where, std::string& text, std::size_t body) {
               .message = node_.name + ": the answer has " + std::to_string(text.size()) + " bytes, the limit is " +
                          std::to_string(longest_) + (out_.datagram() == 0 ? "" : " by datagram: use TCP"),
               .ran = true});
+    } else if (where.wanted && text.size() > always_fits && !where.reserved && !out_.reserve(text.size() + 1)) {
+        fail(where, {.code = errc::busy,
+                     .message = node_.name + ": no memory is left for the answer's " + std::to_string(text.size()) +
+                                " bytes (limits.memory)",
+                     .retry_ms = 1000,
+                     .ran = true});
     } else if (where.wanted) {
         text.push_back('\n');
         output_for(where).append(text);

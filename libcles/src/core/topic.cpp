@@ -71,7 +71,7 @@ bool binding::is_behind() const noexcept { return seen_ != source_.log_.last(); 
 void binding::on_deadline(time_point now) { drain(now); }
 
 std::string_view topic::last_body() const noexcept {
-    if (seq() == 0) {
+    if (!has_value_) {
         return {};
     }
     auto line = last_line();
@@ -83,16 +83,20 @@ std::string_view topic::last_body() const noexcept {
 std::optional<update_mark> topic::last_mark() const {
     protocol::request_line update;
     protocol::malformed_request ignored;
-    if (seq() == 0 || !protocol::parse_request(protocol::trim(last_line()), update, ignored) || !update.is_update()) {
+    if (!has_value_ || !protocol::parse_request(protocol::trim(last_line()), update, ignored) || !update.is_update()) {
         return std::nullopt;
     }
     return update_mark{.seq = *update.seq, .epoch = *update.epoch};
 }
 
-std::string_view topic::last_line() const noexcept { return log_.lines(seq(), seq()); }
+std::string_view topic::last_line() const noexcept {
+    return has_value_ ? log_.lines(seq(), seq()) : std::string_view{};
+}
 
 void topic::commit(std::size_t body_at) {
     log_.commit();
+    begun_ = false;
+    has_value_ = true;
     last_body_at_ = body_at;
     ++shared_.counts.updates_published;
     const auto newest = log_.last();
@@ -104,6 +108,41 @@ void topic::commit(std::size_t body_at) {
     // A binder with a large `keep` may hold more lines than bytes.
     while (log_.first() < newest && log_.bytes(log_.first(), newest) > shared_.binding_bytes) {
         log_.forget_before(log_.first() + 1);
+    }
+    // What is large and stays for good takes no more than it is long; what is sent on in a row keeps its buffer.
+    constexpr std::size_t roomy = 65536;
+    if (!unthinned_ && log_.memory() > roomy && log_.memory() / 4 * 3 > log_.bytes(log_.first(), newest)) {
+        log_.fit();
+    }
+    held_.resize(log_.memory());
+}
+
+void topic::roll_back() {
+    log_.roll_back();
+    begun_ = false;
+    if (log_.memory() > held_.size()) {
+        log_.fit();
+        held_.resize(log_.memory());
+    }
+}
+
+void topic::shed() {
+    if (!log_.empty()) {
+        log_.forget_before(log_.last());
+    }
+    log_.fit();
+}
+
+void topic::retire() {
+    has_value_ = false;
+    forget_retired();
+}
+
+void topic::forget_retired() noexcept {
+    if (!has_value_ && !log_.empty() &&
+        std::none_of(bindings_.begin(), bindings_.end(), [](const auto& b) { return b->is_behind(); })) {
+        log_.clear();
+        held_.resize(log_.memory());
     }
 }
 
@@ -173,6 +212,7 @@ void topic::refresh() noexcept {
             longest_keep_ = std::max(longest_keep_, b->terms_.keep);
         }
     }
+    forget_retired();
 }
 
 } // namespace cles::core

@@ -6,7 +6,10 @@
 
 #include "core/counters.hpp"
 #include "core/deadlines.hpp"
+#include "core/memory_budget.hpp"
 #include "core/update_log.hpp"
+
+#include <boost/intrusive/list.hpp>
 
 #include <chrono>
 #include <cstdint>
@@ -72,31 +75,51 @@ struct topic_context {
     deadline_queue& deadlines;
     counters& counts;
     std::size_t binding_bytes;
+    std::shared_ptr<memory_account> memory{}; ///< of what topics keep; null: nobody counts
 };
 
-/// A noun that is published: its last updates, who is bound to it and how far each has got.
-class topic {
+struct task_nouns;
+
+/// A noun that is published: its last updates, who is bound to it and how far each has got. In a list while nobody is
+/// bound to it, so that those can be found that nobody needs.
+class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>> {
   public:
-    topic(topic_context shared, std::string path) : shared_(shared), path_(std::move(path)) {}
+    /// Its first update is numbered one more than `last`.
+    topic(topic_context shared, std::string path, std::uint64_t last = 0, task_nouns* of = nullptr)
+        : task(of), shared_(std::move(shared)), path_(std::move(path)), log_(last), held_(shared_.memory) {}
+
+    task_nouns* const task; ///< among which it counts
 
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
     [[nodiscard]] std::uint64_t seq() const noexcept { return log_.last(); }
-    /// The body of the last update; empty before the first.
+    /// Something has been published and not retired.
+    [[nodiscard]] bool has_value() const noexcept { return has_value_; }
+    /// The body of the last update; empty where there is none.
     [[nodiscard]] std::string_view last_body() const noexcept;
 
-    /// Which update that is; nothing before the first.
+    /// Which update that is; nothing where there is none.
     [[nodiscard]] std::optional<update_mark> last_mark() const;
 
-    /// The last update with its LF; empty before the first.
+    /// The last update with its LF; empty where there is none.
     [[nodiscard]] std::string_view last_line() const noexcept;
 
     /// Begins the next update: append the line to what is returned, then `commit` (saying where in the line the body
     /// begins) or `roll_back`.
-    std::string& begin() { return log_.begin(); }
+    std::string& begin() {
+        begun_ = true;
+        return log_.begin();
+    }
+    [[nodiscard]] bool is_begun() const noexcept { return begun_; }
     [[nodiscard]] std::string_view pending() const noexcept { return log_.pending(); }
     /// Ends the line and makes it the last update.
     void commit(std::size_t body_at);
-    void roll_back() { log_.roll_back(); }
+    void roll_back();
+    /// Takes note of the memory that its updates take, what was begun included. False where there is not as much.
+    [[nodiscard]] bool hold() noexcept { return held_.try_resize(log_.memory()); }
+    /// Forgets what waits for slow binders, but for the last update and what was begun.
+    void shed();
+    /// Forgets the last update, once every binder has it.
+    void retire();
 
     binding& bind(binder& target, binding::terms wanted);
     /// False where it was not bound.
@@ -121,10 +144,14 @@ class topic {
 
   private:
     friend binding;
+    void forget_retired() noexcept;
 
     topic_context shared_;
     std::string path_;
     update_log log_;
+    memory_reservation held_;
+    bool begun_ = false;
+    bool has_value_ = false;
     std::size_t last_body_at_ = 0;
     std::vector<std::unique_ptr<binding>> bindings_;
     std::deque<waiter> waiters_;

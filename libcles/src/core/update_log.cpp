@@ -33,31 +33,48 @@ std::string_view update_log::lines(std::uint64_t from, std::uint64_t to) const n
 }
 
 void update_log::forget_before(std::uint64_t from) {
-    const auto newest = last();
-    if (newest == 0) {
+    if (empty()) {
         return;
     }
-    from = std::min(from, newest);
+    from = std::min(from, last());
     if (from <= first_) {
         return;
     }
     text_head_ = start_of(from);
     head_ += static_cast<std::size_t>(from - first_);
     first_ = from;
-    // What is forgotten is given back once it is the larger part, which keeps the cost per line constant.
-    if (text_head_ > 4096 && text_head_ > text_.size() / 2) {
-        text_.erase(0, text_head_);
-        ends_.erase(ends_.begin(), ends_.begin() + static_cast<std::ptrdiff_t>(head_));
-        for (auto& end : ends_) {
-            end -= text_head_;
-        }
-        text_head_ = 0;
-        head_ = 0;
+    // What is forgotten is given back once it is no less than the rest, which keeps the cost per line constant.
+    if (text_head_ > 4096 && text_head_ >= text_.size() - text_head_) {
+        compact();
         constexpr std::size_t roomy = 65536;
         if (text_.capacity() > roomy && text_.size() < text_.capacity() / 8) {
             text_.shrink_to_fit();
         }
     }
+}
+
+void update_log::compact() {
+    text_.erase(0, text_head_);
+    ends_.erase(ends_.begin(), ends_.begin() + static_cast<std::ptrdiff_t>(head_));
+    for (auto& end : ends_) {
+        end -= text_head_;
+    }
+    begun_ -= std::min(begun_, text_head_);
+    text_head_ = 0;
+    head_ = 0;
+}
+
+void update_log::clear() noexcept {
+    first_ = last() + 1;
+    std::string{}.swap(text_); // assigned {}, they would keep their memory
+    std::vector<std::size_t>{}.swap(ends_);
+    text_head_ = head_ = begun_ = 0;
+}
+
+void update_log::fit() {
+    compact();
+    text_.shrink_to_fit();
+    ends_.shrink_to_fit();
 }
 
 } // namespace cles::core

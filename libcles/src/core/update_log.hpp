@@ -15,6 +15,9 @@ namespace cles::core {
 /// what a binder has missed goes out as one contiguous piece. Lines are numbered from 1, like `seq`.
 class update_log {
   public:
+    /// The first line is numbered one more than `last`.
+    explicit update_log(std::uint64_t last = 0) noexcept : first_(last + 1) {}
+
     /// Begins a line: append it to the string, without its LF, then `commit` or `roll_back`.
     std::string& begin();
     void commit();
@@ -22,7 +25,7 @@ class update_log {
     /// What has been appended since `begin`.
     [[nodiscard]] std::string_view pending() const noexcept;
 
-    /// The number of the newest line; 0 before the first.
+    /// The number of the newest line; before the first, what the log was made with.
     [[nodiscard]] std::uint64_t last() const noexcept { return first_ + sizes() - 1; }
     /// The number of the oldest line that is kept.
     [[nodiscard]] std::uint64_t first() const noexcept { return first_; }
@@ -33,9 +36,19 @@ class update_log {
     }
     /// Forgets all lines before `from`, but never the newest.
     void forget_before(std::uint64_t from);
+    /// Forgets all lines. The next one is numbered on.
+    void clear() noexcept;
+    /// Gives back what it does not need.
+    void fit();
+    [[nodiscard]] bool empty() const noexcept { return sizes() == 0; }
+    /// Bytes that it takes, what is begun and what is kept in reserve included.
+    [[nodiscard]] std::size_t memory() const noexcept {
+        return text_.capacity() + ends_.capacity() * sizeof(std::size_t);
+    }
 
   private:
     [[nodiscard]] std::uint64_t sizes() const noexcept { return ends_.size() - head_; }
+    void compact();
     [[nodiscard]] std::size_t start_of(std::uint64_t number) const noexcept;
 
     std::string text_;

@@ -22,6 +22,7 @@ constexpr std::chrono::seconds idle_after{2};
 
 connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from)
     : engine_(std::move(host)), link_(std::move(carrier)), from_(from),
+      memory_(std::make_shared<core::memory_account>(engine_->node().memory)),
       session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
     if (link_->datagram() == 0) {
         monitor_.emplace(static_cast<core::link_monitor::owner&>(*this), engine_->deadlines(), engine_->bounds(),
@@ -158,7 +159,9 @@ void connection::close() {
 }
 
 bool connection::takes_updates() const {
-    const bool takes = link_->unsent() < updates_wait_past;
+    // Where nothing waits one more always goes: nothing else would ask for it again.
+    const auto unsent = link_->unsent();
+    const bool takes = unsent < updates_wait_past && (unsent == 0 || memory_->has_room(unsent));
     updates_wait_ = updates_wait_ || !takes;
     return takes;
 }
@@ -221,6 +224,7 @@ void connection::serve_more() {
 // A peer that does not read its replies is not read from either; one that takes nothing for long is left.
 void connection::follow_backlog() {
     const auto unsent = link_->unsent();
+    held_output_.resize(unsent);
     const auto& bounds = engine_->bounds();
     const bool too_much = unsent > (pause_for_backlog_ ? bounds.unread / 2 : bounds.unread);
     if (too_much != pause_for_backlog_) {
@@ -349,6 +353,7 @@ void connection::end(std::string_view why) {
     if (monitor_) {
         monitor_->stop();
     }
+    held_output_.resize(0);
     engine_->forget(*this, link_->received(), link_->sent());
     lose_feeds(why);
     session_.on_lost(why);

@@ -84,6 +84,8 @@ class connection final : public link_events,
     // outlet
     std::string& output() override { return link_->output(); }
     std::string& urgent_output() override { return link_->urgent_output(); }
+    [[nodiscard]] std::shared_ptr<core::memory_account> memory() const override { return memory_; }
+    [[nodiscard]] bool reserve(std::size_t more) override { return held_output_.try_resize(link_->unsent() + more); }
     [[nodiscard]] std::size_t datagram() const noexcept override { return link_->datagram(); }
     void wake() override;
     [[nodiscard]] bool is_behind() const override;
@@ -132,6 +134,8 @@ class connection final : public link_events,
     std::shared_ptr<detail::engine> engine_;
     link_ptr link_;
     origin from_;
+    std::shared_ptr<core::memory_account> memory_;
+    core::memory_reservation held_output_{memory_};
     core::session session_;
     stall_watch stall_;
     idle_watch idle_;

@@ -47,7 +47,18 @@ void route::send(const request& r, detail::pending_ptr operation, core::outbound
         put(*c, r, std::move(operation), std::move(progress));
         return;
     }
+    constexpr std::size_t around = 512; // the text, about
+    core::memory_reservation held{engine_->node().kept_requests};
+    const auto bytes = r.noun.size() + r.adverbs.size() + r.body.size() + around;
+    if (r.noun.find(":cles") != std::string_view::npos) { // what keeps a network together
+        held.resize(bytes);
+    } else if (!held.try_resize(bytes)) {
+        engine_->fail_later(std::move(operation), errc::busy,
+                            "too much waits for a link to " + address_ + " or others (limits.memory)");
+        return;
+    }
     auto w = std::make_unique<waiting>(*this);
+    w->memory = std::move(held);
     w->verb = r.verb;
     w->noun = r.noun;
     w->adverbs = r.adverbs;
@@ -143,6 +154,7 @@ void route::serve_waiting(const std::shared_ptr<connection>& c) {
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
         engine_->deadlines().disarm(w);
+        w.memory.resize(0); // the link counts it now
         put(*c, w.asked(now), std::move(w.operation), std::move(w.progress));
     }
     for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {
@@ -163,6 +175,7 @@ void route::hand_over(route& way) {
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
         engine_->deadlines().disarm(w);
+        w.memory.resize(0);
         way.send(w.asked(now), std::move(w.operation), std::move(w.progress));
     }
     for (auto binders = std::exchange(binders_, {}); !binders.empty(); binders.pop_front()) {

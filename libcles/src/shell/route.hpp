@@ -92,6 +92,7 @@ class route : public std::enable_shared_from_this<route> {
         bool urgent = false;
         time_point deadline{};
         detail::pending_ptr operation;
+        core::memory_reservation memory;
         core::outbound::progress_function progress;
     };
     struct binder {
