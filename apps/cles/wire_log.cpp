@@ -139,6 +139,7 @@ class logged_acceptor final : public cles::acceptor {
             on_link(std::make_shared<logged_link>(std::move(arrived), where, log));
         });
     }
+    void accept_waiting() override { inside_->accept_waiting(); }
     void close() override { inside_->close(); }
 
   private:

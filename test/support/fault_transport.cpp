@@ -167,6 +167,7 @@ class faulty_acceptor final : public acceptor {
             }
         });
     }
+    void accept_waiting() override { inside_->accept_waiting(); }
     void close() override { inside_->close(); }
 
   private:

@@ -97,6 +97,9 @@ class acceptor {
     [[nodiscard]] virtual url local() const = 0;
     /// Hands every link that comes in to the callback; problems that pass (no descriptors left) go to the log.
     virtual void start(std::function<void(link_ptr)> on_link) = 0;
+    /// Hands over the links that have connected already, also one that is being accepted when `close` follows: `close`
+    /// alone resets them, and their peers could not know whether what they have sent was run.
+    virtual void accept_waiting() {}
     virtual void close() = 0;
 };
 

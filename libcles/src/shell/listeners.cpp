@@ -71,6 +71,9 @@ void listeners::close() {
 }
 
 void listeners::turn_away() {
+    for (const auto& each : open_) {
+        each->accept_waiting();
+    }
     std::erase_if(open_, [](const auto& each) { return each->local().scheme != "udp"; });
 }
 

@@ -34,16 +34,15 @@ class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Prot
 
     void close() {
         boost::system::error_code ignored;
-        take_what_has_come();
         acceptor_.close(ignored); // with it the last `accept` ends, and lets go of the callback
         pause_.cancel();
     }
 
     [[nodiscard]] const acceptor_type& socket() const noexcept { return acceptor_; }
 
-  private:
-    // Those who are connected already would be reset, and could not know whether what they have sent was run.
-    void take_what_has_come() {
+    /// See `acceptor`.
+    void accept_waiting() {
+        accepts_waiting_ = true;
         boost::system::error_code code;
         acceptor_.non_blocking(true, code);
         while (!code && on_link_) {
@@ -55,6 +54,7 @@ class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Prot
         }
     }
 
+  private:
     void hand_over(socket_type socket) {
         auto peer = identify_(socket);
         on_link_(std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_));
@@ -62,7 +62,7 @@ class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Prot
 
     void accept() {
         acceptor_.async_accept([self = this->shared_from_this()](boost::system::error_code code, socket_type socket) {
-            if (!code && self->on_link_) { // which may have been closed since
+            if (!code && self->on_link_ && (self->acceptor_.is_open() || self->accepts_waiting_)) {
                 self->hand_over(std::move(socket));
             }
             if (!self->acceptor_.is_open() || !self->on_link_) {
@@ -107,6 +107,7 @@ class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Prot
     limits bounds_;
     identify_function identify_;
     std::function<void(link_ptr)> on_link_;
+    bool accepts_waiting_ = false; // also what completes behind `close`
 };
 
 } // namespace cles::transport

@@ -80,6 +80,7 @@ class tcp_acceptor final : public acceptor {
         return url_of("tcp", inside_->socket().local_endpoint(ignored));
     }
     void start(std::function<void(link_ptr)> on_link) override { inside_->start(std::move(on_link)); }
+    void accept_waiting() override { inside_->accept_waiting(); }
     void close() override { inside_->close(); }
 
   private:

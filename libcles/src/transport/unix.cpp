@@ -73,6 +73,7 @@ class unix_acceptor final : public acceptor {
     [[nodiscard]] url local() const override { return where_; }
     void start(std::function<void(link_ptr)> on_link) override { inside_->start(std::move(on_link)); }
 
+    void accept_waiting() override { inside_->accept_waiting(); }
     void close() override {
         inside_->close();
         struct stat now {};
