@@ -137,7 +137,7 @@ void service::fail_later(detail::pending_ptr operation, const detail::outgoing_b
 }
 
 void service::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
-    run_on(strand_of(pooled_, get_executor()), [&] { engine_->publish(noun, write); });
+    run_on(strand_of(pooled_, get_executor()), [&, inside = engine_] { inside->publish(noun, write); });
 }
 
 bool service::retire(std::string_view noun) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+namespace ask_queue {
 namespace {
 
 using namespace std::chrono_literals;
@@ -44,6 +45,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace ask_queue
 
 BOOST_FIXTURE_TEST_SUITE(ask_queue, fixture)
 

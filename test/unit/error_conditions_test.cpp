@@ -11,6 +11,7 @@
 #include <system_error>
 #include <vector>
 
+namespace error_conditions {
 namespace {
 
 using cles::errc;
@@ -60,6 +61,7 @@ const conditions::errc_t all_conditions[] = {conditions::invalid_argument,
                                              conditions::io_error};
 
 } // namespace
+} // namespace error_conditions
 
 BOOST_AUTO_TEST_SUITE(error_conditions)
 

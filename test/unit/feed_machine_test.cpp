@@ -332,7 +332,8 @@ BOOST_AUTO_TEST_CASE(a_caller_who_does_not_fetch_keeps_the_newest_and_learns_of_
 
 BOOST_AUTO_TEST_CASE(a_feed_of_all_on_a_link_tells_as_many_publishers_apart_as_it_may) {
     for (const std::size_t publishers : {1U, 2U}) {
-        cles::core::feed_machine of_all{host, deadlines, {.publishers = publishers}, "all", "speed", false, 7};
+        cles::core::feed_machine of_all{host,  deadlines, completions, {.publishers = publishers},
+                                        "all", "speed",   false,       7};
         auto [operation, result] = cles::test::record();
         of_all.start(std::move(operation));
         of_all.on_bound("{}");

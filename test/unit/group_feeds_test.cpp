@@ -190,7 +190,7 @@ BOOST_AUTO_TEST_CASE(feeds_may_end_and_begin_while_an_update_is_handed_out) {
 }
 
 BOOST_AUTO_TEST_CASE(what_ends_while_an_update_is_handed_out_leaves_nothing_behind) {
-    group_feed elsewhere{node.host->bounds, "all", "speed/fast"};
+    group_feed elsewhere{node.host->bounds, node.host->completions, "all", "speed/fast"};
     struct meddler final : cles::detail::pending_event {
         bool deliver(const cles::detail::raw_event&) override {
             for (auto* feed : ends) {

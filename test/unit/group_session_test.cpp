@@ -207,7 +207,7 @@ BOOST_AUTO_TEST_CASE(an_update_that_begins_like_a_failure_is_dropped) {
 BOOST_AUTO_TEST_CASE(a_forged_update_does_not_silence_a_feed) {
     using namespace std::chrono_literals;
     constexpr group_source forger{.address = 0x7f000001, .port = 4666};
-    cles::core::group_feed feed{{}, "all", "speed"};
+    cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
     session.feeds().add(feed, node.clock.now());
     node.host->others.hear({.node = "car2", .endpoints = {"tcp://127.0.0.1:1"}}, 0x5f3a09c1, 1, other,
                            node.clock.now());
@@ -233,7 +233,7 @@ BOOST_AUTO_TEST_CASE(a_forged_update_does_not_silence_a_feed) {
 }
 
 BOOST_AUTO_TEST_CASE(another_pool_is_not_heard) {
-    cles::core::group_feed feed{{}, "all", "speed"};
+    cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
     session.feeds().add(feed, node.clock.now());
     out.take();
     session.pass_over(other, node.clock.now() + std::chrono::seconds{15});

@@ -11,6 +11,7 @@
 #include <string_view>
 #include <vector>
 
+namespace inbound_memory {
 namespace {
 
 using cles::verb;
@@ -33,6 +34,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace inbound_memory
 
 BOOST_FIXTURE_TEST_SUITE(inbound_memory, fixture)
 

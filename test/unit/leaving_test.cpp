@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+namespace leaving {
 namespace {
 
 using namespace std::chrono_literals;
@@ -44,6 +45,7 @@ struct asked final : cles::core::leg_events {
 };
 
 } // namespace
+} // namespace leaving
 
 BOOST_FIXTURE_TEST_SUITE(leaving, fixture)
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 
+namespace link_admission {
 namespace {
 
 using namespace std::chrono_literals;
@@ -72,6 +73,7 @@ void peer::give_way() {
 }
 
 } // namespace
+} // namespace link_admission
 
 BOOST_FIXTURE_TEST_SUITE(link_admission, fixture)
 

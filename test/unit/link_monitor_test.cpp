@@ -7,6 +7,7 @@
 #include <chrono>
 #include <vector>
 
+namespace link_monitor {
 namespace {
 
 using namespace std::chrono_literals;
@@ -38,6 +39,7 @@ struct fixture : link_monitor::owner {
 };
 
 } // namespace
+} // namespace link_monitor
 
 BOOST_FIXTURE_TEST_SUITE(link_monitor, fixture)
 

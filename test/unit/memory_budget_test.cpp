@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+namespace memory_budget {
 namespace {
 
 using cles::core::memory_account;
@@ -22,6 +23,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace memory_budget
 
 BOOST_FIXTURE_TEST_SUITE(memory_budget, fixture)
 

@@ -10,6 +10,7 @@
 #include <string_view>
 #include <vector>
 
+namespace presence_checks {
 namespace {
 
 using namespace std::chrono_literals;
@@ -49,6 +50,7 @@ struct fixture : cles::test::watched_presence, cles::core::presence::prober {
 using lines = std::vector<std::string>;
 
 } // namespace
+} // namespace presence_checks
 
 BOOST_FIXTURE_TEST_SUITE(presence_checks, fixture)
 

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <string>
 
+namespace publisher_sources {
 namespace {
 
 using namespace std::chrono_literals;
@@ -32,6 +33,7 @@ struct fixture : cles::test::watched_presence {
 };
 
 } // namespace
+} // namespace publisher_sources
 
 BOOST_FIXTURE_TEST_SUITE(publisher_sources, fixture)
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <string_view>
 
+namespace refused_link {
 namespace {
 
 using cles::errc;
@@ -45,6 +46,7 @@ struct fixture {
 };
 
 } // namespace
+} // namespace refused_link
 
 BOOST_FIXTURE_TEST_SUITE(refused_link, fixture)
 

@@ -147,7 +147,7 @@ BOOST_AUTO_TEST_SUITE_END()
 BOOST_AUTO_TEST_SUITE(updates)
 
 BOOST_AUTO_TEST_CASE(an_update_is_taken_only_from_where_the_binder_bound) {
-    listener speed{"car2", "speed", false};
+    listener speed{"car2", "speed", false, 16};
     link.session().bound().add(speed);
     link.ask("UPDATE car2:speed seq=1 epoch=0000000a {\"v\":1}");
     link.ask("UPDATE car3:speed seq=2 epoch=0000000a {\"v\":2}");
@@ -173,7 +173,7 @@ BOOST_AUTO_TEST_CASE(an_update_is_never_answered) {
 }
 
 BOOST_AUTO_TEST_CASE(an_update_whose_body_is_broken_is_dropped_and_shows_as_a_gap) {
-    listener speed{"car2", "speed", false};
+    listener speed{"car2", "speed", false, 16};
     link.session().bound().add(speed);
     link.ask("UPDATE car2:speed seq=1 epoch=0000000a {}");
     link.ask("UPDATE car2:speed seq=2 epoch=0000000a {\"v\":}");
@@ -185,7 +185,7 @@ BOOST_AUTO_TEST_CASE(an_update_whose_body_is_broken_is_dropped_and_shows_as_a_ga
 }
 
 BOOST_AUTO_TEST_CASE(a_stream_of_updates_is_judged_line_by_line) {
-    listener speed{"car2", "speed", false};
+    listener speed{"car2", "speed", false, 16};
     link.session().bound().add(speed);
     for (int seq = 1; seq <= 4; ++seq) {
         link.ask("UPDATE car2:speed seq=" + std::to_string(seq) + " epoch=0000000a {}");
@@ -206,13 +206,13 @@ BOOST_AUTO_TEST_CASE(a_stream_of_updates_is_judged_line_by_line) {
     link.session().bound().remove(speed);
     link.ask("UPDATE car2:speed seq=3 epoch=0000000b {}");
     BOOST_TEST(counts().updates_dropped == 6U);
-    listener again{"self", "speed", false};
+    listener again{"self", "speed", false, 16};
     link.session().bound().add(again);
     for (int seq = 4; seq <= 7; ++seq) {
         link.ask("UPDATE car2:speed seq=" + std::to_string(seq) + " epoch=0000000b {}");
     }
     link.session().bound().remove(again);
-    listener closer{"car2", "speed", false};
+    listener closer{"car2", "speed", false, 16};
     link.session().bound().add(closer);
     link.ask("UPDATE car2:speed seq=8 epoch=0000000b {}");
     BOOST_TEST(again.heard == "4{} 5{} 6{} 7{} ");
@@ -220,7 +220,7 @@ BOOST_AUTO_TEST_CASE(a_stream_of_updates_is_judged_line_by_line) {
 }
 
 BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_dropped_and_counted) {
-    listener speed{"car2", "speed", false};
+    listener speed{"car2", "speed", false, 16};
     link.session().bound().add(speed);
     link.ask("UPDATE car2:speed seq=5 epoch=0000000a");
     link.ask("UPDATE car2:speed seq=5 epoch=0000000a");
@@ -230,7 +230,7 @@ BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_dropped_and_counted) {
 }
 
 BOOST_AUTO_TEST_CASE(an_update_of_a_restarted_publisher_is_news_and_what_its_earlier_run_said_is_not) {
-    listener speed{"car2", "speed", false};
+    listener speed{"car2", "speed", false, 16};
     link.session().bound().add(speed);
     link.ask("UPDATE car2:speed seq=90 epoch=0000000a");
     link.ask("UPDATE car2:speed seq=2 epoch=0000000b");
@@ -239,7 +239,7 @@ BOOST_AUTO_TEST_CASE(an_update_of_a_restarted_publisher_is_news_and_what_its_ear
 }
 
 BOOST_AUTO_TEST_CASE(nouns_of_updates_are_compared_decoded) {
-    listener log{"car2", "log/aA", false};
+    listener log{"car2", "log/aA", false, 16};
     link.session().bound().add(log);
     link.ask("UPDATE car2:log/a%41 seq=1 epoch=0000000a");
     BOOST_TEST(log.heard == "1{} ");

@@ -46,19 +46,19 @@ bool take(recorder& s, std::string_view line) {
 BOOST_AUTO_TEST_SUITE(subscription)
 
 BOOST_AUTO_TEST_CASE(an_update_is_handed_on_with_its_publisher_seq_and_body) {
-    recorder s{"car1", "speed", false};
+    recorder s{"car1", "speed", false, 16};
     BOOST_TEST(take(s, "UPDATE car1:speed seq=17 epoch=0000000a {\"v\":3}"));
     BOOST_TEST(s.events == std::vector<std::string>{"car1 17 {\"v\":3}"}, boost::test_tools::per_element());
 }
 
 BOOST_AUTO_TEST_CASE(a_missing_body_counts_as_an_empty_object) {
-    recorder s{"car1", "speed", false};
+    recorder s{"car1", "speed", false, 16};
     BOOST_TEST(take(s, "UPDATE car1:speed seq=1 epoch=0000000a"));
     BOOST_TEST(s.events == std::vector<std::string>{"car1 1 {}"}, boost::test_tools::per_element());
 }
 
 BOOST_AUTO_TEST_CASE(a_gap_comes_before_the_update_that_shows_it) {
-    recorder s{"car1", "speed", false};
+    recorder s{"car1", "speed", false, 16};
     take(s, "UPDATE car1:speed seq=1 epoch=0000000a");
     take(s, "UPDATE car1:speed seq=4 epoch=0000000a");
     const std::vector<std::string> expected{"car1 1 {}", "gap of 2", "car1 4 {}"};
@@ -66,7 +66,7 @@ BOOST_AUTO_TEST_CASE(a_gap_comes_before_the_update_that_shows_it) {
 }
 
 BOOST_AUTO_TEST_CASE(what_every_thins_is_no_gap) {
-    recorder s{"car1", "speed", true};
+    recorder s{"car1", "speed", true, 16};
     take(s, "UPDATE car1:speed seq=1 epoch=0000000a");
     take(s, "UPDATE car1:speed seq=4 epoch=0000000a");
     const std::vector<std::string> expected{"car1 1 {}", "car1 4 {}"};
@@ -74,7 +74,7 @@ BOOST_AUTO_TEST_CASE(what_every_thins_is_no_gap) {
 }
 
 BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_not_handed_on) {
-    recorder s{"car1", "speed", false};
+    recorder s{"car1", "speed", false, 16};
     take(s, "UPDATE car1:speed seq=5 epoch=0000000a");
     BOOST_TEST(!take(s, "UPDATE car1:speed seq=5 epoch=0000000a"));
     BOOST_TEST(!take(s, "UPDATE car1:speed seq=4 epoch=0000000a"));
@@ -83,10 +83,10 @@ BOOST_AUTO_TEST_CASE(an_old_or_repeated_update_is_not_handed_on) {
 
 BOOST_AUTO_TEST_CASE(self_may_be_the_same_node_as_a_name) {
     cles::core::subscriptions all;
-    recorder by_name{"car1", "speed", false};
-    recorder other{"car2", "speed", false};
-    recorder by_self{"self", "speed", false};
-    recorder elsewhere{"self", "load", false};
+    recorder by_name{"car1", "speed", false, 16};
+    recorder other{"car2", "speed", false, 16};
+    recorder by_self{"self", "speed", false, 16};
+    recorder elsewhere{"self", "load", false, 16};
     BOOST_TEST(all.add(by_name));
     BOOST_TEST(all.add(other));
     BOOST_TEST(!all.add(by_self));
@@ -97,10 +97,10 @@ BOOST_AUTO_TEST_CASE(self_may_be_the_same_node_as_a_name) {
 
 BOOST_AUTO_TEST_CASE(one_subscription_per_publisher_and_noun) {
     cles::core::subscriptions all;
-    recorder first{"car1", "speed", false};
-    recorder second{"car1", "speed", false};
-    recorder other_node{"car2", "speed", false};
-    recorder other_noun{"car1", "speed/fast", false};
+    recorder first{"car1", "speed", false, 16};
+    recorder second{"car1", "speed", false, 16};
+    recorder other_node{"car2", "speed", false, 16};
+    recorder other_noun{"car1", "speed/fast", false, 16};
     BOOST_TEST(all.empty());
     BOOST_TEST(all.add(first));
     BOOST_TEST(!all.add(second));
@@ -115,8 +115,8 @@ BOOST_AUTO_TEST_CASE(one_subscription_per_publisher_and_noun) {
 
 BOOST_AUTO_TEST_CASE(what_was_removed_is_found_no_more) {
     cles::core::subscriptions all;
-    recorder one{"car1", "speed", false};
-    recorder two{"car2", "speed", false};
+    recorder one{"car1", "speed", false, 16};
+    recorder two{"car2", "speed", false, 16};
     all.add(one);
     all.add(two);
     all.remove(one);
@@ -129,7 +129,7 @@ BOOST_AUTO_TEST_CASE(what_was_removed_is_found_no_more) {
 
 BOOST_AUTO_TEST_CASE(self_is_whoever_is_at_the_other_end) {
     cles::core::subscriptions all;
-    recorder by_self{"self", "speed", false};
+    recorder by_self{"self", "speed", false, 16};
     all.add(by_self);
     BOOST_TEST(all.find("car1", "speed") == &by_self);
     BOOST_TEST(all.find("car2", "speed") == &by_self);
@@ -137,10 +137,10 @@ BOOST_AUTO_TEST_CASE(self_is_whoever_is_at_the_other_end) {
 
 BOOST_AUTO_TEST_CASE(those_of_one_noun_and_the_same_terms_share_a_binding) {
     cles::core::subscriptions all;
-    recorder one{"car1", "speed", false};
-    recorder two{"car1", "speed", false};
-    recorder thinned{"car1", "speed", true};
-    recorder none{"car1", "speed", false};
+    recorder one{"car1", "speed", false, 16};
+    recorder two{"car1", "speed", false, 16};
+    recorder thinned{"car1", "speed", true, 16};
+    recorder none{"car1", "speed", false, 16};
     one.share_by("every=0");
     two.share_by("every=0");
     thinned.share_by("every=100");

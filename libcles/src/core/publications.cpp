@@ -99,7 +99,7 @@ void publications::use(topic& t) noexcept {
 }
 
 void publications::tidy(topic& t) {
-    if (t.is_bound() || !t.waiters().empty()) {
+    if (t.is_bound() || t.is_begun() || !t.waiters().empty()) {
         return;
     }
     if (t.has_value()) {
@@ -284,6 +284,8 @@ void publications::drain(time_point now) {
     for (auto* t : batch) {
         t->drain(now);
     }
+    // What is published below may take the place of nouns that nobody is bound to or waits for.
+    std::erase_if(batch, [](topic* t) { return t->waiters().empty(); });
     for (auto* t : batch) {
         admit(*t);
     }

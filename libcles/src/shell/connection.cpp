@@ -274,6 +274,7 @@ void connection::on_stall(time_point now) {
 void connection::on_quiet() { abandon("nothing came for a while"); }
 
 void connection::on_silence() {
+    const auto keep = shared_from_this();
     engine_->say(log_level::debug,
                  {"closed a link that brought no line: " + link_->peer().address, link_->peer().address});
     part("no line came in time");

@@ -235,6 +235,9 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
 }
 
 void engine::cancel(std::uint64_t ticket) {
+    if (ticket == 0) { // what has ended or failed already
+        return;
+    }
     const auto keep = shared_from_this();
     if (departure_ && departure_->ticket() == ticket) {
         node_->completions.fail(departure_->give_up(), errc::cancelled, "the service is not waited for");
@@ -301,15 +304,23 @@ std::shared_ptr<update_sink> engine::outside_updates() {
         // The service outlives what is taken: it closes this when it stops.
         outside_updates_ = std::make_shared<shell::outside_updates>(
             executor_,
-            [this](std::string_view noun, std::string_view json) {
+            [weak = weak_from_this()](std::string_view noun, std::string_view json) {
+                const auto self = weak.lock();
+                if (!self) { // what was refused before has been logged, by a program that then let go of the service
+                    return;
+                }
                 try {
-                    publish(noun, [json](json_writer& w) { write_text(w, json); });
+                    self->publish(noun, [json](json_writer& w) { write_text(w, json); });
                 } catch (const error& e) {
-                    say(log_level::warning, "an update of '" + std::string{noun} + "' was refused: " + e.message());
+                    self->say(log_level::warning,
+                              "an update of '" + std::string{noun} + "' was refused: " + e.message());
                 }
             },
-            [this](std::size_t count) {
-                say(log_level::warning, std::to_string(count) + " updates were dropped: they come faster than they go");
+            [weak = weak_from_this()](std::size_t count) {
+                if (const auto self = weak.lock()) {
+                    self->say(log_level::warning,
+                              std::to_string(count) + " updates were dropped: they come faster than they go");
+                }
             });
         if (stopped_) {
             outside_updates_->close();
@@ -350,6 +361,10 @@ std::uint64_t engine::close(std::chrono::milliseconds limit, pending_ptr operati
     const auto keep = shared_from_this();
     const auto ticket = draw_id();
     neighbours_->leave();
+    if (stopped_ || departure_) { // by a function of the program's that is asked for its load
+        fail_later(std::move(operation), errc::stopped, "the service ends already");
+        return 0;
+    }
     departure_ = std::make_unique<shell::departure>(*this, ticket, limit, std::move(operation));
     listeners_.turn_away();
     connections_.begin_nothing();
@@ -365,7 +380,9 @@ void engine::stop() {
     node_->published.drain(now()); // what has been published goes out
     stopped_ = true;
     listeners_.close();
-    timer_->stop();
+    if (timer_) { // not where making it has failed
+        timer_->stop();
+    }
     if (routing_) {
         routing_->stop();
     }

@@ -168,9 +168,11 @@ class feed_links::features_reply final : public detail::pending {
         if (const auto alive = handle_.lock(); host && alive) {
             const std::string text{message};
             feed_.on_refused(code, text, host->now());
+            host->settle();
         }
     }
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     void go_on(bool marks) {

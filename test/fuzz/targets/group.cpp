@@ -86,7 +86,7 @@ class watched_group {
         session_.attend(&presence_);
         for (const auto& [target, path] :
              {std::pair{"all", "speed"}, std::pair{"car2", "speed"}, std::pair{"all", "a/b"}}) {
-            feeds_.push_back(std::make_unique<core::group_feed>(node_.bounds, target, path));
+            feeds_.push_back(std::make_unique<core::group_feed>(node_.bounds, node_.completions, target, path));
         }
         open_.fill(false);
     }
