@@ -2,6 +2,7 @@
 // The pieces of code that the pages show, in one file that compiles. test/docs/code_in_docs.py looks for each of them
 // here and in the examples.
 #include <cles/service.hpp>
+#include <cles/setting_error.hpp>
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
@@ -165,3 +166,17 @@ void blocking(cles::service& me) {
     const std::string json = me.request("PULL car:speed");
     std::cout << json;
 }
+
+namespace checked {
+
+struct settings {
+    std::optional<double> rate;
+
+    void check() const {
+        if (rate.value_or(1) > 60) {
+            throw cles::setting_error("rate", "60 at most");
+        }
+    }
+};
+
+} // namespace checked

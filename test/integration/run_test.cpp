@@ -78,7 +78,7 @@ BOOST_AUTO_TEST_CASE(a_priority_that_does_not_exist_is_refused_before_anything_r
     asio::io_context io;
     bool ran = false;
     asio::post(io, [&] { ran = true; });
-    BOOST_CHECK_THROW(cles::run(io, {.fifo_priority = 1000}), std::system_error);
+    BOOST_CHECK_THROW(cles::run(io, {.fifo_priority = 1000}), cles::error);
     BOOST_TEST(!ran);
 }
 

@@ -41,7 +41,7 @@ std::ostream& operator<<(std::ostream& out, const mistake& m) { return out << m.
 
 const mistake mistakes[] = {
     // unknown keys, at every depth
-    {"node: a\nworker: 2\n", "clesd.yaml:2: worker: ", "unknown key; known here: busy_poll, drain, "},
+    {"node: a\nworker: 2\n", "clesd.yaml:2: worker: ", "unknown key; known here: allow_clash, busy_poll, drain, "},
     {"multicast:\n  group: 239.255.25.37\n  prot: 1\n", "clesd.yaml:3: multicast.prot: ", "unknown key"},
     {"log: {colour: red}\n", "clesd.yaml:1: log.colour: ", "unknown key; known here: format, level"},
     {"plugins:\n  - path: a.so\n  - path: b.so\n    args: {}\n", "clesd.yaml:4: plugins[1].args: ", "unknown key"},

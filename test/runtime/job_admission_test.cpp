@@ -73,7 +73,7 @@ BOOST_FIXTURE_TEST_CASE(a_withdrawn_job_leaves_the_queue, fixture) {
     client.send("PUSH self:cles/cancel/2 id=10\n");
     BOOST_TEST(client.line().starts_with(R"(id=2 {"error":"cancelled")"));
     BOOST_TEST(client.line() == "id=10 {}");
-    BOOST_TEST(pool->load().queued == 1U);
+    wait_for([&] { return pool->load().queued == 1; });
     BOOST_TEST(pool->figures().withdrawn == 1U);
     hold.open();
     client.line();
@@ -100,7 +100,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_whose_time_is_over_leaves_the_queue, fixture) {
     occupy();
     client.send("DELEGATE self:note/late id=2 deadline=20\n");
     BOOST_TEST(client.line().starts_with(R"(id=2 {"error":"deadline")"));
-    BOOST_TEST(pool->load().queued == 0U);
+    wait_for([&] { return pool->load().queued == 0; });
     hold.open();
     client.line();
     BOOST_TEST(ran.size() == 0U);

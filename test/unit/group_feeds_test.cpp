@@ -208,7 +208,7 @@ BOOST_AUTO_TEST_CASE(what_ends_while_an_update_is_handed_out_leaves_nothing_behi
     add(all);
     add(elsewhere);
     BOOST_TEST(!all.mail().next(cles::core::feed_mailbox::event_ptr{&meddling}));
-    BOOST_CHECK_THROW(hear("car1", 1), std::runtime_error);
+    hear("car1", 1);
     BOOST_TEST(feeds.empty());
 }
 
