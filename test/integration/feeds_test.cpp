@@ -105,47 +105,6 @@ BOOST_DATA_TEST_CASE(several_feeds_on_one_noun_each_get_everything, carriers, ki
               [&] { return all[0]->items.size() == 3 && all[2]->items.size() == 3 && all[3]->items.size() == 3; });
 }
 
-BOOST_AUTO_TEST_CASE(feeds_of_one_noun_and_the_same_terms_share_a_link_and_a_binding) {
-    nodes n{carrier::tcp4};
-    const auto links = [&n] {
-        answer<> told;
-        n.tower->async_pull("car1:cles/metrics", told.take());
-        run_until(n.io, [&] { return told.done(); });
-        const auto at = told.value.text.find("\"links_accepted\":");
-        return std::stoi(told.value.text.substr(at + 17));
-    };
-    n.car->update("place", 1);
-    std::vector<std::unique_ptr<feed_log>> all;
-    for (int i = 0; i < 20; ++i) {
-        all.push_back(std::make_unique<feed_log>());
-        n.until_bound(*all.back());
-        run_until(n.io, [&] { return !all.back()->items.empty(); });
-        BOOST_TEST(all.back()->items.front().value.text == value(1));
-    }
-    BOOST_TEST(links() == 1);
-    n.car->update("place", 2);
-    const auto all_have = [&](std::size_t count) {
-        return std::all_of(all.begin(), all.end(), [count](const auto& f) { return f->bodies().size() == count; });
-    };
-    run_until(n.io, [&] { return all_have(1); });
-    all.erase(all.begin(), all.begin() + 19); // the one that made it among them
-    run_ready(n.io);
-    n.car->update("place", 3);
-    run_until(n.io, [&] { return all_have(2); });
-    feed_log thinned; // what it is to be sent is not the same
-    n.until_bound(thinned, "car1:place", cles::bind_options{}.every(10ms));
-    BOOST_TEST(links() == 2);
-    all.clear();
-    thinned.close();
-    run_ready(n.io);
-    n.car->update("place", 4);
-    run_ready(n.io);
-    answer<> told;
-    n.tower->async_pull("self:cles/metrics", told.take());
-    run_until(n.io, [&] { return told.done(); });
-    BOOST_TEST(told.value.text.find("\"updates_dropped\":0,") != std::string::npos, told.value.text);
-}
-
 BOOST_DATA_TEST_CASE(a_closed_feed_is_unbound_at_the_publisher, carriers, kind) {
     nodes n{kind};
     feed_log feed;

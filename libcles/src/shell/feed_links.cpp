@@ -193,8 +193,6 @@ class feed_links::features_reply final : public detail::pending {
 };
 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
-    feed.share_by("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
-                  terms.adverbs);
     feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0});
 }
 
