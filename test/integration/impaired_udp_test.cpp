@@ -159,7 +159,7 @@ BOOST_DATA_TEST_CASE(feeds_report_what_was_lost_as_gaps, seeds, seed) {
     }
     n.path.set({});
     n.car.update("place", count + 1); // and the last one shows what is missing before it
-    run_until(n.io, [&] { // the gap before it bears its number too
+    run_until(n.io, [&] {             // the gap before it bears its number too
         return feed.items.back().kind == feed_event::update && feed.items.back().seq == count + 2;
     });
     BOOST_TEST(feed.count(feed_event::gap) > 10U);
