@@ -282,6 +282,16 @@ bool count_units(whole_time value, std::int64_t num, std::int64_t den, std::int6
     return units <= std::numeric_limits<std::int64_t>::max() && units >= std::numeric_limits<std::int64_t>::min();
 }
 
+whole_time whole_of(std::int64_t count, std::int64_t num, std::int64_t den) {
+    const auto units = static_cast<wide>(count) * num;
+    const auto seconds = floor_divide(units, den);
+    if (seconds > std::numeric_limits<std::int64_t>::max() || seconds < std::numeric_limits<std::int64_t>::min()) {
+        throw_time_out_of_range();
+    }
+    const auto nanoseconds = (units - seconds * den) * second / den;
+    return {static_cast<std::int64_t>(seconds), static_cast<std::int64_t>(nanoseconds)};
+}
+
 void write_duration(json_writer& w, whole_time value) {
     const bool negative = value.seconds < 0;
     if (negative && value.nanoseconds != 0) { // -1.5 is -2 and 0.5

@@ -38,6 +38,8 @@ bool read_time_point(json_reader& r, whole_time& since_1970);
 /// How many units of num/den seconds a time has, rounded down. False where there are more than can be counted.
 bool count_units(whole_time value, std::int64_t num, std::int64_t den, std::int64_t& count) noexcept;
 [[noreturn]] void throw_time_out_of_range();
+/// A number of units of num/den seconds. Throws where that is more seconds than can be counted.
+whole_time whole_of(std::int64_t count, std::int64_t num, std::int64_t den);
 whole_time whole_of(double seconds);
 double seconds_of(whole_time value) noexcept;
 
@@ -46,15 +48,10 @@ whole_time whole_of(const std::chrono::duration<Rep, Period>& value) {
     if constexpr (std::is_floating_point_v<Rep>) {
         return whole_of(std::chrono::duration<double>(value).count());
     } else {
-        using whole_seconds = std::chrono::duration<std::int64_t>;
-        if constexpr (std::ratio_greater_v<Period, std::ratio<1>>) {
-            constexpr auto most = INT64_MAX / Period::num;
-            if (std::cmp_greater(value.count(), most) || std::cmp_less(value.count(), -most)) {
-                throw_time_out_of_range();
-            }
+        if (!std::in_range<std::int64_t>(value.count())) {
+            throw_time_out_of_range();
         }
-        const auto down = std::chrono::floor<whole_seconds>(value);
-        return {down.count(), std::chrono::floor<std::chrono::duration<std::int64_t, std::nano>>(value - down).count()};
+        return whole_of(static_cast<std::int64_t>(value.count()), Period::num, Period::den);
     }
 }
 
