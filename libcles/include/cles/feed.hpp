@@ -185,7 +185,9 @@ class feed {
     feed() = default;
     explicit feed(std::shared_ptr<detail::feed_control> control, bool elsewhere = false)
         : control_(std::move(control)), executor_(control_->executor()), elsewhere_(elsewhere) {}
+    /// What was moved from keeps its executor, on which its `async_next` fails.
     feed(feed&& other) noexcept
+        // NOLINTNEXTLINE(performance-move-constructor-init)
         : control_(std::move(other.control_)), executor_(other.executor_), elsewhere_(other.elsewhere_) {}
     feed& operator=(feed&& other) noexcept {
         if (this != &other) {
