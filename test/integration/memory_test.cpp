@@ -55,7 +55,7 @@ BOOST_DATA_TEST_CASE(many_large_results_that_nobody_reads_stay_within_it, every_
     for (std::size_t i = 0; i < links; ++i) {
         greedy.push_back(std::make_unique<scripted_peer>(io, car.endpoints().front(), buffers::small));
         for (std::size_t n = 1; n <= of_each; ++n) {
-            greedy.back()->send("PULL self:picture id=" + std::to_string(n) + "\n");
+            greedy.back()->send("PULL self:picture deadline=3600000 id=" + std::to_string(n) + "\n");
         }
     }
     run_until(io, [&] { return asked.size() == links * of_each; });
@@ -139,7 +139,9 @@ BOOST_AUTO_TEST_CASE(many_large_requests_to_a_stopped_node_stay_within_its_forwa
     BOOST_TEST(most >= budget / 3);
     const auto refused = std::count_if(all.begin(), all.end(), [](const auto& a) { return a->code == errc::busy; });
     const auto late = std::count_if(all.begin(), all.end(), [](const auto& a) { return a->code == errc::deadline; });
-    BOOST_TEST(refused + late == 60);
+    // Where the machine is slow, the hub meanwhile gives up the link on which nothing was taken for `stall`.
+    const auto lost = std::count_if(all.begin(), all.end(), [](const auto& a) { return a->code == errc::unavailable; });
+    BOOST_TEST(refused + late + lost == 60);
     BOOST_TEST(refused > 0);
     BOOST_TEST(late > 0);
     run_until(io, [&] { return memory(hub, "used") == 0; });
