@@ -261,6 +261,31 @@ void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>
     BOOST_TEST(calls[1] == 0); // never from inside the call
 }
 
+/// Begins three operations, each with a handler and a cancellation slot of its own: the second handler acts.
+template <class Begin>
+void begin_three(world& w, deed does, std::array<int, 3>& calls, Begin begin) {
+    const std::array<asio::cancellation_signal*, 3> signals{&w.first, &w.second, &w.third};
+    for (std::size_t i = 0; i < 3; ++i) {
+        begin(i,
+              asio::bind_cancellation_slot(signals[i]->slot(), handler{&w, &calls[i], i == 1 ? does : deed::nothing}));
+    }
+}
+
+/// Cancels them, the one that acts first.
+void cancel_three(world& w, asio::cancellation_type how) {
+    for (auto* each : {&w.second, &w.first, &w.third}) {
+        each->emit(how);
+    }
+}
+
+/// Runs until all three have been called, and checks that each was called once and that the service lives on.
+void check_that_three_are_called(world& w, deed does, const std::array<int, 3>& calls) {
+    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
+    w.acted = 1; // the bystanders did nothing
+    w.check_that_it_lives(does);
+    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+}
+
 } // namespace user_code_test
 
 BOOST_AUTO_TEST_SUITE(user_code)
@@ -274,10 +299,7 @@ BOOST_DATA_TEST_CASE(a_completion_handler_may_do_anything, data::make(every_aski
     world w;
     std::array<int, 3> calls{};
     end_three(w, how, where, handler{&w, &calls[1], does}, calls);
-    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
-    w.acted = 1; // the bystanders did nothing
-    w.check_that_it_lives(does);
-    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+    check_that_three_are_called(w, does, calls);
 }
 
 BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_asking) * every_place * every_deed, how,
@@ -291,10 +313,7 @@ BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_
         w, how, where,
         [doing = std::make_shared<doer>(w, does), n = &calls[1]](boost::system::error_code, const auto&) { ++*n; },
         calls);
-    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
-    w.acted = 1;
-    w.check_that_it_lives(does);
-    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+    check_that_three_are_called(w, does, calls);
 }
 
 BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_deed), does) {
@@ -309,11 +328,7 @@ BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_de
             }
             w.until([&] { return feeds.size() == 3; });
             std::array<int, 3> calls{};
-            const std::array<asio::cancellation_signal*, 3> signals{&w.first, &w.second, &w.third};
-            for (std::size_t i = 0; i < 3; ++i) {
-                feeds[i]->async_next(asio::bind_cancellation_slot(
-                    signals[i]->slot(), handler{&w, &calls[i], i == 1 ? does : deed::nothing}));
-            }
+            begin_three(w, does, calls, [&](std::size_t i, auto on_end) { feeds[i]->async_next(std::move(on_end)); });
             if (where == place::reply) {
                 w.car->update("place", 1);
                 w.car->update("place1", 2);
@@ -321,17 +336,12 @@ BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_de
             } else if (where == place::lost) {
                 w.car.reset();
             } else if (where == place::cancelled) {
-                for (const std::size_t i : {1, 0, 2}) {
-                    signals[i]->emit(asio::cancellation_type::terminal);
-                }
+                cancel_three(w, asio::cancellation_type::terminal);
             } else {
                 w.tower->stop();
             }
             BOOST_TEST(calls[1] == 0);
-            w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
-            w.acted = 1;
-            w.check_that_it_lives(does);
-            BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+            check_that_three_are_called(w, does, calls);
         }
     }
 }
@@ -353,24 +363,16 @@ BOOST_DATA_TEST_CASE(a_publisher_that_waits_may_do_anything, data::make(every_de
                 BOOST_TEST(filled < 300);
             }
             std::array<int, 3> calls{};
-            const std::array<asio::cancellation_signal*, 3> signals{&w.first, &w.second, &w.third};
-            for (std::size_t i = 0; i < 3; ++i) {
-                w.tower->async_update("full", static_cast<int>(i),
-                                      asio::bind_cancellation_slot(
-                                          signals[i]->slot(), handler{&w, &calls[i], i == 1 ? does : deed::nothing}));
-            }
+            begin_three(w, does, calls, [&](std::size_t i, auto on_end) {
+                w.tower->async_update("full", static_cast<int>(i), std::move(on_end));
+            });
             if (where == place::cancelled) {
-                for (const std::size_t i : {1, 0, 2}) {
-                    signals[i]->emit(asio::cancellation_type::total);
-                }
+                cancel_three(w, asio::cancellation_type::total);
             } else if (where == place::stop) {
                 w.tower->stop();
             }
             BOOST_TEST(calls[1] == 0);
-            w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
-            w.acted = 1;
-            w.check_that_it_lives(does);
-            BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+            check_that_three_are_called(w, does, calls);
         }
     }
 }
@@ -430,10 +432,7 @@ BOOST_DATA_TEST_CASE(who_is_told_to_stop_may_do_anything, data::make(every_deed)
                 w.tower->stop();
                 BOOST_TEST(told[1] == 0);
             }
-            w.until([&] { return told[0] != 0 && told[1] != 0 && told[2] != 0; });
-            w.acted = 1;
-            w.check_that_it_lives(does);
-            BOOST_TEST(told == (std::array{1, 1, 1}), boost::test_tools::per_element());
+            check_that_three_are_called(w, does, told);
         }
     }
 }

@@ -5,6 +5,8 @@
 #include <cles/convert_chrono.hpp>
 #include <cles/convert_wrapped.hpp>
 
+#include "support/converted.hpp"
+
 #include <boost/describe.hpp>
 #include <boost/test/unit_test.hpp>
 
@@ -81,29 +83,20 @@ struct cles::converter<standard_types::celsius> {
     static bool read(json_reader& r, standard_types::celsius& value) { return r.read(value.degrees); }
 };
 
+namespace convert_standard {
 namespace {
 
 using namespace standard_types;
 using namespace std::chrono_literals;
 using cles::from_json;
 using cles::to_json;
+using cles::test::round_trip;
+using cles::test::why;
 namespace chrono = std::chrono;
-
-template <class T>
-std::string why(std::string_view text) {
-    T value{};
-    std::string message;
-    return from_json(text, value, &message) ? "(read)" : message.substr(0, message.find(" (at byte"));
-}
-
-template <class T>
-T travel(const T& value) {
-    return from_json<T>(to_json(value));
-}
 
 /// As a body or result travels.
 template <class T>
-T travel_as_body(const T& value) {
+T round_trip_as_body(const T& value) {
     return from_json<cles::detail::wrapped<T>>(cles::detail::to_body(value)).value;
 }
 
@@ -118,6 +111,7 @@ std::string conversion_error(F f) {
 }
 
 } // namespace
+} // namespace convert_standard
 
 BOOST_AUTO_TEST_SUITE(convert_standard)
 
@@ -187,12 +181,12 @@ BOOST_AUTO_TEST_CASE(durations_come_back_the_same) {
     for (const auto count :
          {std::int64_t{0}, std::int64_t{1}, std::int64_t{-1}, std::int64_t{999'999'999}, std::int64_t{-1'000'000'001},
           std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min()}) {
-        BOOST_TEST((travel(chrono::nanoseconds{count}) == chrono::nanoseconds{count}), count);
-        BOOST_TEST((travel(chrono::microseconds{count}) == chrono::microseconds{count}), count);
-        BOOST_TEST((travel(chrono::seconds{count}) == chrono::seconds{count}), count);
+        BOOST_TEST((round_trip(chrono::nanoseconds{count}) == chrono::nanoseconds{count}), count);
+        BOOST_TEST((round_trip(chrono::microseconds{count}) == chrono::microseconds{count}), count);
+        BOOST_TEST((round_trip(chrono::seconds{count}) == chrono::seconds{count}), count);
     }
     for (const auto seconds : {1e-300, 1.0 / 3, 1e15, 5e-324, 1.7976931348623157e308}) {
-        BOOST_TEST((travel(chrono::duration<double>{seconds}).count() == seconds));
+        BOOST_TEST((round_trip(chrono::duration<double>{seconds}).count() == seconds));
     }
 }
 
@@ -205,7 +199,7 @@ BOOST_AUTO_TEST_CASE(times_are_written_in_utc) {
     BOOST_TEST(conversion_error([] { to_json(chrono::sys_days{chrono::year{10000} / 1 / 1}); }) ==
                "a time out of range");
     const auto now = chrono::system_clock::now();
-    BOOST_TEST((travel(now) == now));
+    BOOST_TEST((round_trip(now) == now));
 }
 
 BOOST_AUTO_TEST_CASE(times_are_read_in_any_zone_and_from_seconds_since_1970) {
@@ -244,7 +238,7 @@ BOOST_AUTO_TEST_CASE(tuples_and_pairs_are_arrays_of_their_length) {
     BOOST_TEST((from_json<triple>("[1, \"a\", [2.5]]") == triple{1, "a", {2.5}}));
     BOOST_TEST(to_json(std::tuple<>{}) == "[]");
     BOOST_TEST((from_json<std::tuple<>>("[]") == std::tuple<>{}));
-    BOOST_TEST((travel(std::pair{true, std::string{"b"}}) == std::pair{true, std::string{"b"}}));
+    BOOST_TEST((round_trip(std::pair{true, std::string{"b"}}) == std::pair{true, std::string{"b"}}));
     BOOST_TEST(why<triple>("[1,\"a\"]") == "fewer than 3 elements");
     BOOST_TEST(why<triple>("[1,\"a\",[],4]") == "more than 3 elements");
     BOOST_TEST(why<triple>("[1,2,[]]") == "[1]: expected a string, got a number");
@@ -255,7 +249,7 @@ BOOST_AUTO_TEST_CASE(tuples_and_pairs_are_arrays_of_their_length) {
 BOOST_AUTO_TEST_CASE(an_unordered_map_is_an_object) {
     using map = std::unordered_map<std::string, std::array<int, 2>>;
     const map value{{"a", {1, 2}}, {"b\"", {3, 4}}};
-    BOOST_TEST((travel(value) == value));
+    BOOST_TEST((round_trip(value) == value));
     BOOST_TEST((to_json(map{{"a", {1, 2}}}) == "{\"a\":[1,2]}"));
     BOOST_TEST((why<map>("{\"a\":[1,true]}") == "a[1]: expected a number, got true or false" ||
                 why<map>("{\"a\":[1,true]}").starts_with("a[1]: expected a number")));
@@ -290,16 +284,16 @@ BOOST_AUTO_TEST_CASE(whatever_may_be_a_scalar_travels_as_a_body_and_back) {
     BOOST_TEST(to_body(std::variant<double, pose>{pose{1, 2}}) == "{\"x\":1,\"y\":2}");
     BOOST_TEST(to_body(std::vector<int>{1}) == "[1]");
     BOOST_TEST(to_body("text") == "{\"value\":\"text\"}");
-    BOOST_TEST((travel_as_body(1500ms) == 1500ms));
-    BOOST_TEST((travel_as_body(std::optional<int>{5}) == 5));
-    BOOST_TEST((!travel_as_body(std::optional<int>{}).has_value()));
-    BOOST_TEST((travel_as_body(std::optional<pose>{pose{1, 2}})->y == 2.0));
-    BOOST_TEST((!travel_as_body(std::optional<pose>{}).has_value()));
+    BOOST_TEST((round_trip_as_body(1500ms) == 1500ms));
+    BOOST_TEST((round_trip_as_body(std::optional<int>{5}) == 5));
+    BOOST_TEST((!round_trip_as_body(std::optional<int>{}).has_value()));
+    BOOST_TEST((round_trip_as_body(std::optional<pose>{pose{1, 2}})->y == 2.0));
+    BOOST_TEST((!round_trip_as_body(std::optional<pose>{}).has_value()));
     using either = std::variant<double, pose, std::vector<int>>;
-    BOOST_TEST((std::get<double>(travel_as_body(either{2.5})) == 2.5));
-    BOOST_TEST((std::get<pose>(travel_as_body(either{pose{1, 2}})).x == 1.0));
-    BOOST_TEST((std::get<2>(travel_as_body(either{std::vector<int>{1, 2}})).size() == 2U));
-    BOOST_TEST(travel_as_body(celsius{21.5}).degrees == 21.5);
+    BOOST_TEST((std::get<double>(round_trip_as_body(either{2.5})) == 2.5));
+    BOOST_TEST((std::get<pose>(round_trip_as_body(either{pose{1, 2}})).x == 1.0));
+    BOOST_TEST((std::get<2>(round_trip_as_body(either{std::vector<int>{1, 2}})).size() == 2U));
+    BOOST_TEST(round_trip_as_body(celsius{21.5}).degrees == 21.5);
     // No value is none.
     BOOST_TEST(!from_json<cles::detail::wrapped<std::optional<int>>>("{}").value.has_value());
     // An object that is no wrapping.

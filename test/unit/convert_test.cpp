@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/convert.hpp>
 
+#include "support/converted.hpp"
+
 #include <boost/describe.hpp>
 #include <boost/test/unit_test.hpp>
 
@@ -67,18 +69,8 @@ namespace {
 using namespace convert_types;
 using cles::from_json;
 using cles::to_json;
-
-template <class T>
-std::string why(std::string_view text) {
-    T value{};
-    std::string message;
-    return from_json(text, value, &message) ? "(read)" : message.substr(0, message.find(" (at byte"));
-}
-
-template <class T>
-T round_trip(const T& value) {
-    return from_json<T>(to_json(value));
-}
+using cles::test::round_trip;
+using cles::test::why;
 
 } // namespace
 } // namespace convert

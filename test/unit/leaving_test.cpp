@@ -2,6 +2,7 @@
 // A node that leaves, and one that is left: docs/protocol.md, "Leaving".
 #include "core/leg.hpp"
 #include "support/recorded_reply.hpp"
+#include "support/sent_request.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -20,15 +21,13 @@ namespace {
 using namespace std::chrono_literals;
 using cles::errc;
 using cles::verb;
+using cles::test::send_on;
 
 const std::string farewell = "PUSH self:cles/leaving reply=no\n";
 
 struct fixture {
     std::shared_ptr<cles::test::outcome> ask_peer(std::uint64_t id) {
-        auto [operation, result] = cles::test::record();
-        const auto now = node.clock.now();
-        link.session().asking().send({.verb = verb::delegate, .noun = "car2:work", .id = id}, now + 5s, now,
-                                     std::move(operation));
+        auto result = send_on(link, node, {.verb = verb::delegate, .noun = "car2:work", .id = id});
         link.take();
         return result;
     }
@@ -107,13 +106,7 @@ BOOST_AUTO_TEST_CASE(by_datagram_nothing_is_said) {
     datagrams.session().say_that_it_leaves();
     BOOST_TEST(datagrams.take().empty());
     BOOST_TEST(datagrams.finishes == 0);
-    const auto waiting = [&] {
-        auto [operation, result] = cles::test::record();
-        const auto now = node.clock.now();
-        datagrams.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 7}, now + 5s, now,
-                                          std::move(operation));
-        return result;
-    }();
+    const auto waiting = send_on(datagrams, node, {.verb = verb::pull, .noun = "car2:speed", .id = 7});
     datagrams.ask("PUSH self:cles/leaving reply=no id=3"); // anybody might send it
     BOOST_TEST(!waiting->ended);
 }

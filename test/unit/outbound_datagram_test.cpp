@@ -4,6 +4,7 @@
 #include "core/outbound.hpp"
 #include "support/answer.hpp"
 #include "support/recorded_reply.hpp"
+#include "support/sent_request.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -25,11 +26,8 @@ using namespace std::chrono_literals;
 struct fixture {
     std::shared_ptr<outcome> send(std::uint64_t id, verb v = verb::pull, std::chrono::milliseconds limit = 5s,
                                   std::string_view body = {}, cles::core::outbound::progress_function progress = {}) {
-        auto [operation, result] = cles::test::record();
-        const auto now = node.clock.now();
-        link.session().asking().send({.verb = v, .noun = "car2:speed", .id = id, .body = body}, now + limit, now,
-                                     std::move(operation), std::move(progress));
-        return result;
+        return cles::test::send_on(link, node, {.verb = v, .noun = "car2:speed", .id = id, .body = body}, limit,
+                                   std::move(progress));
     }
     /// Lets time pass in small steps and tells what was sent meanwhile.
     std::vector<std::string> during(std::chrono::milliseconds span) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/outbound.hpp"
 #include "support/recorded_reply.hpp"
+#include "support/sent_request.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -18,16 +19,13 @@ namespace {
 using cles::errc;
 using cles::verb;
 using cles::test::outcome;
+using cles::test::send_on;
 using namespace std::chrono_literals;
 
 struct fixture {
     std::shared_ptr<outcome> send(std::uint64_t id, verb v = verb::pull, std::chrono::milliseconds limit = 5s,
                                   cles::core::outbound::progress_function progress = {}) {
-        auto [operation, result] = cles::test::record();
-        const auto now = node.clock.now();
-        link.session().asking().send({.verb = v, .noun = "car2:speed", .id = id}, now + limit, now,
-                                     std::move(operation), std::move(progress));
-        return result;
+        return send_on(link, node, {.verb = v, .noun = "car2:speed", .id = id}, limit, std::move(progress));
     }
     std::size_t in_flight() { return link.session().asking().in_flight(); }
     std::uint64_t dropped() { return node.counts().replies_dropped; }
@@ -61,11 +59,7 @@ BOOST_AUTO_TEST_CASE(a_request_over_the_limit_on_a_line_is_not_sent) {
     const std::string head = "PUSH car2:speed id=1 ";
     const std::string body(node.host->bounds.line - head.size(), '1');
     const auto push = [&](std::uint64_t id, std::string_view with) {
-        auto [operation, result] = cles::test::record();
-        const auto now = node.clock.now();
-        link.session().asking().send({.verb = verb::push, .noun = "car2:speed", .id = id, .body = with}, now + 5s, now,
-                                     std::move(operation));
-        return result;
+        return send_on(link, node, {.verb = verb::push, .noun = "car2:speed", .id = id, .body = with});
     };
     const auto just_fits = push(1, body);
     BOOST_TEST(link.take().size() == node.host->bounds.line + 1);
@@ -274,11 +268,7 @@ BOOST_AUTO_TEST_CASE(a_session_that_goes_discards_what_waits) {
     std::shared_ptr<outcome> result;
     {
         cles::test::test_link other{node};
-        auto [operation, recorded] = cles::test::record();
-        const auto now = node.clock.now();
-        other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 1s, now,
-                                      std::move(operation));
-        result = recorded;
+        result = send_on(other, node, {.verb = verb::pull, .noun = "car2:speed", .id = 1}, 1s);
     }
     BOOST_TEST(!result->ended);
     BOOST_TEST(result->discarded);

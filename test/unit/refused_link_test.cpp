@@ -2,6 +2,7 @@
 // A link whose other end has no room for it: its only line is a `busy` that answers nothing.
 #include "core/leg.hpp"
 #include "core/session.hpp"
+#include "support/sent_request.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -18,6 +19,7 @@ namespace {
 
 using cles::errc;
 using cles::verb;
+using cles::test::send_on;
 using namespace std::chrono_literals;
 
 constexpr std::string_view busy = R"({"error":"busy","message":"car2 has as many links as it may","retry_ms":1000})";
@@ -33,12 +35,9 @@ struct client final : cles::core::leg_events {
 struct fixture {
     fixture() { link.session().may_be_refused(); }
 
-    std::shared_ptr<cles::test::outcome> send(std::uint64_t id) {
-        auto [operation, result] = cles::test::record();
-        const auto now = node.clock.now();
-        link.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = id}, now + 5s, now,
-                                     std::move(operation));
-        return result;
+    std::shared_ptr<cles::test::outcome> send(std::uint64_t id) { return send(link, id); }
+    std::shared_ptr<cles::test::outcome> send(cles::test::test_link& on, std::uint64_t id) const {
+        return send_on(on, node, {.verb = verb::pull, .noun = "car2:speed", .id = id});
     }
 
     cles::test::test_node node;
@@ -101,10 +100,7 @@ BOOST_AUTO_TEST_CASE(with_another_line_it_is_a_link_like_any_other) {
 
     cles::test::test_link other{node};
     other.session().may_be_refused();
-    auto [operation, after] = cles::test::record();
-    const auto now = node.clock.now();
-    other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 5s, now,
-                                  std::move(operation));
+    const auto after = send(other, 1);
     other.ask(busy);
     other.ask("PULL car1:cles id=1");
     other.half_close();
@@ -117,10 +113,7 @@ BOOST_AUTO_TEST_CASE(other_failures_and_those_with_an_id_refuse_no_link) {
           R"({"error":"busy","message":"no","ran":true,"retry_ms":5})", R"({"error":"busy")", "[]", "{}"}) {
         cles::test::test_link other{node};
         other.session().may_be_refused();
-        auto [operation, result] = cles::test::record();
-        const auto now = node.clock.now();
-        other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 5s, now,
-                                      std::move(operation));
+        const auto result = send(other, 1);
         other.ask(line);
         other.half_close();
         BOOST_TEST((result->code == errc::unavailable), line);
@@ -129,10 +122,7 @@ BOOST_AUTO_TEST_CASE(other_failures_and_those_with_an_id_refuse_no_link) {
 
 BOOST_AUTO_TEST_CASE(a_link_that_came_in_cannot_be_refused) {
     cles::test::test_link other{node};
-    auto [operation, result] = cles::test::record();
-    const auto now = node.clock.now();
-    other.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 5s, now,
-                                  std::move(operation));
+    const auto result = send(other, 1);
     other.ask(busy);
     other.half_close();
     BOOST_TEST((result->code == errc::unavailable));
