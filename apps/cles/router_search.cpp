@@ -46,6 +46,7 @@ asio::awaitable<std::vector<std::string>> possible_routers(client& asker) {
     known.resize(std::min(known.size(), max_candidates));
 
     std::vector<std::string> urls;
+    urls.reserve(known.size() + 1);
     for (const auto& node : known) {
         urls.push_back(node.endpoints.front());
     }
