@@ -29,8 +29,8 @@ class pool_state;
 
 /// One job from its admission until nobody holds it any more; then its memory serves for another.
 ///
-/// Each member belongs to one of four: the service's executor, of which what keeps the records has a part, the crew
-/// (under its mutex), or everybody.
+/// Each member belongs to one of four: the service's executor, of which what keeps the records has a part, the worker
+/// pool (under its mutex), or everybody.
 class job_record final : public job_queue::item {
   public:
     job_record() = default;
@@ -78,7 +78,7 @@ class job_record final : public job_queue::item {
     };
     static void set_at_work(at_work* record) noexcept;
 
-    // -- the crew's ------------------------------------------------------------------------------------------------
+    // -- the worker pool's -----------------------------------------------------------------------------------------
     enum class place : std::uint8_t { nowhere, queued, at_work };
     place where = place::nowhere;
     bool begun = false;

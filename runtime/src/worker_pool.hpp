@@ -29,16 +29,16 @@ class job_record;
 ///
 /// A worker that is awake takes one job after another until there is none; so a worker is only woken where there is
 /// more to do than are awake, and a burst of jobs costs one wake-up, not one for each.
-class crew {
+class worker_pool {
   public:
-    crew(const pool_options& options, result_box& box);
-    crew(const crew&) = delete;
-    crew& operator=(const crew&) = delete;
-    ~crew() = default;
+    worker_pool(const pool_options& options, result_box& box);
+    worker_pool(const worker_pool&) = delete;
+    worker_pool& operator=(const worker_pool&) = delete;
+    ~worker_pool() = default;
 
     /// To be called first, with what keeps this alive while a worker is in it. \param missed called on a worker which
     /// has found that the executor is late (`expect_executor`) and that no job begins until `release`
-    void start(std::weak_ptr<crew> self, std::function<void()> missed) {
+    void start(std::weak_ptr<worker_pool> self, std::function<void()> missed) {
         self_ = std::move(self);
         missed_ = std::move(missed);
     }
@@ -65,8 +65,8 @@ class crew {
     /// No job begins, and nothing is called back, until `release`.
     void hold() noexcept;
     void release();
-    /// A job that is to stop had better end soon.
-    void hurry(const job_record& job, time_point now);
+    /// The job has been told to stop: from now on its worker counts as late.
+    void expect_end(const job_record& job, time_point now);
     /// Calls `found` for each worker that has become stuck, once replacements are at work.
     void watch(time_point now, const std::function<void(const worker_watch::finding&, const job_record&)>& found);
     /// No job begins any more. Those that have not are handed over.
@@ -109,7 +109,7 @@ class crew {
 
     result_box& box_;
     worker_threads threads_;
-    std::weak_ptr<crew> self_;
+    std::weak_ptr<worker_pool> self_;
     std::function<void()> missed_;
     std::atomic<time_point> executor_due_{time_point::max()};
     mutable brief_mutex mutex_; // of all that follows
