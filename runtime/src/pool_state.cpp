@@ -55,8 +55,8 @@ asio::any_io_executor pool_state::executor() const {
 
 void pool_state::start() {
     workers_.start(std::shared_ptr<worker_pool>{shared_from_this(), &workers_}, [this] {
-        // Where this fails, the next tick notices.
-        static_cast<void>(box_.put([this] { notice_pause(); }));
+        // Where this fails, the next tick does it.
+        static_cast<void>(box_.put([this] { look_for_pause(); }));
     });
     if (options_.look_in.count() > 0) {
         // From when the executor runs, which may take a while.
@@ -331,7 +331,7 @@ void pool_state::tick() {
     if (closed_) {
         return;
     }
-    notice_pause();
+    look_for_pause();
     report_stuck();
     collect(); // what went without a word
     if (records_.size() != 0 || options_.look_in.count() > 0) {
@@ -366,6 +366,15 @@ void pool_state::notice_pause() {
                                 seconds(tick_span_ + options_.late_executor) +
                                 ": what came meanwhile is read before a job begins");
     read_on();
+}
+
+// A worker that has found the executor late waits to be woken, also where the pause has been dealt with before it says
+// so.
+void pool_state::look_for_pause() {
+    notice_pause();
+    if (!reading_ && !closed_) {
+        workers_.wake();
+    }
 }
 
 // What is posted comes after what is ready, and after a look for what has become ready.

@@ -83,6 +83,7 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     void arm_tick();
     void expect_tick(time_point now);
     void notice_pause();
+    void look_for_pause();
     void read_on();
     void begin_again();
     void report_stuck();

@@ -140,6 +140,7 @@ void worker_pool::close(const std::function<void(job_record&)>& dropped) {
         const std::lock_guard lock{mutex_};
         closed_ = true;
         held_ = false;
+        executor_due_.store(time_point::max(), std::memory_order_relaxed); // nothing is read any more
         std::vector<job_record*> begun;
         while (auto* next = queue_.pop()) {
             auto& job = static_cast<job_record&>(*next);
@@ -238,7 +239,6 @@ void worker_pool::put_back(job_record& job) {
     job.begun = false;
     job.where = job_record::place::queued;
     queue_.push_begun(job); // the next one of its requester, as it was
-    held_ = !closed_;
 }
 
 void worker_pool::work() {
@@ -290,12 +290,12 @@ void worker_pool::work() {
         --at_work_;
         note_progress(now);
         figures_.revived += watch_.end(place) ? 1 : 0;
+        missed = missed && !closed_; // at the end it is dropped
         if (missed) {
             done = nullptr;
             put_back(job);
-            missed = held_;
             mirror();
-            continue;
+            break;
         }
         service_time_.add(ended - now);
         now = ended;

@@ -37,7 +37,8 @@ class worker_pool {
     ~worker_pool() = default;
 
     /// To be called first, with what keeps this alive while a worker is in it. \param missed called on a worker which
-    /// has found that the executor is late (`expect_executor`) and that no job begins until `release`
+    /// has found that the executor is late (`expect_executor`). The worker has put its job back and looks for no other:
+    /// the executor is to call `wake` once it has read what came meanwhile.
     void start(std::weak_ptr<worker_pool> self, std::function<void()> missed) {
         self_ = std::move(self);
         missed_ = std::move(missed);
@@ -57,12 +58,13 @@ class worker_pool {
     /// Takes out a job that has not begun. False where it has.
     bool take_back(job_record& job);
     /// The executor will have been back by then. Where it has not, the process was stopped, or the executor held up:
-    /// then workers know of no withdrawal that came meanwhile, and begin no job.
+    /// workers do not know of the withdrawals that came meanwhile, and begin no job.
     void expect_executor(time_point until) noexcept { executor_due_.store(until, std::memory_order_relaxed); }
     [[nodiscard]] bool executor_is_late(time_point now) const noexcept {
         return now > executor_due_.load(std::memory_order_relaxed);
     }
-    /// No job begins, and nothing is called back, until `release`.
+    /// No job begins, and nothing is called back, until `release`. Only the executor holds, so that each hold has its
+    /// release.
     void hold() noexcept;
     void release();
     /// The job has been told to stop: from now on its worker counts as late.
@@ -119,7 +121,7 @@ class worker_pool {
     std::uint32_t at_work_ = 0;
     service_time service_time_;
     figures figures_;
-    bool held_ = false;   // nothing does, for now
+    bool held_ = false;   // no job begins, and nothing is called back
     bool closed_ = false; // no job begins
     bool ended_ = false;  // nothing is called back
     std::condition_variable_any at_rest_;
