@@ -125,6 +125,16 @@ int run(config setup, config_sources sources) {
     return code;
 }
 
+// What the parent blocks or ignores is inherited. Ignoring SIGCHLD would hide how a plugin's trial ended, and a blocked
+// signal would neither stop the daemon nor end a plugin's start that hangs.
+void set_up_signals() {
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    std::signal(SIGCHLD, SIG_DFL);
+    std::signal(SIGPIPE, SIG_IGN); // a reader of its output that goes away
+}
+
 int start(int argc, const char* const* argv) {
     const auto asked = parse_options(argc, argv);
     if (const auto* text = std::get_if<std::string>(&asked)) {
@@ -146,7 +156,7 @@ int start(int argc, const char* const* argv) {
 } // namespace
 
 int clesd(int argc, const char* const* argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a reader of its output that goes away
+    set_up_signals();
     try {
         return start(argc, argv);
     } catch (const usage_error& wrong) {
