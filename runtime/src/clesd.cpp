@@ -36,6 +36,7 @@ namespace {
 constexpr int success = 0;
 constexpr int cannot_run = 1;
 constexpr int wrong_usage = 2;
+constexpr int name_taken = 3;
 
 void print(std::FILE* to, const std::string& text) {
     std::fwrite(text.data(), 1, text.size(), to);
@@ -118,7 +119,7 @@ int run(config setup, config_sources sources) {
         log.warning("the service manager could not be told");
     }
     cles::run(io, how);
-    const int code = running.gave_way() ? cannot_run : success;
+    const int code = running.gave_way() ? name_taken : success;
     if (running.leaves_something()) {
         std::_Exit(code); // it cannot be waited for
     }

@@ -148,10 +148,14 @@ void daemon::write_metrics(json_writer& w) const {
 
 void daemon::stop(int signal) {
     const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
-    if (std::exchange(stopping_, true)) {
+    if (std::exchange(signalled_, true)) {
         log_.warning("stopping at once, on a second signal");
-        leaves_something_ = true; // nobody has looked
+        cut_short_ = leaves_something_ = true; // nobody has looked
         finish();
+        return;
+    }
+    if (std::exchange(stopping_, true)) {
+        log_.info(name + ": it is stopping already; a second signal ends it at once");
         return;
     }
     stop_begun_ = steady_clock::now();

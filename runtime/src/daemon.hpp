@@ -64,6 +64,8 @@ class daemon {
     signals signals_;
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;
+    bool signalled_ = false;
+    bool cut_short_ = false; // by a second signal
     bool finished_ = false;
     bool leaves_something_ = false;
     bool gave_way_ = false;

@@ -257,6 +257,8 @@ class Unit(unittest.TestCase):
         self.assertEqual(lines["Type"], "notify")
         self.assertEqual(lines["ExecStart"], "clesd --config /etc/cles/clesd.yaml")
         self.assertIn("-HUP $MAINPID", lines["ExecReload"])
+        # Neither a wrong configuration nor a name that is taken goes away by trying again.
+        self.assertEqual(lines["RestartPreventExitStatus"], "2 3")
         # Longer than a drain takes by default.
         drain = int(next(line for line in clesd("--print-config")[1].splitlines() if line.startswith("drain: "))
                     .removeprefix("drain: ").removesuffix("s"))
