@@ -464,10 +464,11 @@ void pool_state::abandon(drain_report& report) {
     }
 }
 
-void pool_state::close() {
+std::size_t pool_state::close(std::optional<std::chrono::milliseconds> limit) {
     if (closed_) {
-        return;
+        return 0;
     }
+    const auto patience = std::min(limit.value_or(patience_), patience_);
     draining_ = true;
     drain_report unheard;
     abandon(unheard);
@@ -497,11 +498,17 @@ void pool_state::close() {
         const std::lock_guard lock{executor_mutex_};
         executor_ = {};
     }
-    const auto left = workers_.join(patience_) + stop_notifier_.end(patience_);
-    if (left != 0) {
-        say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(left));
+    const auto workers = workers_.join(patience);
+    if (workers != 0) {
+        say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(workers));
+    }
+    const auto callbacks = stop_notifier_.end(patience);
+    if (callbacks != 0) {
+        say(log_level::error,
+            "threads left behind in on_stop callbacks that do not return: " + std::to_string(callbacks));
     }
     records_.drop_spare();
+    return workers + callbacks;
 }
 
 } // namespace cles::runtime

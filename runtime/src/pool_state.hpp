@@ -49,7 +49,8 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     [[nodiscard]] node_load load() const noexcept;
     [[nodiscard]] pool_figures figures() const;
     void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
-    void close();
+    /// Returns how many threads are left behind.
+    std::size_t close(std::optional<std::chrono::milliseconds> limit = {});
     /// A handler ran on this executor for so long.
     void note_inline(std::string_view task, std::chrono::nanoseconds took);
 
