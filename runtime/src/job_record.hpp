@@ -85,7 +85,7 @@ class job_record final : public job_queue::item {
     std::size_t worker = 0;                           ///< where it is at work
     std::vector<std::function<void()>> called_back{}; ///< to be run when it is its turn
 
-    // -- of whoever keeps the records ------------------------------------------------------------------------------
+    // -- of what keeps the records ---------------------------------------------------------------------------------
     /// It serves for a new job, with one reference.
     void open(std::shared_ptr<pool_state> pool);
     /// Lets go of all that belonged to its job, but for some memory.
@@ -107,7 +107,7 @@ class job_record final : public job_queue::item {
 
     // -- everybody's -----------------------------------------------------------------------------------------------
     std::atomic<int> references_{0};
-    std::atomic<bool> answered_{false}; // whoever sets it writes the result
+    std::atomic<bool> answered_{false}; // the thread that sets it writes the result
     std::atomic<bool> stopped_{false};
     std::atomic<bool> unheard_{false}; // nobody wants its progress
     std::atomic<bool> listens_{false}; // to be told that it is stopped

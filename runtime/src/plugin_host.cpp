@@ -19,8 +19,8 @@
 namespace cles::runtime {
 namespace {
 
-// All hosts' plugins, kept until the process ends, whoever goes first. A host's destructor cannot know whether a plugin
-// is at rest.
+// All hosts' plugins, kept until the process ends, in whatever order the hosts go. A host's destructor cannot know
+// whether a plugin is at rest.
 template <class T>
 void keep_for_ever(T kept) {
     static std::mutex mutex;

@@ -36,7 +36,7 @@ std::string seconds(std::chrono::nanoseconds span) {
 
 pool_state::pool_state(asio::any_io_executor executor, pool_options options)
     : executor_(std::move(executor)), options_(std::move(options)), box_([this] {
-          // Whoever wakes holds a job, and so this.
+          // The thread that wakes holds a job, and so this.
           asio::post(executor_, [weak = weak_from_this()] {
               if (const auto self = weak.lock()) {
                   self->collect();
@@ -347,7 +347,7 @@ void pool_state::expect_tick(time_point now) {
     }
 }
 
-// The process was stopped, or the machine suspended, or a handler held up the executor: whoever asked may have
+// The process was stopped, or the machine suspended, or a handler held up the executor: requesters may have
 // withdrawn meanwhile, which stands in what has not been read.
 void pool_state::notice_pause() {
     const auto now = clock::now();
