@@ -59,7 +59,7 @@ function(cles_flags_of_boost cflags_out libs_out)
 endfunction()
 
 cles_flags_of_boost(cles_pc_cflags cles_pc_libs)
-# Whoever compiles against the library has to agree with it on these.
+# Code that is compiled against the library has to agree with it on these.
 get_target_property(cles_pc_definitions cles INTERFACE_COMPILE_DEFINITIONS)
 list(TRANSFORM cles_pc_definitions PREPEND " -D")
 string(CONCAT cles_pc_cflags ${cles_pc_definitions} "${cles_pc_cflags}")

@@ -26,7 +26,7 @@ function(cles_target_sanitizers target)
     endif()
 
     target_compile_options(${target} PRIVATE ${flags} ${quiet})
-    # A program that links an instrumented library needs the runtime, whoever wrote the program.
+    # A program that links an instrumented library needs the runtime, too.
     target_link_options(${target} PUBLIC ${flags})
 endfunction()
 

@@ -47,9 +47,9 @@ urgent_report bench_urgent(const bench_options& options) {
     const auto requests = options.requests != 0 ? options.requests : urgent_requests_unless_told;
     perf::latency_recorder record{requests};
     bench_progress progress{options.rounds * 3};
-    const auto pass = [&](const char* what, std::size_t beside, bool hurry, std::vector<latency_figures>& into) {
+    const auto pass = [&](const char* what, std::size_t beside, bool urgent, std::vector<latency_figures>& into) {
         progress.step(what);
-        small.ask_urgently(hurry);
+        small.ask_urgently(urgent);
         small.run(options.in_flight, limit_of(options), record); // warms up, and makes the link
         large.start(beside);
         small.run(options.in_flight, limit_of(options), record);

@@ -43,7 +43,7 @@ std::string read_body(const std::string& argument) {
 
     std::string why;
     if (!cles::is_valid_json(text, 32, &why)) {
-        throw usage_error(origin + " is no JSON: " + why);
+        throw usage_error(origin + " is not valid JSON: " + why);
     }
     const auto kind = cles::json_reader{text}.peek();
     if (kind != cles::json_reader::kind::object && kind != cles::json_reader::kind::array) {

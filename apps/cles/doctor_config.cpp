@@ -3,8 +3,11 @@
 #include "run_program.hpp"
 
 #include <chrono>
+#include <sstream>
 #include <string>
+#include <string_view>
 #include <system_error>
+#include <vector>
 
 namespace tool {
 
@@ -12,7 +15,18 @@ using namespace std::chrono_literals;
 
 namespace {
 
-std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+// Each plugin may take ten seconds.
+constexpr auto check_limit = 60s;
+constexpr std::string_view not_required = " (it is not required)";
+
+std::vector<std::string> lines_of(const std::string& text) {
+    std::vector<std::string> lines;
+    std::istringstream from{text};
+    for (std::string line; std::getline(from, line);) {
+        lines.push_back(line);
+    }
+    return lines;
+}
 
 } // namespace
 
@@ -24,8 +38,15 @@ void check_config(findings& found) {
         return;
     }
     try {
-        const auto end = run_program({program, "--check"}, 10s);
-        const auto words = first_line(end.text);
+        const auto end = run_program({program, "--check"}, check_limit);
+        auto lines = lines_of(end.text);
+        // What is said before the last word is about plugins without which the daemon starts.
+        while (end.code == 0 && lines.size() > 1 && lines.front().ends_with(not_required)) {
+            found.push_back(
+                {"config", verdict::warning, lines.front(), "mend it, or take it out of the configuration"});
+            lines.erase(lines.begin());
+        }
+        const auto words = lines.empty() ? std::string{} : lines.front();
         if (end.code == 0) {
             found.push_back({"config", verdict::ok, "clesd: " + words});
         } else if (end.code == -1) {

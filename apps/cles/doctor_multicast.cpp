@@ -59,7 +59,7 @@ class group_probe {
     }
 
     void send() {
-        // Who hears it tells where he is, as for any node that starts.
+        // Nodes that receive it announce where they are, as for any node that starts.
         static constexpr std::string_view word = "BIND all:cles\n";
         sender_.send_to(asio::buffer(word), group_);
     }

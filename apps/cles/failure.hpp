@@ -12,7 +12,7 @@ class usage_error : public std::runtime_error {
     using std::runtime_error::runtime_error;
 };
 
-/// Whoever read the output has gone, as `head` does when it has seen enough: a reason to end, not to complain.
+/// The reader of the output has gone, as `head` does when it has seen enough: a reason to end, not to complain.
 class output_closed : public std::exception {
   public:
     [[nodiscard]] const char* what() const noexcept override { return "nobody reads the output"; }

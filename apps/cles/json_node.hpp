@@ -23,7 +23,7 @@ struct json_node {
     [[nodiscard]] const json_node* find(std::string_view name) const;
 };
 
-/// \throws cles::error with `conversion` where it is no JSON
+/// \throws cles::error with `conversion` where it is not JSON
 json_node parse_json(std::string_view json);
 
 /// One value of an object, nested ones included: {"a":{"b":1}} has "a.b".

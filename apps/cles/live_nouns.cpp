@@ -120,7 +120,7 @@ asio::awaitable<std::vector<candidate>> live_nouns(client& asker, const address_
         try {
             add_nouns(out, node, verb, description);
         } catch (const cles::error&) {
-            continue; // it is no JSON
+            continue; // it is not JSON
         }
     }
     if (verb == cles::verb::pull && !told.empty()) {

@@ -24,7 +24,7 @@ class node_rates {
     using time_point = std::chrono::steady_clock::time_point;
 
     /// \param run tells a node's runs apart, since each counts from 0
-    /// \throws cles::error where it is no JSON
+    /// \throws cles::error where it is not JSON
     node_rate take(const std::string& run, std::string_view metrics, time_point now);
 
     /// Forgets those that have not answered since.

@@ -16,7 +16,7 @@ void write_output(std::string_view text) {
         const auto written = ::write(STDOUT_FILENO, text.data(), text.size());
         if (written >= 0) {
             text.remove_prefix(static_cast<std::size_t>(written));
-        } else if (errno == EAGAIN) { // whoever shares the pipe made it so
+        } else if (errno == EAGAIN) { // another process that shares the pipe made it so
             pollfd out{STDOUT_FILENO, POLLOUT, 0};
             ::poll(&out, 1, -1);
         } else if (errno == EPIPE) {

@@ -5,7 +5,7 @@
 
 namespace tool {
 
-/// Writes all of the text to stdout, now, so that whoever reads a pipe sees each document when it comes.
+/// Writes all of the text to stdout, now, so that the reader of a pipe sees each document when it comes.
 /// \throws output_closed, output_interrupted, or a system error
 void write_output(std::string_view text);
 

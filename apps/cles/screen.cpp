@@ -38,7 +38,7 @@ winsize size_of_terminal() {
 
 } // namespace
 
-/// Hears each key at once, without showing it.
+/// Reads each key at once, without showing it.
 class screen::keys {
   public:
     keys(asio::io_context& io, const termios& before, std::function<void()> on_quit)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Tasks are registered with a registrar, whoever that is: here the service of an application, and one made for a test.
+// Tasks are registered with a registrar, of any kind: here the service of an application, and one made for a test.
 #include <cles/service.hpp>
 
 #include <boost/asio/io_context.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Multicast: whoever publishes a task is heard, without an address, and one datagram serves all who listen.
+// Multicast: publishers of a task are found without an address, and one datagram serves all that are bound.
 #include <cles/service.hpp>
 
 #include <boost/asio/awaitable.hpp>

@@ -34,7 +34,7 @@ struct mission_options {
 };
 
 /// The mission centre: bound to what the reconnaissance aircraft finds, it lets an operator decide, and delegates the
-/// strike to whoever offers it. A plain service, which listens nowhere.
+/// strike to a node that offers it. A plain service, which listens nowhere.
 class mission {
   public:
     explicit mission(const mission_options& wanted);

@@ -174,7 +174,7 @@ void recon::take(std::uint64_t number, const fmv::found& seen, picture times) {
     ground_.update("tracks", times);
 }
 
-// The first of its kind, and then once a second, so that whoever looks at old tracks knows that they are old.
+// The first of its kind, and then once a second, so that those who look at old tracks know that they are old.
 void recon::tell_trouble(const cles::error& why) {
     const auto asked = fates_.target();
     const bool news = fates_.failed(why);

@@ -29,10 +29,10 @@ struct recon_options {
     bool json = false;
 };
 
-/// The reconnaissance aircraft: has its video processed by whoever offers it, and publishes what was found.
+/// The reconnaissance aircraft: has its video processed by nodes that offer it, and publishes what was found.
 ///
 /// It is two nodes: one for the mission centre, and one without an address of its own for the satellites, so that
-/// neither side hears of the other, and no frame is in the way of what the mission centre asks.
+/// neither side learns of the other, and no frame is in the way of what the mission centre asks.
 class recon {
   public:
     /// \throws cles::error where it cannot listen

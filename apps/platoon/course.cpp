@@ -9,7 +9,7 @@ namespace {
 
 constexpr double fine = 0.01, coarse = 0.05; // s: for the verdict, and for the record
 
-/// Each one's distance error to whoever drives ahead of it at that time, in the order of `where`.
+/// Each one's distance error to the vehicle that is ahead of it at that time, in the order of `where`.
 std::vector<double> errors_of(const std::vector<std::optional<motion>>& where, double spacing) {
     std::vector<double> errors(where.size(), NAN);
     for (std::size_t i = 0; i < where.size(); ++i) {

@@ -131,7 +131,7 @@ void driver::follow(double dt) {
     } else if (leader_silent || broken) {
         enter(role::degraded, leader_silent ? lead_ + ", who leads, is silent" : ahead_ + " ahead has fallen back");
     } else {
-        enter(role::follow, "hears " + ahead_ + " and " + lead_);
+        enter(role::follow, "receives " + ahead_ + " and " + lead_);
     }
     const bool counts = setup_.uses_leader && mode_ == role::follow && heard(lead_) != nullptr;
     doubt_ = counts ? 0 : doubt_ + dt;

@@ -14,7 +14,7 @@ namespace platoon {
 /// What a vehicle is doing.
 enum class role : std::uint8_t {
     lead,     ///< drives by itself
-    follow,   ///< hears the leader and the one ahead
+    follow,   ///< receives the leader and the one ahead
     degraded, ///< the leader is silent, or the platoon is broken ahead: it follows the one ahead alone
     fallback, ///< the one ahead is silent: it brakes to a halt
     leave     ///< drives on as before, and is about to leave the lane

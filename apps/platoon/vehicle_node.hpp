@@ -22,7 +22,7 @@ namespace platoon {
 
 struct vehicle_options {
     driver_setup setup{};
-    bool joins = false;              ///< at the end of the platoon that it hears, instead of where `setup` says
+    bool joins = false;              ///< at the end of the platoon that it receives, instead of where `setup` says
     std::size_t turn = 0, turns = 1; ///< its part of each period, in which it sends
     std::int64_t start_ns = 0;       ///< the time 0 of the drive, by CLOCK_MONOTONIC
     double seconds = 0;              ///< of the drive; 0: until it is told to end
@@ -38,7 +38,7 @@ struct applicant {
 };
 BOOST_DESCRIBE_STRUCT(applicant, (), (name))
 
-/// A vehicle on the road: a driver, and the service by which it hears others and they hear it. It is bound by multicast
+/// A vehicle on the road: a driver, and the service that connects it with the others. It is bound by multicast
 /// to the leader and to the one ahead, and tells its own state `hz` times a second.
 ///
 /// Tasks: BIND `state`; PUSH `join` asks it to be followed, PUSH `leave` to leave.

@@ -8,7 +8,7 @@
 namespace primes {
 
 /// Counts the primes from one number up to another, stretch by stretch (the sieve of Eratosthenes, in segments), so
-/// that whoever asks can tell how far it is, and stop it.
+/// that the requester can be told how far it is, and stop it.
 class prime_counter {
   public:
     /// From `from` on, and below `below`.

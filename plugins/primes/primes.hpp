@@ -24,7 +24,7 @@ BOOST_DESCRIBE_STRUCT(settings, (), (limit, parts_by))
 ///
 /// - PULL prime/<n>: whether n is one
 /// - DELEGATE primes {"from","below"}: how many there are, and the largest
-/// - DELEGATE primes_in_parts {"below","parts"}: the same, each part being delegated to whoever offers `primes`
+/// - DELEGATE primes_in_parts {"below","parts"}: the same, each part being delegated to a node that offers `primes`
 void register_tasks(cles::registrar& to, const settings& wanted);
 
 } // namespace primes

@@ -34,7 +34,7 @@ struct aircraft {
         : weapons(wanted.weapons.value_or(4)), at{wanted.x.value_or(-100), wanted.y.value_or(120)},
           speed(wanted.speed.value_or(400)), oldest_s(wanted.oldest_s.value_or(2)) {}
 
-    std::mutex lock; // in an application, a test or a daemon: whoever calls
+    std::mutex lock; // in an application, a test or a daemon: any thread calls
     magazine weapons;
     place at;
     double speed;

@@ -36,6 +36,7 @@ namespace {
 constexpr int success = 0;
 constexpr int cannot_run = 1;
 constexpr int wrong_usage = 2;
+constexpr int name_taken = 3;
 
 void print(std::FILE* to, const std::string& text) {
     std::fwrite(text.data(), 1, text.size(), to);
@@ -118,11 +119,21 @@ int run(config setup, config_sources sources) {
         log.warning("the service manager could not be told");
     }
     cles::run(io, how);
-    const int code = running.gave_way() ? cannot_run : success;
+    const int code = running.gave_way() ? name_taken : success;
     if (running.leaves_something()) {
         std::_Exit(code); // it cannot be waited for
     }
     return code;
+}
+
+// What the parent blocks or ignores is inherited. Ignoring SIGCHLD would hide how a plugin's trial ended, and a blocked
+// signal would neither stop the daemon nor end a plugin's start that hangs.
+void set_up_signals() {
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    std::signal(SIGCHLD, SIG_DFL);
+    std::signal(SIGPIPE, SIG_IGN); // a reader of its output that goes away
 }
 
 int start(int argc, const char* const* argv) {
@@ -146,7 +157,7 @@ int start(int argc, const char* const* argv) {
 } // namespace
 
 int clesd(int argc, const char* const* argv) {
-    std::signal(SIGPIPE, SIG_IGN); // a reader of its output that goes away
+    set_up_signals();
     try {
         return start(argc, argv);
     } catch (const usage_error& wrong) {

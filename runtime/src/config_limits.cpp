@@ -18,7 +18,8 @@ std::size_t most_of(const count_range& range) {
 }
 
 std::chrono::milliseconds to_milliseconds(const std::string& text, const time_range& range) {
-    const auto span = std::chrono::duration_cast<std::chrono::milliseconds>(to_duration(text));
+    // Rounded up: 0 turns some limits off, and what is not 0 must not.
+    const auto span = std::chrono::ceil<std::chrono::milliseconds>(to_duration(text));
     const auto bound = [](std::chrono::milliseconds at) { return to_string(std::chrono::microseconds{at}); };
     if (span < range.least) {
         throw bad_value("'" + text + "' is too short: " + bound(range.least) + " at least");

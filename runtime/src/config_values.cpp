@@ -109,7 +109,7 @@ microseconds to_duration(std::string_view text) {
     if (span > static_cast<double>(longest_span.count())) {
         refuse(text, "is more than a day");
     }
-    return microseconds{std::llround(span)};
+    return microseconds{number > 0 ? std::max(std::llround(span), 1LL) : 0}; // 0 has a meaning of its own
 }
 
 std::optional<microseconds> to_wake_bound(std::string_view text) {

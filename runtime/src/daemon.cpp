@@ -148,10 +148,14 @@ void daemon::write_metrics(json_writer& w) const {
 
 void daemon::stop(int signal) {
     const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
-    if (std::exchange(stopping_, true)) {
+    if (std::exchange(signalled_, true)) {
         log_.warning("stopping at once, on a second signal");
-        leaves_something_ = true; // nobody has looked
+        cut_short_ = leaves_something_ = true; // nobody has looked
         finish();
+        return;
+    }
+    if (std::exchange(stopping_, true)) {
+        log_.info(name + ": it is stopping already; a second signal ends it at once");
         return;
     }
     stop_begun_ = steady_clock::now();
@@ -197,17 +201,31 @@ void daemon::finish() {
     if (std::exchange(finished_, true)) {
         return;
     }
-    // A plugin gets what is left of the time to let go of what it holds.
-    const auto late = plugins_.stop(std::clamp<milliseconds>(leaves_something_ ? 0ms : time_left(), 100ms, 2000ms));
-    for (const auto& name : late) {
+    // A plugin gets what is left of the time to let go of what it holds; and enough in any case, for it is over sooner
+    // unless a plugin blocks.
+    const auto stopped =
+        plugins_.stop(cut_short_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::least_stop, 2000ms));
+    for (const auto& name : stopped.late) {
         log_.warning("plugin " + name + " did not stop in time");
-        leaves_something_ = true;
     }
+    if (stopped.callbacks > 0) {
+        log_.warning(counted(stopped.callbacks, "on_stop callback") + " of plugins did not return");
+    }
+    leaves_something_ = leaves_something_ || !stopped.late.empty() || stopped.callbacks > 0;
     service_.stop();
+    close_pool();
     signals_.close();
     log_.info("stopped");
     // A job that does not end is still watched, and keeps the context at work.
     boost::asio::post(io_, [this] { io_.stop(); });
+}
+
+// Here, and not in the destructor, so that it is known whether anything is left. Where something is already, the
+// process does not wait for the rest either.
+void daemon::close_pool() {
+    if (!leaves_something_) {
+        leaves_something_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0;
+    }
 }
 
 // -- reading again -------------------------------------------------------------------------------------------------

@@ -37,8 +37,8 @@ class daemon {
     [[nodiscard]] std::vector<std::string> endpoints() const { return service_.endpoints(); }
     /// Whether it has ended because another live node had its name first.
     [[nodiscard]] bool gave_way() const noexcept { return gave_way_; }
-    /// Whether something is left that does not end, a job or a plugin: the process then has to go without waiting for
-    /// it, by `std::_Exit`.
+    /// Whether something is left that does not end, a job, an `on_stop` callback or a plugin: the process then has to
+    /// go without waiting for it, by `std::_Exit`.
     [[nodiscard]] bool leaves_something() const noexcept { return leaves_something_; }
 
   private:
@@ -49,6 +49,7 @@ class daemon {
     void drain();
     void close(const drain_report& how);
     void finish();
+    void close_pool();
     [[nodiscard]] std::chrono::milliseconds time_left() const;
     void reload();
 
@@ -64,6 +65,8 @@ class daemon {
     signals signals_;
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;
+    bool signalled_ = false;
+    bool cut_short_ = false; // by a second signal
     bool finished_ = false;
     bool leaves_something_ = false;
     bool gave_way_ = false;

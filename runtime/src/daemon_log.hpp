@@ -30,7 +30,7 @@ class daemon_log {
     void warning(std::string_view text) const { write(log_level::warning, text); }
     void error(std::string_view text) const { write(log_level::error, text); }
 
-    /// For whoever takes a sink; the log has to outlive it.
+    /// For functions that take a sink; the log has to outlive it.
     [[nodiscard]] log_sink sink() const;
 
   private:

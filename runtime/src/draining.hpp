@@ -12,7 +12,7 @@ namespace cles::runtime {
 
 struct drain_report;
 
-/// The wait for the last jobs of a pool: it ends once, by whoever comes first of the last job and the limit.
+/// The wait for the last jobs of a pool: it ends once, by the last job or by the limit.
 class draining {
   public:
     explicit draining(const boost::asio::any_io_executor& executor) : limit_(std::in_place, executor) {}

@@ -48,7 +48,7 @@ class job_context {
     /// Whether nobody waits for the answer any more: withdrawn, the link lost, the time over, the pool at its end.
     [[nodiscard]] bool stopped() const noexcept;
 
-    /// Answers with JSON text; nothing becomes {}, a scalar {"value":x}. What is no JSON becomes `failed`.
+    /// Answers with JSON text; nothing becomes {}, a scalar {"value":x}. What is not JSON becomes `failed`.
     void done(std::string_view json = {}) const;
     void fail(errc code, std::string_view message) const;
     /// Answers `busy`: the work was not begun. The requester is told when it is worth asking again.

@@ -14,6 +14,8 @@ job_pool::job_pool(service& host, pool_options options)
 
 job_pool::~job_pool() { state_->close(); }
 
+std::size_t job_pool::close(std::chrono::milliseconds limit) { return state_->close(limit); }
+
 void job_pool::submit(job what) { state_->submit(std::move(what)); }
 
 node_load job_pool::load() const noexcept { return state_->load(); }

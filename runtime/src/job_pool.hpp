@@ -32,9 +32,9 @@ struct drain_report {
 /// stop then is stuck: it is reported and its worker replaced, as often as there are replacements.
 ///
 /// All functions are to be called on the service's executor, and the pool goes before its service. At its end, jobs
-/// that have not answered are answered `unavailable`. Workers that are still in a job after `pool_options::patience`
-/// are left to themselves: such a program has to end by `std::_Exit` or `std::quick_exit`, since there is no way to end
-/// a thread that does not want to.
+/// that have not answered are answered `unavailable`. Threads that are still in a job or an `on_stop` callback after
+/// `pool_options::patience` are left to themselves: such a program has to end by `std::_Exit` or `std::quick_exit`,
+/// since there is no way to end a thread that does not want to.
 class job_pool {
   public:
     job_pool(service& host, pool_options options);
@@ -51,6 +51,11 @@ class job_pool {
     /// Admits no more, and calls back when all jobs have ended. At the limit it answers what is left, tells what runs
     /// to stop, and calls back; the destructor then waits for no job. To be called once.
     void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
+
+    /// What the destructor does, with another limit than `pool_options::patience`: answers what is left, and waits so
+    /// long for the workers and for `on_stop` callbacks, and a second at most for what is about to end. Returns how
+    /// many threads are left behind; 0 where the pool has been closed before.
+    std::size_t close(std::chrono::milliseconds limit);
 
     /// For `pooled_registrar`, whose handlers may be called after the pool has gone.
     [[nodiscard]] const std::shared_ptr<pool_state>& state() const noexcept { return state_; }

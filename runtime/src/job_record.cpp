@@ -147,7 +147,7 @@ void job_record::refuse(std::string_view message, std::chrono::milliseconds retr
 }
 
 void job_record::fail(const std::exception_ptr& thrown) {
-    // Told in words on this thread: the exception itself belongs to whoever threw it.
+    // Turned into text on this thread: the exception itself belongs to the code that threw it.
     add_reference();
     job_control words{job_context{*this}};
     detail::fail_with(words, thrown);

@@ -29,8 +29,8 @@ class pool_state;
 
 /// One job from its admission until nobody holds it any more; then its memory serves for another.
 ///
-/// Each member belongs to one of four: the service's executor, of which what keeps the records has a part, the crew
-/// (under its mutex), or everybody.
+/// Each member belongs to one of four: the service's executor, of which what keeps the records has a part, the worker
+/// pool (under its mutex), or everybody.
 class job_record final : public job_queue::item {
   public:
     job_record() = default;
@@ -78,14 +78,14 @@ class job_record final : public job_queue::item {
     };
     static void set_at_work(at_work* record) noexcept;
 
-    // -- the crew's ------------------------------------------------------------------------------------------------
+    // -- the worker pool's -----------------------------------------------------------------------------------------
     enum class place : std::uint8_t { nowhere, queued, at_work };
     place where = place::nowhere;
     bool begun = false;
     std::size_t worker = 0;                           ///< where it is at work
     std::vector<std::function<void()>> called_back{}; ///< to be run when it is its turn
 
-    // -- of whoever keeps the records ------------------------------------------------------------------------------
+    // -- of what keeps the records ---------------------------------------------------------------------------------
     /// It serves for a new job, with one reference.
     void open(std::shared_ptr<pool_state> pool);
     /// Lets go of all that belonged to its job, but for some memory.
@@ -107,7 +107,7 @@ class job_record final : public job_queue::item {
 
     // -- everybody's -----------------------------------------------------------------------------------------------
     std::atomic<int> references_{0};
-    std::atomic<bool> answered_{false}; // whoever sets it writes the result
+    std::atomic<bool> answered_{false}; // the thread that sets it writes the result
     std::atomic<bool> stopped_{false};
     std::atomic<bool> unheard_{false}; // nobody wants its progress
     std::atomic<bool> listens_{false}; // to be told that it is stopped

@@ -89,7 +89,7 @@ struct loaded_plugin::from_plugin {
             plugin.updates_->update(view_of(noun), json_text{std::string{view_of(json)}});
         } catch (const error& e) {
             plugin.say(log_level::warning,
-                       "an update of '" + std::string{view_of(noun)} + "' is no JSON: " + e.message());
+                       "an update of '" + std::string{view_of(noun)} + "' is not valid JSON: " + e.message());
         } catch (...) { // no memory
         }
     }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "onward_requests.hpp"
 
-#include "crew.hpp"
+#include "worker_pool.hpp"
 
 #include <string_view>
 #include <utility>
@@ -19,7 +19,7 @@ void onward_requests::send(const job_context& asks, const responder* by, const s
     auto chosen = options;
     if (options.on_progress_) {
         chosen.on_progress([this, asks, told = options.on_progress_](double fraction, std::string_view json) {
-            crew_.resume(*asks.record_, [told, fraction, json = std::string{json}] { told(fraction, json); });
+            workers_.resume(*asks.record_, [told, fraction, json = std::string{json}] { told(fraction, json); });
         });
     }
     // The job that asks keeps this alive, also where the answer comes after the end.
@@ -37,8 +37,8 @@ void onward_requests::answer(std::uint64_t ticket, boost::system::error_code cod
     }
     const auto q = std::move(found->second);
     open_.erase(found);
-    crew_.resume(*q.asks.record_, [answered = q.answered, code, json = std::string{json},
-                                   message = std::string{message}] { answered(code, json, message); });
+    workers_.resume(*q.asks.record_, [answered = q.answered, code, json = std::string{json},
+                                      message = std::string{message}] { answered(code, json, message); });
 }
 
 void onward_requests::close() {

@@ -14,13 +14,13 @@
 
 namespace cles::runtime {
 
-class crew;
+class worker_pool;
 
 /// What jobs ask others: sent from the service's executor, and answered on a worker, as a part of the job that asks.
 /// Each is answered once, by `close` at the latest.
 class onward_requests {
   public:
-    explicit onward_requests(crew& workers) noexcept : crew_(workers) {}
+    explicit onward_requests(worker_pool& workers) noexcept : workers_(workers) {}
     onward_requests(const onward_requests&) = delete;
     onward_requests& operator=(const onward_requests&) = delete;
     ~onward_requests() = default;
@@ -38,7 +38,7 @@ class onward_requests {
     };
     void answer(std::uint64_t ticket, boost::system::error_code code, std::string_view json, std::string_view message);
 
-    crew& crew_;
+    worker_pool& workers_;
     boost::unordered_flat_map<std::uint64_t, question> open_;
     std::uint64_t last_ticket_ = 0;
 };

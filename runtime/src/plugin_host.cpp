@@ -19,8 +19,8 @@
 namespace cles::runtime {
 namespace {
 
-// All hosts' plugins, kept until the process ends, whoever goes first. A host's destructor cannot know whether a plugin
-// is at rest.
+// All hosts' plugins, kept until the process ends, in whatever order the hosts go. A host's destructor cannot know
+// whether a plugin is at rest.
 template <class T>
 void keep_for_ever(T kept) {
     static std::mutex mutex;
@@ -42,6 +42,7 @@ struct plugin_host::state {
     std::mutex mutex;
     std::condition_variable changed;
     bool all_stopped = false;
+    std::size_t callbacks_left = 0;
 };
 
 plugin_host::plugin_host(plugin_host_options options)
@@ -99,7 +100,7 @@ plugin_figures plugin_host::figures() const {
     return {.jobs = state_->jobs.size(), .answered_twice = state_->jobs.unknown()};
 }
 
-std::vector<std::string> plugin_host::stop(std::chrono::milliseconds limit) {
+plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {
     if (std::exchange(stopped_, true)) {
         return {};
     }
@@ -115,7 +116,12 @@ std::vector<std::string> plugin_host::stop(std::chrono::milliseconds limit) {
     }
     // A plugin's code may take its time, or never return: it runs where nobody has to wait for it.
     std::thread{[state = state_, limit] {
-        state->notifier.end(limit / 2); // one that blocks does not keep the plugins from stopping
+        const auto left_behind =
+            state->notifier.end(limit / 2); // one that blocks does not keep the plugins from stopping
+        {
+            const std::scoped_lock lock{state->mutex};
+            state->callbacks_left = left_behind;
+        }
         for (auto left = state->plugins.size(); left > 0; --left) {
             state->plugins[left - 1]->stop();
         }
@@ -125,14 +131,14 @@ std::vector<std::string> plugin_host::stop(std::chrono::milliseconds limit) {
     }}.detach();
     std::unique_lock lock{state_->mutex};
     state_->changed.wait_for(lock, limit, [this] { return state_->all_stopped; });
-    std::vector<std::string> late;
+    plugin_stop_report report{.callbacks = state_->callbacks_left};
     for (const auto& plugin : state_->plugins) {
         if (!plugin->has_stopped()) {
-            late.push_back(plugin->name());
+            report.late.push_back(plugin->name());
         }
-        plugin->silence(); // whoever made the log may go before a plugin that does not end
+        plugin->silence(); // the owner of the log may go before a plugin that does not end
     }
-    return late;
+    return report;
 }
 
 } // namespace cles::runtime

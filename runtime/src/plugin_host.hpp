@@ -5,6 +5,7 @@
 
 #include "loaded_plugin.hpp"
 #include "plugin_error.hpp"
+#include "stop_notifier.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -32,6 +33,13 @@ struct plugin_info {
     std::vector<std::string> tasks; ///< "PULL utc"
 };
 
+/// What `plugin_host::stop` leaves behind. Where it is anything, the process can end by `std::quick_exit` or
+/// `std::_Exit` alone.
+struct plugin_stop_report {
+    std::vector<std::string> late{}; ///< the names of the plugins that have not stopped in time
+    std::size_t callbacks = 0;       ///< `on_stop` callbacks that have not returned
+};
+
 struct plugin_figures {
     std::size_t jobs = 0;             ///< that are not answered
     std::uint64_t answered_twice = 0; ///< answers to jobs that were not there (any more)
@@ -57,10 +65,11 @@ class plugin_host {
     [[nodiscard]] const std::vector<plugin_info>& plugins() const noexcept { return plugins_; }
     [[nodiscard]] plugin_figures figures() const;
 
-    /// Starts no further job, answers those that are left `unavailable`, and lets the plugins stop, the last one first.
-    /// Returns the names of those that were not done with it in time: the process can then end by `std::quick_exit` or
-    /// `std::_Exit` alone.
-    std::vector<std::string> stop(std::chrono::milliseconds limit);
+    /// Starts no further job, answers those that are left `unavailable`, and lets the plugins stop, the last one first,
+    /// when their `on_stop` callbacks have returned or half of the limit is over.
+    plugin_stop_report stop(std::chrono::milliseconds limit);
+    /// A limit in which callbacks that do not block have returned, and plugins that do not block have stopped.
+    static constexpr std::chrono::milliseconds least_stop = 2 * stop_notifier::last_moment;
 
   private:
     struct state;

@@ -72,9 +72,9 @@ class shared_callback {
 ///
 /// A plugin answers from any thread. The responder of a job on a pool of workers is used right there; it knows by
 /// itself whether it is stopped, and has its callback called. That of a job in line belongs to an executor: while a
-/// task's `start` runs, its own thread may use it, as whoever called it does; from elsewhere, what a plugin says is
-/// posted, and whoever registers the job calls `stop`. All functions may be called from any thread, but for `close`,
-/// which belongs on the executor of all the responders.
+/// task's `start` runs, its own thread may use it, as its caller does; from elsewhere, what a plugin says is
+/// posted, and the code that registers the job calls `stop`. All functions may be called from any thread, but for
+/// `close`, which belongs on the executor of all the responders.
 class plugin_jobs {
   public:
     using id = std::uint64_t;

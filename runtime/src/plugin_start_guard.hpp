@@ -7,8 +7,8 @@
 namespace cles::runtime {
 
 /// While a plugin starts in this process, what ends or holds the process is said by one line on stderr, and ends it
-/// with a code of our choice: a crash, an `exit`, a start that takes longer than the limit. SIGTERM and SIGINT end the
-/// process as they do where nobody listens to them, since whoever would listen waits for the plugin.
+/// with a code of our choice: a crash, an `exit`, a start that takes longer than the limit. SIGTERM and SIGINT have
+/// their default effect and end the process, since the thread that would handle them waits for the plugin.
 ///
 /// One at a time, on the main thread.
 class plugin_start_guard {

@@ -20,6 +20,7 @@
 #include <poll.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -29,7 +30,8 @@ namespace {
 // How the child ends. No usual numbers: a library that ends the process may choose any, 0 too.
 constexpr int usable = 123;
 constexpr int refused = 124;
-constexpr std::size_t most_words = 2000;
+constexpr std::size_t most_words = 2000; // the last ones, which tell why it ended
+constexpr std::size_t roomy_pipe = 256 * 1024;
 // The system keeps a report in one piece, and takes it though nobody reads yet.
 constexpr std::size_t longest_report = 2000;
 
@@ -74,7 +76,7 @@ void write_all(int to, std::string_view text) {
 // As in a process that begins: nothing of what the parent does about signals, and no memory image where it crashes.
 void become_a_child(int words) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL); // it may hang for ever, and who gives it up may be killed
-    for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGTERM, SIGINT, SIGHUP, SIGPIPE}) {
+    for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGTERM, SIGINT, SIGHUP, SIGPIPE, SIGCHLD}) {
         ::signal(number, SIG_DFL);
     }
     sigset_t none;
@@ -120,28 +122,64 @@ void become_a_child(int words) {
     ::_exit(refused);
 }
 
-// What the child writes until it ends or the time is up. True: it ended.
-bool read_words(int from, std::string& words, std::chrono::steady_clock::time_point end) {
+// Leaves the end of a text, no longer than `most_words`, from the beginning of a character.
+void keep_last_words(std::string& words) {
+    if (words.size() <= most_words) {
+        return;
+    }
+    auto begin = words.size() - most_words;
+    while (begin < words.size() && (static_cast<unsigned char>(words[begin]) & 0xC0U) == 0x80U) {
+        ++begin;
+    }
+    words.erase(0, begin);
+}
+
+// Takes what there is to read, but no more than a pipe holds: the child may write faster. False at the end of the
+// stream.
+bool read_ready(int from, std::string& words) {
+    std::array<char, 4096> some{};
+    for (std::size_t taken = 0; taken < roomy_pipe; taken += some.size()) {
+        const auto size = ::read(from, some.data(), some.size());
+        if (size == 0) {
+            return false;
+        }
+        if (size < 0) {
+            return errno == EAGAIN || errno == EINTR;
+        }
+        words.append(some.data(), static_cast<std::size_t>(size));
+        keep_last_words(words);
+    }
+    return true;
+}
+
+int open_process(pid_t process) {
+    const auto fd = static_cast<int>(::syscall(SYS_pidfd_open, process, 0));
+    if (fd < 0) {
+        throw std::system_error(errno, std::generic_category(), "cannot watch a process");
+    }
+    return fd;
+}
+
+// Reads what the child writes until it has ended, or the time is up. True: it has ended. The end of the stream says
+// nothing about the child: it may close its output and go on, and a process that it started may keep the output open.
+bool read_words(int from, int process, std::string& words, std::chrono::steady_clock::time_point end) {
+    std::array<pollfd, 2> watched{
+        {{.fd = process, .events = POLLIN, .revents = 0}, {.fd = from, .events = POLLIN, .revents = 0}}};
+    auto& [ended, readable] = watched;
     for (;;) {
         const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-        pollfd readable{.fd = from, .events = POLLIN, .revents = 0};
-        const auto ready = ::poll(&readable, 1, static_cast<int>(std::max<long>(left.count(), 0)));
+        const auto ready = ::poll(watched.data(), watched.size(), static_cast<int>(std::max<long>(left.count(), 0)));
         if (ready < 0 && errno == EINTR) {
             continue;
         }
-        if (ready <= 0) {
-            return false;
+        if (ready > 0 && ended.revents == 0) {
+            readable.fd = read_ready(from, words) ? from : -1;
         }
-        std::array<char, 512> some{};
-        const auto size = ::read(from, some.data(), some.size());
-        if (size < 0 && (errno == EAGAIN || errno == EINTR)) {
-            continue;
+        const bool over = left.count() <= 0 && ended.revents == 0;
+        if (ready <= 0 || ended.revents != 0 || over) {
+            read_ready(from, words);
+            return ready > 0 && ended.revents != 0;
         }
-        if (size <= 0) {
-            return true;
-        }
-        words.append(some.data(), static_cast<std::size_t>(size));
-        words.resize(std::min(words.size(), most_words));
     }
 }
 
@@ -157,6 +195,28 @@ std::string on_one_line(std::string text) {
 
 std::string with_words(std::string text, const std::string& words) {
     return words.empty() ? text : text + ": " + words;
+}
+
+// Waits for the child, and ends it when the time is up, which is then told by `false`.
+bool wait_for_end(pid_t child, int from, std::string& words, std::chrono::steady_clock::time_point end, int& status) {
+    bool ended = false;
+    try {
+        const descriptor process{open_process(child)};
+        ended = read_words(from, process.get(), words, end);
+    } catch (...) {
+        ::kill(child, SIGKILL);
+        ::waitpid(child, &status, 0);
+        throw;
+    }
+    if (!ended) {
+        ::kill(child, SIGKILL);
+    }
+    while (::waitpid(child, &status, 0) < 0) {
+        if (errno != EINTR) {
+            throw std::system_error(errno, std::generic_category(), "cannot learn how a process ended");
+        }
+    }
+    return ended;
 }
 
 // What is there, now that the child has ended.
@@ -181,7 +241,8 @@ std::string read_report(int from) {
 
 std::array<int, 2> make_pipe() {
     std::array<int, 2> ends{};
-    if (::pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0) {
+    // Only the reader's end does not block: what the child writes while nobody reads must not be lost.
+    if (::pipe2(ends.data(), O_CLOEXEC) != 0 || ::fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) {
         throw std::system_error(errno, std::generic_category(), "cannot make a pipe");
     }
     return ends;
@@ -208,13 +269,8 @@ void try_plugin(const std::string& path, const std::filesystem::path& file, cons
     into.close();
     report_into.close();
     std::string words;
-    const bool ended = read_words(from.get(), words, end);
-    if (!ended) {
-        ::kill(child, SIGKILL);
-    }
     int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
-    }
+    const bool ended = wait_for_end(child, from.get(), words, end, status);
     words = on_one_line(std::move(words));
     const auto report = read_report(report_from.get());
     const auto steps = report.substr(0, report.find_first_of(verdicts));

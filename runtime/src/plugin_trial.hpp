@@ -11,12 +11,13 @@ namespace cles::runtime {
 /// registered.
 ///
 /// What a library runs then cannot be guarded against in the process that runs it: an exception out of a constructor of
-/// a global object ends the process, and so does a crash, and what never returns holds it. The child's last words are
+/// a global object ends the process, and so does a crash, and what never returns holds it. What the child wrote last is
 /// part of what is thrown. Costs a few milliseconds. To be called before the process has other threads: the child is a
 /// copy of this thread alone, in which a lock that another one holds is never released.
 ///
 /// \param path as the configuration names it \param file where it is \param config its settings, a JSON object
-/// \throws plugin_error where it cannot be used
+/// \throws plugin_error where it cannot be used; std::system_error where it cannot be tried, as in a process that
+/// ignores SIGCHLD and so never learns how its children end
 void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
                 const std::string& config, std::chrono::milliseconds limit);
 

@@ -36,14 +36,14 @@ std::string seconds(std::chrono::nanoseconds span) {
 
 pool_state::pool_state(asio::any_io_executor executor, pool_options options)
     : executor_(std::move(executor)), options_(std::move(options)), box_([this] {
-          // Whoever wakes holds a job, and so this.
+          // The thread that wakes holds a job, and so this.
           asio::post(executor_, [weak = weak_from_this()] {
               if (const auto self = weak.lock()) {
                   self->collect();
               }
           });
       }),
-      crew_(options_, box_), onward_(crew_), tick_(std::in_place, executor_), drain_(executor_),
+      workers_(options_, box_), onward_(workers_), tick_(std::in_place, executor_), drain_(executor_),
       patience_(options_.patience) {}
 
 pool_state::~pool_state() = default;
@@ -54,9 +54,9 @@ asio::any_io_executor pool_state::executor() const {
 }
 
 void pool_state::start() {
-    crew_.start(std::shared_ptr<crew>{shared_from_this(), &crew_}, [this] {
-        // Where this fails, the next tick notices.
-        static_cast<void>(box_.put([this] { notice_pause(); }));
+    workers_.start(std::shared_ptr<worker_pool>{shared_from_this(), &workers_}, [this] {
+        // Where this fails, the next tick does it.
+        static_cast<void>(box_.put([this] { look_for_pause(); }));
     });
     if (options_.look_in.count() > 0) {
         // From when the executor runs, which may take a while.
@@ -107,7 +107,7 @@ void pool_state::submit(job what) {
         return;
     }
     if (draining_) {
-        refuse(what.answer, crew::admission::no_workers);
+        refuse(what.answer, worker_pool::admission::no_workers);
         return;
     }
     notice_pause();
@@ -116,8 +116,8 @@ void pool_state::submit(job what) {
     r.requester = reinterpret_cast<std::uintptr_t>(&what.what.peer());
     r.request_.keep(what.what, peers_.copy_of(what.what.peer()));
     r.work_ = std::move(what.work);
-    const auto admission = crew_.push(r);
-    if (admission == crew::admission::full || admission == crew::admission::no_workers) {
+    const auto admission = workers_.push(r);
+    if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
         r.answered_ = true;
         recycle(r);
         refuse(what.answer, admission);
@@ -127,7 +127,7 @@ void pool_state::submit(job what) {
     // The worker may have it by now, and does not look at what is set here.
     answers_.add(r, std::move(what.answer));
     r.answer_->on_stop([this, &r] { stop(r); });
-    if (admission == crew::admission::wants_workers) {
+    if (admission == worker_pool::admission::wants_workers) {
         wake_workers();
     }
 }
@@ -136,22 +136,22 @@ void pool_state::submit(job what) {
 void pool_state::wake_workers() {
     if (answers_.size() == 1 || ++unwoken_ >= most_unwoken) {
         unwoken_ = 0;
-        crew_.wake();
+        workers_.wake();
     } else if (!std::exchange(wake_asked_, true)) {
         asio::post(executor_, [self = shared_from_this()] {
             self->wake_asked_ = false;
             self->unwoken_ = 0;
-            self->crew_.wake();
+            self->workers_.wake();
         });
     }
 }
 
-void pool_state::refuse(responder& answer, crew::admission why) {
+void pool_state::refuse(responder& answer, worker_pool::admission why) {
     ++figures_.refused;
-    const auto retry = retry_delay(crew_.queued(), crew_.usable(), crew_.count().service_time);
+    const auto retry = retry_delay(workers_.queued(), workers_.usable(), workers_.count().service_time);
     if (draining_) {
         answer.refuse("it is shutting down", 1s);
-    } else if (why == crew::admission::no_workers) {
+    } else if (why == worker_pool::admission::no_workers) {
         answer.refuse("all its workers are stuck", std::max<std::chrono::milliseconds>(retry, 1s));
     } else {
         answer.refuse("its queue is full", retry);
@@ -204,14 +204,14 @@ void pool_state::stop(job_record& r) {
         callback.swap(r.on_stop_);
     }
     answers_.give_up(r);
-    if (crew_.take_back(r)) {
+    if (workers_.take_back(r)) {
         ++figures_.withdrawn;
         r.answered_ = true;
         answers_.conclude(r);
         let_go(r);
         return;
     }
-    crew_.hurry(r, clock::now());
+    workers_.expect_end(r, clock::now());
     if (callback) {
         r.add_reference();
         stop_notifier_.notify(
@@ -238,7 +238,7 @@ void pool_state::delegate(job_context asks, std::string command, call_options op
         ending ? (*asked)(errc::unavailable, "{}", "the node is stopping")
                : (*asked)(errc::busy, "{}", "too much is asked at once");
     };
-    if (!crew_.resume(*asks.record_, refuse)) {
+    if (!workers_.resume(*asks.record_, refuse)) {
         refuse(); // no worker is left
     }
 }
@@ -246,21 +246,22 @@ void pool_state::delegate(job_context asks, std::string command, call_options op
 // -- figures -------------------------------------------------------------------------------------------------------
 
 node_load pool_state::load() const noexcept {
-    const auto queued = crew_.queued();
+    const auto queued = workers_.queued();
     const auto open = static_cast<std::uint32_t>(answers_.size());
     const auto begun = open - std::min(queued, open);
     // Where no worker comes free the next job waits at least as long as that has been so.
-    const auto held = std::chrono::duration_cast<std::chrono::microseconds>(crew_.held_for(clock::now())).count();
+    const auto held = std::chrono::duration_cast<std::chrono::microseconds>(workers_.held_for(clock::now())).count();
     constexpr std::int64_t most = 1'000'000'000;
     return {.queued = queued,
-            .running = std::max(begun, crew_.running()),
-            .workers = crew_.usable(),
-            .service_us = std::max(crew_.service_us(), static_cast<std::uint32_t>(std::min<std::int64_t>(held, most)))};
+            .running = std::max(begun, workers_.running()),
+            .workers = workers_.usable(),
+            .service_us =
+                std::max(workers_.service_us(), static_cast<std::uint32_t>(std::min<std::int64_t>(held, most)))};
 }
 
 pool_figures pool_state::figures() const {
     const auto now = load();
-    const auto workers = crew_.count();
+    const auto workers = workers_.count();
     auto all = figures_;
     all.threw = counts_.threw.load(std::memory_order_relaxed);
     all.answerless = counts_.answerless.load(std::memory_order_relaxed);
@@ -270,7 +271,7 @@ pool_figures pool_state::figures() const {
     all.replaced = workers.replaced;
     all.revived = workers.revived;
     all.queued = now.queued;
-    all.running = crew_.running();
+    all.running = workers_.running();
     all.waiting = now.running - std::min(now.running, all.running);
     all.workers = now.workers;
     all.stuck_now = workers.stuck_now;
@@ -330,7 +331,7 @@ void pool_state::tick() {
     if (closed_) {
         return;
     }
-    notice_pause();
+    look_for_pause();
     report_stuck();
     collect(); // what went without a word
     if (records_.size() != 0 || options_.look_in.count() > 0) {
@@ -342,22 +343,22 @@ void pool_state::tick() {
 
 void pool_state::expect_tick(time_point now) {
     if (options_.look_in.count() > 0) {
-        crew_.expect_executor(now + tick_span_ + options_.late_executor);
+        workers_.expect_executor(now + tick_span_ + options_.late_executor);
     }
 }
 
-// The process was stopped, or the machine suspended, or a handler held up the executor: whoever asked may have
+// The process was stopped, or the machine suspended, or a handler held up the executor: requesters may have
 // withdrawn meanwhile, which stands in what has not been read.
 void pool_state::notice_pause() {
     const auto now = clock::now();
-    if (closed_ || !crew_.executor_is_late(now)) {
+    if (closed_ || !workers_.executor_is_late(now)) {
         return;
     }
     expect_tick(now);
     if (std::exchange(reading_, true)) {
         return;
     }
-    crew_.hold();
+    workers_.hold();
     reading_since_ = now;
     quiet_rounds_ = 0;
     changes_before_ = changes_;
@@ -365,6 +366,15 @@ void pool_state::notice_pause() {
                                 seconds(tick_span_ + options_.late_executor) +
                                 ": what came meanwhile is read before a job begins");
     read_on();
+}
+
+// A worker that has found the executor late waits to be woken, also where the pause has been dealt with before it says
+// so.
+void pool_state::look_for_pause() {
+    notice_pause();
+    if (!reading_ && !closed_) {
+        workers_.wake();
+    }
 }
 
 // What is posted comes after what is ready, and after a look for what has become ready.
@@ -386,11 +396,11 @@ void pool_state::begin_again() {
     }
     reading_ = false;
     expect_tick(now);
-    crew_.release();
+    workers_.release();
 }
 
 void pool_state::report_stuck() {
-    crew_.watch(clock::now(), [this](const worker_watch::finding& found, const job_record& r) {
+    workers_.watch(clock::now(), [this](const worker_watch::finding& found, const job_record& r) {
         say(log_level::error,
             {"worker " + std::to_string(found.place + 1) + " is stuck in " +
                  std::string{to_string(r.request().verb())} + " '" + std::string{r.request().task()} + "' since " +
@@ -420,7 +430,7 @@ void pool_state::drain(std::chrono::milliseconds limit, std::function<void(const
 }
 
 void pool_state::follow_drain(bool over) {
-    if (!drain_.under_way() || !(over || (answers_.awaited() == 0 && crew_.running() == 0))) {
+    if (!drain_.under_way() || !(over || (answers_.awaited() == 0 && workers_.running() == 0))) {
         return;
     }
     drain_report report;
@@ -428,7 +438,7 @@ void pool_state::follow_drain(bool over) {
         abandon(report);
         patience_ = 0ms;
     }
-    report.stuck = crew_.running();
+    report.stuck = workers_.running();
     drain_.end(report);
 }
 
@@ -454,17 +464,18 @@ void pool_state::abandon(drain_report& report) {
     }
 }
 
-void pool_state::close() {
+std::size_t pool_state::close(std::optional<std::chrono::milliseconds> limit) {
     if (closed_) {
-        return;
+        return 0;
     }
+    const auto patience = std::min(limit.value_or(patience_), patience_);
     draining_ = true;
     drain_report unheard;
     abandon(unheard);
     closed_ = true;
     drain_.forget();
     tick_.reset();
-    crew_.close([](job_record& r) { r.release(); });
+    workers_.close([](job_record& r) { r.release(); });
     std::vector<result_box::item> items;
     std::vector<result_box::errand> errands;
     box_.close(items, errands);
@@ -487,11 +498,17 @@ void pool_state::close() {
         const std::lock_guard lock{executor_mutex_};
         executor_ = {};
     }
-    const auto left = crew_.join(patience_) + stop_notifier_.end(patience_);
-    if (left != 0) {
-        say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(left));
+    const auto workers = workers_.join(patience);
+    if (workers != 0) {
+        say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(workers));
+    }
+    const auto callbacks = stop_notifier_.end(patience);
+    if (callbacks != 0) {
+        say(log_level::error,
+            "threads left behind in on_stop callbacks that do not return: " + std::to_string(callbacks));
     }
     records_.drop_spare();
+    return workers + callbacks;
 }
 
 } // namespace cles::runtime

@@ -4,7 +4,6 @@
 #include <cles/limits.hpp>
 #include <cles/peer.hpp>
 
-#include "crew.hpp"
 #include "draining.hpp"
 #include "job.hpp"
 #include "job_pool.hpp"
@@ -17,6 +16,7 @@
 #include "pool_options.hpp"
 #include "result_box.hpp"
 #include "stop_notifier.hpp"
+#include "worker_pool.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/steady_timer.hpp>
@@ -49,7 +49,8 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     [[nodiscard]] node_load load() const noexcept;
     [[nodiscard]] pool_figures figures() const;
     void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
-    void close();
+    /// Returns how many threads are left behind.
+    std::size_t close(std::optional<std::chrono::milliseconds> limit = {});
     /// A handler ran on this executor for so long.
     void note_inline(std::string_view task, std::chrono::nanoseconds took);
 
@@ -73,7 +74,7 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     job_record& take_record();
     void recycle(job_record& r);
     void wake_workers();
-    void refuse(responder& answer, crew::admission why);
+    void refuse(responder& answer, worker_pool::admission why);
 
     void collect();
     void let_go(job_record& r);
@@ -83,6 +84,7 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     void arm_tick();
     void expect_tick(time_point now);
     void notice_pause();
+    void look_for_pause();
     void read_on();
     void begin_again();
     void report_stuck();
@@ -95,7 +97,7 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     pool_options options_;
     shared_counts counts_;
     result_box box_;
-    crew crew_;
+    worker_pool workers_;
     onward_requests onward_;
     stop_notifier stop_notifier_;
 

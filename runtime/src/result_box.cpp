@@ -23,7 +23,7 @@ bool result_box::put(item what, bool in_time) {
     return true;
 }
 
-void result_box::hurry() {
+void result_box::flush() {
     bool first = false;
     {
         const std::lock_guard lock{mutex_};

@@ -37,7 +37,7 @@ class result_box {
     /// False once it has been closed. `in_time`: without a wake-up, when the executor comes by anyway.
     [[nodiscard]] bool put(item what, bool in_time = false);
     /// Has what was put in with time fetched now.
-    void hurry();
+    void flush();
     /// Something to be run on the executor. False once it has been closed, or where too many wait.
     [[nodiscard]] bool put(errand what);
     /// Exchanges what is there for two empty lists.

@@ -17,8 +17,6 @@ namespace {
 
 using steady = std::chrono::steady_clock;
 
-// What a thread has to begin and to go from one call to the next, whatever the limit.
-constexpr std::chrono::milliseconds last_moment{500};
 constexpr std::chrono::milliseconds least_patience{1};
 
 } // namespace
@@ -58,9 +56,11 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
             }
         });
     }
+    // With the lock: whether somebody waits for the call that is under way.
+    [[nodiscard]] bool is_awaited() const { return !waiting.empty() || (ending && current != nullptr); }
     // With the lock: one makes the calls, and one waits whether it is blocked.
     void see_to_threads() {
-        const std::size_t wanted = blocked + (waiting.empty() ? 0 : 1) + (current == nullptr ? 0 : 1);
+        const std::size_t wanted = blocked + (is_awaited() ? 1 : 0) + (current == nullptr ? 0 : 1);
         while (working < wanted) {
             const auto before = working;
             add_thread();
@@ -73,7 +73,7 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
     void work() {
         std::unique_lock lock{mutex};
         while (!ended && working <= blocked + 2) {
-            if (waiting.empty()) {
+            if (!is_awaited()) {
                 changed.wait(lock);
             } else if (current == nullptr) {
                 make_call(lock);
@@ -115,6 +115,7 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
         slow->blocks = true;
         ++blocked;
         see_to_threads();
+        changed.notify_all();
         const auto blocked_threads = blocked;
         const bool last = blocked + 1 >= most_threads && !std::exchange(exhausted, true);
         lock.unlock();
@@ -142,6 +143,7 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
     std::size_t calls = 0;         // under way, those that block too
     std::size_t blocked = 0;
     bool exhausted = false; // which has been reported
+    bool ending = false;
     bool ended = false;
 };
 
@@ -163,7 +165,8 @@ bool stop_notifier::notify(notice what) {
 
 std::size_t stop_notifier::end(std::chrono::milliseconds limit) {
     auto& in = *inside_;
-    const auto end = steady::now() + limit;
+    const auto begun = steady::now();
+    const auto end = begun + limit;
     std::deque<notice> never;
     std::size_t busy = 0;
     {
@@ -171,7 +174,11 @@ std::size_t stop_notifier::end(std::chrono::milliseconds limit) {
         if (in.ended) {
             return 0;
         }
-        in.changed.wait_for(lock, std::max(limit, last_moment), [&] { return in.waiting.empty() && in.calls == 0; });
+        in.ending = true;
+        in.see_to_threads(); // which find out whether the last call blocks, too
+        in.changed.notify_all();
+        in.changed.wait_until(lock, end, [&] { return in.waiting.empty() && in.calls == 0; });
+        in.changed.wait_until(lock, begun + last_moment, [&] { return in.waiting.empty() && in.calls == in.blocked; });
         never.swap(in.waiting);
         in.ended = true;
         busy = in.calls;

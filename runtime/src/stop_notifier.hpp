@@ -27,6 +27,9 @@ class stop_notifier {
     };
 
     static constexpr std::size_t most_threads = 16;
+    /// How long `end` waits at least for a call that is not known to block, whatever the limit: what a thread has to
+    /// begin and to go from one call to the next.
+    static constexpr std::chrono::milliseconds last_moment{500};
 
     explicit stop_notifier(std::chrono::milliseconds patience = std::chrono::milliseconds{10});
     stop_notifier(const stop_notifier&) = delete;
@@ -35,9 +38,10 @@ class stop_notifier {
 
     /// From any thread. False after `end`: it is not called.
     bool notify(notice what);
-    /// Waits until all calls have returned, no longer than the limit, or half a second where that is more: a call that
-    /// is under way when the limit passes is seldom one that hangs. What has not been called by then never is; nothing
-    /// of it is held. Returns how many threads are left behind.
+    /// Waits until all calls have been made and have returned. For calls that are known to block it waits no longer
+    /// than the limit; for the others `last_moment` at least, since a call that is under way when the limit passes is
+    /// seldom one that hangs. What has not been called by then never is; nothing of it is held. Returns how many
+    /// threads are left behind.
     std::size_t end(std::chrono::milliseconds limit);
 
   private:

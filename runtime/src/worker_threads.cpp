@@ -75,7 +75,7 @@ std::size_t worker_threads::stop(std::chrono::milliseconds limit, std::size_t bu
         // Those that run nothing take a moment too.
         inside_->one_ended.wait_for(lock, most_to_wake, [&] { return inside_->running <= busy; });
     }
-    // Whoever goes on finds its mark as long as it lives: it holds what the list is in.
+    // A thread that goes on finds its mark as long as it lives: it holds what the list is in.
     std::vector<std::thread> ended;
     std::size_t left = 0;
     for (const auto& w : inside_->workers) {

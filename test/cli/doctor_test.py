@@ -155,6 +155,22 @@ class Doctor(unittest.TestCase):
         self.clesd("exit 1")
         self.failure(self.examine()[1], "config", "refuses its configuration")
 
+    def test_plugins_that_are_not_required(self):
+        self.clesd("echo 'clesd: a.yaml:3: plugins[0].path: a.so: there is no such file (it is not required)' >&2; "
+                   "echo 'clesd: a.yaml:5: plugins[1].path: b.so: it is no plugin (it is not required)' >&2; "
+                   "echo 'a.yaml: can be used'")
+        code, found = self.examine()
+        self.assertEqual(code, 0, found)
+        self.assertEqual([(each["verdict"], each["text"]) for each in found["config"]], [
+            ("warning", "clesd: a.yaml:3: plugins[0].path: a.so: there is no such file (it is not required)"),
+            ("warning", "clesd: a.yaml:5: plugins[1].path: b.so: it is no plugin (it is not required)"),
+            ("ok", "clesd: a.yaml: can be used")])
+
+    def test_a_check_that_takes_as_long_as_a_plugin_may(self):
+        self.clesd("sleep 11; echo 'without a file: can be used'")
+        _, found = self.examine()
+        self.assertEqual([each["verdict"] for each in found["config"]], ["ok"])
+
     @unittest.skipUnless(CLESD, "clesd was not built")
     def test_what_clesd_itself_says_of_its_configuration(self):
         self.clesd(f'exec {CLESD} "$@"')

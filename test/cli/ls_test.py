@@ -115,7 +115,7 @@ class Found(Group):
         code, out, err = by_name("pull", "car9:echo")
         self.assertEqual((code, out), (3, ""))
         first, second = err.splitlines()
-        self.assertRegex(first, r"^cles: no_target: cles-\d+ knows no way to 'car9': nobody of that name has announced "
+        self.assertRegex(first, r"^cles: no_target: cles-\d+ cannot find 'car9': nobody of that name has announced "
                                 r"itself on lo; give its URL$")
         self.assertEqual(second, "cles: cles ls shows who is there; --at URL or --peer NAME=URL says where else to ask")
 

@@ -35,17 +35,17 @@ class Usage(unittest.TestCase):
 
     def test_bodies(self):
         self.refused("push", "car1:a", "-d", '{"a":}', says="at byte 5")
-        self.refused("push", "car1:a", "-d", '{"a":1', says="the body is no JSON")
+        self.refused("push", "car1:a", "-d", '{"a":1', says="the body is not valid JSON")
         self.refused("push", "car1:a", "-d", '{"a":01}', says="leading zeros")
         self.refused("push", "car1:a", "-d", "7", says="an object or an array")
-        self.refused("push", "car1:a", "-d", "", says="the body is no JSON")
+        self.refused("push", "car1:a", "-d", "", says="the body is not valid JSON")
         self.refused("push", "car1:a", "-d", "[" * 33 + "]" * 33, says="32")
-        self.refused("push", "car1:a", "-d", "-", stdin="", says="the body from stdin is no JSON")
-        self.refused("push", "car1:a", "-d", "-", stdin="{,}", says="the body from stdin is no JSON")
+        self.refused("push", "car1:a", "-d", "-", stdin="", says="the body from stdin is not valid JSON")
+        self.refused("push", "car1:a", "-d", "-", stdin="{,}", says="the body from stdin is not valid JSON")
         self.refused("push", "car1:a", "-d", "@/nowhere/x.json", says="cannot read /nowhere/x.json: No such file")
         self.refused("push", "car1:a", "-d", "@/", says="cannot read /: Is a directory")
         with tempfile.NamedTemporaryFile("w") as empty:
-            self.refused("push", "car1:a", "-d", "@" + empty.name, says=f"{empty.name} is no JSON")
+            self.refused("push", "car1:a", "-d", "@" + empty.name, says=f"{empty.name} is not valid JSON")
 
     def test_verbs_without_a_body(self):
         self.refused("pull", "car1:a", "-d", "{}", says="PULL takes no body")

@@ -178,7 +178,7 @@ BOOST_FIXTURE_TEST_CASE(after_the_first_round_an_unknown_name_is_refused_at_once
     const auto first = pulled(asker, "car9:who");
     BOOST_TEST((first.code == errc::no_target));
     BOOST_TEST(first.why ==
-               "asker knows no way to 'car9': nobody of that name has announced itself on lo; give its URL");
+               "asker cannot find 'car9': nobody of that name has announced itself on lo; give its URL");
     const auto second = pull(asker, "car9:who");
     here.restart();
     here.poll();
@@ -267,7 +267,7 @@ BOOST_FIXTURE_TEST_CASE(without_multicast_nobody_is_known, fixture) {
     cles::service alone{here, {.name = "alone"}};
     const auto answer = pulled(alone, "car1:who");
     BOOST_TEST((answer.code == errc::no_target));
-    BOOST_TEST(answer.why == "alone knows no way to 'car1': give its URL");
+    BOOST_TEST(answer.why == "alone cannot find 'car1': give its URL");
     BOOST_TEST(pulled(alone, "self:cles/peers").text == R"({"peers":[]})");
 }
 
@@ -389,7 +389,7 @@ BOOST_FIXTURE_TEST_CASE(what_is_malformed_is_counted_and_otherwise_without_effec
     const auto nowhere = pulled(asker, "car3:who");
     BOOST_TEST((nowhere.code == errc::no_target));
     BOOST_TEST(nowhere.why ==
-               "asker knows no way to 'car3': it is there, but at no address that can be used from here");
+               "asker cannot find 'car3': it is there, but at no address that can be used from here");
 }
 
 BOOST_FIXTURE_TEST_CASE(past_the_limit_nodes_are_passed_over, fixture) {

@@ -45,6 +45,8 @@ constexpr std::array faults{
     fault{"refuses", "the device is on fire"},
     fault{"refuses_setting", "60 at most"},
     fault{"refuses_silently", "it refuses to start and does not say why"},
+    fault{"talks_and_crashes", "its check of its settings ends the process by signal 6: "},
+    fault{"talks_and_crashes", "looked at sensor 4999 assertion failed: no sensor is left"},
     fault{"throws_in_entry", "its entry threw: not today"},
     fault{"throws_in_start", "its start threw: no such device"},
     fault{"throws_when_loaded", "thrown by a global object"},
@@ -106,6 +108,18 @@ BOOST_AUTO_TEST_CASE(an_entry_point_that_never_returns_is_given_up) {
     BOOST_CHECK_EXCEPTION(hasty.load("hangs_in_entry.so", "{}", node), plugin_error, [](const plugin_error& e) {
         return std::string{e.what()} == "hangs_in_entry.so: its entry point does not end";
     });
+}
+
+BOOST_AUTO_TEST_CASE(a_trial_ends_with_its_process_and_not_with_its_output) {
+    plugin_host hasty{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 3s}};
+    hasty.load("leaves_a_process.so", "{}", node);
+    BOOST_TEST(hasty.plugins().size() == 1U);
+    // Nothing is left of its output, and it goes on.
+    plugin_host hastier{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
+    BOOST_CHECK_EXCEPTION(
+        hastier.load("closes_output_and_hangs.so", "{}", node), plugin_error, [](const plugin_error& e) {
+            return std::string{e.what()} == "closes_output_and_hangs.so: its check of its settings does not end";
+        });
 }
 
 BOOST_AUTO_TEST_CASE(the_setting_that_is_to_blame_is_named) {

@@ -190,7 +190,7 @@ BOOST_AUTO_TEST_CASE(its_bind_handler_decides_and_what_it_publishes_arrives) {
 BOOST_AUTO_TEST_CASE(at_the_stop_jobs_are_answered_and_told_and_no_further_one_begins) {
     auto& told = send("DELEGATE self:until_stopped");
     auto& polls = send("DELEGATE self:polls");
-    BOOST_TEST(host->stop(20s).empty());
+    BOOST_TEST(host->stop(20s).late.empty());
     wait_for(told);
     wait_for(polls);
     BOOST_TEST(told.code == cles::make_error_code(errc::unavailable));
@@ -198,7 +198,7 @@ BOOST_AUTO_TEST_CASE(at_the_stop_jobs_are_answered_and_told_and_no_further_one_b
     BOOST_TEST(polls.code == cles::make_error_code(errc::unavailable));
     BOOST_TEST(ask("PULL self:number") == "unavailable: node: the plugin 'sound' has stopped");
     BOOST_TEST(ask("BIND self:ticks").find("async_bind") != std::string::npos);
-    BOOST_TEST(host->stop(20s).empty()); // once is enough
+    BOOST_TEST(host->stop(20s).late.empty()); // once is enough
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_is_answered_once_however_often_its_plugin_tries, rough) {
@@ -226,15 +226,24 @@ BOOST_FIXTURE_TEST_CASE(what_is_no_json_is_not_passed_on, rough) {
     BOOST_TEST(ask("DELEGATE self:unknown_code") == "failed: node: as it does");
     BOOST_TEST(ask("DELEGATE self:bad_progress") == "{}");
     run_ready(io);
-    BOOST_TEST(was_said("an update of 'fine' is no JSON"));
+    BOOST_TEST(was_said("an update of 'fine' is not valid JSON"));
     BOOST_TEST(was_said("was refused"));
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_that_is_forgotten_ends_at_its_deadline, rough) {
     BOOST_TEST(ask("DELEGATE self:forgets deadline=20").starts_with("deadline: "));
     BOOST_TEST(host->figures().jobs == 1U); // its plugin may still answer
-    BOOST_TEST(host->stop(20s).empty());
+    BOOST_TEST(host->stop(20s).late.empty());
     BOOST_TEST(host->figures().jobs == 0U);
+    BOOST_TEST(was_said("rough: its stop threw"));
+}
+
+// However short the limit is.
+BOOST_FIXTURE_TEST_CASE(an_on_stop_callback_that_blocks_does_not_keep_its_plugin_from_stopping, rough) {
+    send("DELEGATE self:blocks_when_stopped");
+    const auto left = host->stop(200ms);
+    BOOST_TEST(left.late.empty());
+    BOOST_TEST(left.callbacks == 1U);
     BOOST_TEST(was_said("rough: its stop threw"));
 }
 

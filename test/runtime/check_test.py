@@ -10,7 +10,7 @@ import time
 import unittest
 
 from daemon import CLESD, FAULTY, STUBBORN, Folder, clean_environment, clesd
-from support import PATIENCE, wait_until
+from support import PATIENCE, finish, read_line, wait_until
 
 SLOWNESS = max(PATIENCE / 30, 1)  # of sanitizers
 
@@ -110,6 +110,23 @@ class Check(unittest.TestCase):
             with open(path, "wb") as out:
                 out.write(image)
             self.refused(f"plugins: [{path}]\n", 1, "plugins[0].path", "it cannot be loaded: ")
+
+    def test_what_a_parent_ignores_and_blocks_does_not_matter(self):
+        """Which a parent without a thought for it hands down, as some supervisors do."""
+        def careless():
+            signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM, signal.SIGCHLD, signal.SIGALRM})
+
+        with Folder() as f:
+            file = f.write(f"node: a\nlisten: tcp://127.0.0.1:0\nmulticast: off\nplugins: [{STUBBORN}]\n")
+            done = subprocess.run([CLESD, "--config", file, "--check"], env=clean_environment(), preexec_fn=careless,
+                                  capture_output=True, text=True, timeout=PATIENCE, check=False)
+            self.assertEqual((done.returncode, done.stdout, done.stderr), (0, f"{file}: can be used\n", ""))
+            process = subprocess.Popen([CLESD, "--config", file], env=clean_environment(), preexec_fn=careless,
+                                       stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+            self.assertIn("listening", read_line(process))
+            process.send_signal(signal.SIGTERM)
+            self.assertEqual(finish(process)[0], 0)
 
     def test_plugins_are_not_started_by_a_check(self):
         with Folder() as f:
@@ -240,6 +257,8 @@ class Unit(unittest.TestCase):
         self.assertEqual(lines["Type"], "notify")
         self.assertEqual(lines["ExecStart"], "clesd --config /etc/cles/clesd.yaml")
         self.assertIn("-HUP $MAINPID", lines["ExecReload"])
+        # Neither a wrong configuration nor a name that is taken goes away by trying again.
+        self.assertEqual(lines["RestartPreventExitStatus"], "2 3")
         # Longer than a drain takes by default.
         drain = int(next(line for line in clesd("--print-config")[1].splitlines() if line.startswith("drain: "))
                     .removeprefix("drain: ").removesuffix("s"))

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: BSL-1.0
 """Two daemons of one name: the second ends, and says who has it, unless it is told to go on."""
 
+import signal
 import time
 import unittest
 
-from daemon import DEFAULTS, Daemon, body
+from daemon import DEFAULTS, STUBBORN, Daemon, body
 from support import free_port, wait_until
 
 
@@ -24,7 +25,7 @@ class Clash(unittest.TestCase):
     def test_the_second_ends_and_says_why(self):
         second = self.daemon()
         code, took = second.end()
-        self.assertEqual(code, 1)
+        self.assertEqual(code, 3)
         self.assertLess(took, 10)
         entry = second.wait_for_entry("stopping: ")
         self.assertEqual(entry["level"], "error")
@@ -32,6 +33,27 @@ class Clash(unittest.TestCase):
         self.assertIsNone(self.first.process.poll())
         peers = self.first.ask("PULL self:cles/peers")
         self.assertEqual(body(peers)["peers"], [])
+
+    def test_a_signal_while_it_gives_way_is_its_first(self):
+        second = self.daemon(f"plugins: [{STUBBORN}]\ndrain: 3s\n")
+        with second.connect() as link:
+            link.send("DELEGATE self:never_ends id=1 deadline=60000")
+            second.wait_for_entry("stopping: ")
+            given = time.monotonic()
+            code, _ = second.stop()
+            self.assertGreater(time.monotonic() - given, 2)
+        self.assertEqual(code, 3)
+        second.wait_for_entry("SIGTERM: it is stopping already")
+        self.assertNotIn("on a second signal", second.log())
+
+    def test_a_second_signal_ends_it_also_while_it_gives_way(self):
+        second = self.daemon(f"plugins: [{STUBBORN}]\ndrain: 10min\n")
+        with second.connect() as link:
+            link.send("DELEGATE self:never_ends id=1 deadline=60000")
+            second.wait_for_entry("stopping: ")
+            second.send_signal(signal.SIGTERM)
+            second.wait_for_entry("SIGTERM: it is stopping already")
+            self.assertEqual(second.stop()[0], 3)
 
     def test_it_goes_on_where_it_is_told_to(self):
         second = self.daemon("allow_clash: true\n")

@@ -190,6 +190,14 @@ BOOST_AUTO_TEST_CASE(multicast_is_turned_off_or_named_in_a_word) {
     BOOST_TEST(read("multicast: {port: 4000}\n").multicast.interface == "lo");
 }
 
+BOOST_AUTO_TEST_CASE(a_limit_is_rounded_up_since_0_turns_some_off) {
+    BOOST_TEST((read("limits: {first_line: 500us}\n").limits.first_line == 1ms));
+    BOOST_TEST((read("limits: {first_line: 0.1us}\n").limits.first_line == 1ms));
+    BOOST_TEST((read("limits: {first_line: 1500us}\n").limits.first_line == 2ms));
+    BOOST_TEST((read("limits: {first_line: 0}\n").limits.first_line == 0ms));
+    BOOST_TEST(refusal("limits: {lease: 60000001us}\n").find("is too long") != std::string::npos);
+}
+
 BOOST_AUTO_TEST_CASE(each_value_knows_its_line) {
     const auto c = read("node: sat1\n\nmulticast:\n  port: 4000\nplugins:\n  - path: a.so\n  - b.so\n");
     BOOST_TEST(c.origins.at("node") == "clesd.yaml:1");

@@ -59,11 +59,11 @@ BOOST_FIXTURE_TEST_CASE(what_has_time_wakes_nobody, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(what_had_time_can_be_hurried, fixture) {
-    results.hurry(); // there is nothing
+    results.flush(); // there is nothing
     BOOST_TEST(woken == 0);
     BOOST_TEST(results.put({some_record(8), box::news::ended}, true));
-    results.hurry();
-    results.hurry();
+    results.flush();
+    results.flush();
     BOOST_TEST(woken == 1);
     BOOST_TEST(take().size() == 1U);
 }

@@ -86,6 +86,17 @@ class Stops(unittest.TestCase):
         self.assertEqual(code, 0)
         self.assertLess(took, 5)
 
+    def test_the_daemon_ends_though_one_blocks(self):
+        """Even one alone, for which no other callback waits; and without destroying what it may use."""
+        with self.daemon.connect() as link:
+            self.withdraw(link, self.begin(link, "blocks_when_stopped", ["alone"]))
+            self.assertEqual(link.ask("PULL sat1:quick"), '{"value":42}')
+        code, took = self.daemon.stop()
+        self.assertEqual(code, 0)
+        self.assertLess(took, 5)
+        entry = self.daemon.wait_for_entry("threads left behind in on_stop callbacks that do not return: 1")
+        self.assertEqual(entry["level"], "error")
+
     def test_more_that_block_than_there_are_threads_are_reported(self):
         with self.daemon.connect() as link:
             self.withdraw(link, self.begin(link, "blocks_when_stopped", [f"b{n}" for n in range(20)]))

@@ -200,7 +200,7 @@ BOOST_AUTO_TEST_CASE(who_offers_it_no_more_is_passed_over) {
     two_others("PULL", "speed");
     link.ask("PULL any:speed id=7");
     ways.open().refuses(R"({"error":"no_task","message":"car2 has no PULL 'speed'"})");
-    ways.open().refuses(R"({"error":"no_target","message":"car3 knows no way"})");
+    ways.open().refuses(R"({"error":"no_target","message":"car3 cannot find it"})");
     BOOST_TEST(link.sent() == "id=7 no_target"); // the last one's words
 }
 

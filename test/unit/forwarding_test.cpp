@@ -115,7 +115,7 @@ BOOST_AUTO_TEST_CASE(what_happens_on_the_way_is_told_with_the_nodes_name) {
     BOOST_TEST(told.error == "unavailable");
     BOOST_TEST(told.message.find("car2") != std::string::npos, told.message);
     link.ask("PULL car9:speed");
-    ways.to("car9").fails(errc::no_target, "car1 knows no way to 'car9'");
+    ways.to("car9").fails(errc::no_target, "car1 cannot find 'car9'");
     BOOST_TEST(link.sent() == "no_target");
     link.ask("PUSH car2:log");
     ways.to("car2").fails(errc::unavailable, "the link was lost");

@@ -29,8 +29,8 @@ class call_options {
     }
     /// A small request that must not wait behind large ones: it travels on a link of its own, and its answer goes
     /// before others that wait at the peer. A peer that does not know the adverb `urgent` answers it in its turn.
-    call_options& urgent(bool hurry = true) {
-        urgent_ = hurry;
+    call_options& urgent(bool value = true) {
+        urgent_ = value;
         return *this;
     }
     /// Where the peer's own words go if the request fails; written before the request completes, which it must outlive.

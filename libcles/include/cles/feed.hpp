@@ -53,7 +53,7 @@ class feed_control {
     [[nodiscard]] virtual const boost::asio::any_io_executor& executor() const = 0;
 };
 
-/// False where the body is no JSON. What a type reads of it is checked by reading it.
+/// False where the body is not JSON. What a type reads of it is checked by reading it.
 template <class T>
 bool read_body(const raw_event& event, T& value, boost::system::error_code& code, std::string& why) {
     constexpr std::string_view what = "the update";
@@ -89,7 +89,7 @@ bool read_shared_body(const raw_event& event, T& value, boost::system::error_cod
     return read_body(event, value, code, why);
 }
 
-/// False where the body is no JSON.
+/// False where the body is not JSON.
 template <class T>
 bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code& code, std::string& why) {
     item.kind = event.kind;

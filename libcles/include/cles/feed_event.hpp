@@ -53,7 +53,7 @@ class pending_event {
     pending_event() = default;
     pending_event(const pending_event&) = delete;
     pending_event& operator=(const pending_event&) = delete;
-    /// False where the event's body is no JSON: the operation goes on waiting. Else it has ended.
+    /// False where the event's body is not JSON: the operation goes on waiting. Else it has ended.
     virtual bool deliver(const raw_event& event) = 0;
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
     /// Destroys it without calling its handler.

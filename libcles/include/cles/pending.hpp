@@ -19,7 +19,7 @@ namespace cles::detail {
 inline constexpr std::size_t answer_depth = 32 + 3;
 inline bool is_valid_answer(std::string_view json) { return is_valid_json(json, answer_depth); }
 
-/// One operation that waits for its result. Whoever holds it has it ended once, by `offer`, `fail` or `discard`, which
+/// One operation that waits for its result. Its holder has it ended once, by `offer`, `fail` or `discard`, which
 /// consume it.
 class pending {
   public:
@@ -29,7 +29,7 @@ class pending {
 
     enum class verdict : std::uint8_t { completed, malformed };
 
-    /// Offers the result's text. `malformed`: it is no JSON, and the operation goes on waiting.
+    /// Offers the result's text. `malformed`: it is not JSON, and the operation goes on waiting.
     virtual verdict offer(std::string_view json) = 0;
     /// The same for an answer to BIND that says which update it bears.
     virtual verdict offer_marked(std::string_view json, const update_mark& mark) {

@@ -14,13 +14,13 @@
  * Rules that hold for everything here:
  *
  * - Text is UTF-8, a pointer and a length, not ended by a zero. JSON is text that holds one value. What is handed to a
- *   function is borrowed until that function returns; whoever wants to keep it copies it. That holds both ways.
+ *   function is borrowed until that function returns; to keep it, copy it. That holds both ways.
  * - Functions of the host may be called from any thread, but for `add_task`, which is for `start` alone, and `refuse`
  * and `refuse_setting`, which are for `start` and `check`. The host and its functions stay valid until the process
  * ends, and so does the loaded library.
  * - A handle of a job that has been answered, or never was, is harmless: the call does nothing and is counted.
  * - No exception may leave a function of the plugin. (One that does is caught where the compilers allow it.)
- * - A structure begins with its size as whoever filled it knew it, so that later versions append members: read none
+ * - A structure begins with its size as its writer knows it, so that later versions append members: read none
  *   past that size. `abi_major` changes when that does not do, and the entry point's name with it.
  */
 

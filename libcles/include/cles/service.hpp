@@ -35,8 +35,8 @@
 
 #if !defined(BOOST_ASIO_SEPARATE_COMPILATION) || !defined(BOOST_ASIO_NO_DEPRECATED)
 #error                                                                                                                 \
-    "CLES is compiled with BOOST_ASIO_SEPARATE_COMPILATION and BOOST_ASIO_NO_DEPRECATED, and so must be whoever uses \
-it: the target cles::cles of CMake and the flags of pkg-config's cles set them"
+    "CLES is compiled with BOOST_ASIO_SEPARATE_COMPILATION and BOOST_ASIO_NO_DEPRECATED, and so must be its users: \
+the target cles::cles of CMake and the flags of pkg-config's cles set them"
 #endif
 
 namespace cles {

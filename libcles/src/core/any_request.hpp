@@ -19,8 +19,8 @@
 namespace cles::core {
 
 /// A request for `any`: asks one node, and another where that one could not be reached or refused the work before it
-/// began. Work that began and was lost is repeated only where that does no harm, and once: what brings down whoever
-/// does it is not to go from node to node.
+/// began. Work that began and was lost is repeated only where that does no harm, and once: what brings down the node
+/// that does it is not to go from node to node.
 class any_request final : public routing::errand, public leg_events, public std::enable_shared_from_this<any_request> {
   public:
     /// Of busy nodes no more are asked than this: a network that is full is not to be kept at it by asking around.

@@ -94,7 +94,7 @@ class completion {
 ///
 /// A library that calls a handler in the middle of its own work finds, when the handler returns, that it has cancelled
 /// what was to be told next, destroyed the service, or thrown. So whatever completes is put here, and is called by
-/// itself, with nothing of the library below it on the stack but this; what it throws reaches whoever runs the
+/// itself, with nothing of the library below it on the stack but this; what it throws reaches the thread that runs the
 /// executor, as with Asio's own operations, and nothing else is affected.
 ///
 /// `now` is the exception, for the hot path: an answer or an update that was just read, at a place where no loop over

@@ -18,7 +18,7 @@
 
 namespace cles::core {
 
-/// A request whose task this node runs, whoever asked: a link, or this node itself as one of those that `any` and `all`
+/// A request whose task this node runs, of a link or of this node itself as one of those that `any` and `all`
 /// mean. Here it is decided whether it may run, and what it publishes; where the result goes is the asker's to say.
 class execution {
   public:

@@ -26,7 +26,7 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
     }
     state_ = state::bound;
     backoff_.reset();
-    // The events are queued before the caller hears that it is bound, so that it finds them in their order.
+    // The events are queued before the caller learns that it is bound, so that it finds them in their order.
     const std::string body{last};
     if (was_bound_) {
         on_event({.kind = feed_event::rebound});
@@ -34,7 +34,7 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
     was_bound_ = true;
     if (mark) {
         take_marked(body, *mark);
-        if (state_ != state::bound) { // whoever took it has closed the feed
+        if (state_ != state::bound) { // the handler that took it has closed the feed
             return;
         }
     }

@@ -13,7 +13,7 @@
 
 namespace cles::core {
 
-/// Between what a feed hears and who fetches it: hands an event to whoever waits, or keeps it until somebody asks.
+/// Between what a feed receives and its reader: hands an event to a reader that waits, or keeps it until one asks.
 class feed_mailbox {
   public:
     using event_ptr = pending_event_ptr;
@@ -23,7 +23,7 @@ class feed_mailbox {
 
     enum class hand_over : std::uint8_t { now, later };
 
-    /// False where the event's body is no JSON. Nothing is kept once it is closed. `now`: an update may be handed over
+    /// False where the event's body is not JSON. Nothing is kept once it is closed. `now`: an update may be handed over
     /// inside the call, which is then the caller's last for this feed; all else waits for a completion of its own.
     bool put(const detail::raw_event& event, hand_over when = hand_over::now);
     /// Waits for an event; it is open, and nobody else waits. True where one is there: `pump` delivers it, which is for

@@ -28,7 +28,7 @@ class group_feed {
     [[nodiscard]] const std::string& target() const noexcept { return target_; }
     [[nodiscard]] const std::string& path() const noexcept { return path_; }
     [[nodiscard]] bool wants(std::string_view node) const noexcept { return target_ == "all" || target_ == node; }
-    /// Hands an update on that it wants. False where it is old or repeated, or its body is no JSON.
+    /// Hands an update on that it wants. False where it is old or repeated, or its body is not JSON.
     /// The next update of that node is the first.
     void forget(std::string_view node) { publishers_.forget(node); }
     bool take(const protocol::request_line& update, feed_mailbox::hand_over when = feed_mailbox::hand_over::now);

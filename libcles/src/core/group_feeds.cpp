@@ -124,7 +124,7 @@ void group_feeds::remove(group_feed& feed) {
     }
 }
 
-/// Whoever is told may close feeds, of any noun, and make new ones; or throw. Their places are kept until then.
+/// A callback may close feeds, of any noun, and make new ones; or throw. Their places are kept until then.
 class group_feeds::handing_out {
   public:
     explicit handing_out(group_feeds& of) noexcept : of_(of) { ++of_.depth_; }

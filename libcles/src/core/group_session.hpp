@@ -33,7 +33,7 @@ class group_presence {
     ~group_presence() = default;
 };
 
-/// What a node makes of what it hears in its multicast group (docs/protocol.md, "Multicast"): BIND of `all:` or of a
+/// What a node makes of what it receives in its multicast group (docs/protocol.md, "Multicast"): BIND of `all:` or of a
 /// node's name, and updates. All else is dropped and counted, and nothing is ever answered there.
 class group_session {
   public:
@@ -48,7 +48,7 @@ class group_session {
                     }),
           feeds_(*host, out, ~seed), sources_(host->others, host->bounds.publishers) {}
 
-    /// Who hears of the reserved task from now on; null: nobody. It must outlive this.
+    /// Gets what concerns the reserved task from now on; null: nobody. It must outlive this.
     void attend(group_presence* presence) noexcept { presence_ = presence; }
 
     /// What others are bound to here.

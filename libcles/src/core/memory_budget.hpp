@@ -33,7 +33,7 @@ class memory_budget {
 /// What is held for one link, or by one part of the node.
 ///
 /// None holds more than is free: one alone gets half of the whole, two get a third each, and so on, and something is
-/// left for whoever comes next. Where many hold much, those that hold most are refused first. What the node keeps for
+/// left for the next one. Where many hold much, those that hold most are refused first. What the node keeps for
 /// all (last values) may take half whatever links hold, as far as there is any, so that no peer squeezes it out.
 class memory_account {
   public:

@@ -99,7 +99,7 @@ class presence final : private deadline {
         unknown, ///< of a run that has not been described
         foreign, ///< of another pool
     };
-    /// A node, as whoever asks it needs to know it. Views are valid until the next change.
+    /// A node, as a node that asks it needs to know it. Views are valid until the next change.
     struct known {
         std::string_view node;
         std::string_view where; ///< empty: at no address that can be used from here

@@ -11,7 +11,7 @@ namespace {
 
 using outcome = probe_outcome::kind;
 
-// Whoever may send to the group can have nodes asked: no more often than this.
+// Any host that may send to the group can have nodes asked: no more often than this.
 constexpr std::size_t most_probes = 64;
 
 } // namespace

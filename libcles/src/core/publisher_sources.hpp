@@ -19,7 +19,7 @@ namespace cles::core {
 class presence;
 
 /// From which source a publisher's updates by the multicast group are taken: that of the run whose name it is. One
-/// that announces nothing is tied to the source that it was first heard from, until that falls silent. Whoever else
+/// that announces nothing is tied to the source that it was first heard from, until that falls silent. Another that
 /// sends updates under the name cannot silence it. Sources of other pools are not heard at all.
 class publisher_sources {
   public:

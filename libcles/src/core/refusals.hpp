@@ -20,7 +20,7 @@ protocol::failure no_such_task(const node& n, const protocol::request_line& requ
 protocol::failure overlong(const node& n, std::size_t datagram);
 /// That it runs as many handlers as it may; nothing where it does not.
 std::optional<protocol::failure> no_room_to_run(const node& n);
-/// A failure once the handler has begun: whoever repeats what was too large has to know.
+/// A failure once the handler has begun: a requester that repeats it has to know.
 protocol::failure after_run(protocol::failure why);
 
 std::string failure_text(const protocol::failure& why);

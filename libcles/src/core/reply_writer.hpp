@@ -24,8 +24,8 @@ struct reply_to {
     bool housekeeping = false;
     bool reserved = false; ///< of the task `cles`, which is answered however little memory is left
 
-    reply_to(std::uint64_t of, bool reply_wanted, bool hurry = false) noexcept
-        : id(of), wanted(reply_wanted), urgent(hurry && of != 0) {} // without an id the order counts
+    reply_to(std::uint64_t of, bool reply_wanted, bool is_urgent = false) noexcept
+        : id(of), wanted(reply_wanted), urgent(is_urgent && of != 0) {} // without an id the order counts
     explicit reply_to(const protocol::request_line& r) noexcept : reply_to(r.id, r.wants_reply, r.urgent) {
         housekeeping = is_housekeeping(r);
         reserved = r.noun.task == "cles";

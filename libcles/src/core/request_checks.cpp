@@ -92,7 +92,7 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
                                                "': give it cles::routing() as service_options::routing, or ask a node "
                                                "that routes, as clesd does");
         }
-        return object(errc::no_target, n.name + " knows no way to '" + std::string{r.noun.target} + "'");
+        return object(errc::no_target, n.name + " cannot find '" + std::string{r.noun.target} + "'");
     }
     std::string why;
     if (!r.body.empty() && !is_valid_json(r.body, n.bounds.depth, &why)) {

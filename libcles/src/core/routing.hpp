@@ -29,7 +29,7 @@ class routing final : public router, private catalogue::listener, public std::en
 
     /// `any` and `all` wait: who is there is still being asked.
     void hold() noexcept { held_ = true; }
-    /// Whoever is to be heard of has been.
+    /// The nodes that are to be found have been.
     void release(time_point now);
     /// Asks nobody any more.
     void stop();

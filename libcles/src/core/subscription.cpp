@@ -74,7 +74,7 @@ subscription* subscriptions::find(std::string_view publisher, std::string_view p
     }
     subscription* of_all = nullptr;
     for (auto* s : found->second) {
-        if (s->target() == publisher || s->target() == "self") { // whoever is at the other end; no other is beside it
+        if (s->target() == publisher || s->target() == "self") { // the node at the other end; no other is beside it
             return s;
         }
         if (s->target() == "all") {
@@ -88,7 +88,7 @@ bool subscriptions::deliver(const match& found) {
     if (sharing_ == 0) {
         return found.whose->take(*found.update);
     }
-    // Whoever is told may end it, or others.
+    // A callback may end it, or others.
     const std::string path{found.whose->path()};
     const auto& there = by_path_.find(path)->second;
     std::vector<subscription*> all;

@@ -48,7 +48,7 @@ class subscription {
     ~subscription() = default;
 
   private:
-    /// False where the event's body is no JSON.
+    /// False where the event's body is not JSON.
     virtual bool on_event(const detail::raw_event& event) = 0;
 
     std::string target_;

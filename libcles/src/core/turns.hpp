@@ -111,7 +111,7 @@ class turns {
     };
 
   private:
-    /// While it stands no turn is posted: whoever made it sees to what waits.
+    /// While it stands no turn is posted: its owner sees to what waits.
     class posts_none {
       public:
         explicit posts_none(turns& of) noexcept : of_(of), before_(std::exchange(of.asked_, true)) {}

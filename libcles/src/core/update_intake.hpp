@@ -11,7 +11,7 @@
 namespace cles::core {
 
 /// Takes an update in: tells `on_event` of a gap that it shows, then of itself. False where it is old or repeated, or
-/// `on_event` says that its body is no JSON; then nothing is remembered of it.
+/// `on_event` says that its body is not JSON; then nothing is remembered of it.
 template <class Sink>
 bool take_in(update_order& order, const protocol::request_line& update, bool thinned, Sink&& on_event) {
     const auto before = order;
@@ -33,7 +33,7 @@ bool take_in(update_order& order, const protocol::request_line& update, bool thi
         on_event(detail::raw_event{
             .kind = feed_event::gap, .publisher = event.publisher, .seq = event.seq, .missed = verdict.missed});
     }
-    // Once it has been handed on, whose order it is may be gone: whoever took it may have closed the feed.
+    // Once it has been handed on, whose order it is may be gone: its handler may have closed the feed.
     if (on_event(event)) {
         return true;
     }

@@ -7,7 +7,7 @@
 
 namespace cles::protocol {
 
-/// Why a text is no JSON.
+/// Why a text is not JSON.
 struct json_flaw {
     enum class kind : std::uint8_t { none, expected, bad, too_deep };
     kind what = kind::none;

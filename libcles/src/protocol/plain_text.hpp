@@ -15,7 +15,7 @@ constexpr bool is_plain(char c) noexcept {
 }
 
 /// Where a run of plain characters ends that begins at `at`. Long runs are passed eight characters at a time, since
-/// texts of many kilobytes hold up whoever waits behind them.
+/// texts of many kilobytes hold up what waits behind them.
 inline std::size_t plain_end(std::string_view text, std::size_t at) noexcept {
     constexpr std::uint64_t each = 0x0101010101010101U;
     constexpr std::uint64_t tops = each * 0x80U;

@@ -387,7 +387,7 @@ void engine::stop() {
         routing_->stop();
     }
     turns_.stop();
-    // Whoever waits hears of it on the executor, never from inside this call.
+    // Callers that wait are told on the executor, never from inside this call.
     const auto tell = [this](std::vector<pending_ptr> waiting) {
         for (auto& operation : waiting) {
             fail_later(std::move(operation), errc::stopped, "the service has been stopped");

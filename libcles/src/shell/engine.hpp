@@ -74,7 +74,7 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     [[nodiscard]] shell::neighbours& neighbours() noexcept { return *neighbours_; }
     /// The multicast group; null where it is off.
     [[nodiscard]] shell::group* group() noexcept { return group_.get(); }
-    /// Whoever is there has been heard of, as far as could be waited for.
+    /// The nodes that are there have been found, as far as could be waited for.
     void on_round_over();
     /// This node's name is another's.
     void on_name_taken(const std::string& where);

@@ -28,7 +28,7 @@ namespace cles::shell {
 
 class group;
 
-/// The other nodes: hears and asks who they are, and tells them of this one, in the multicast group and by gossip.
+/// The other nodes: finds and asks who they are, and tells them of this one, in the multicast group and by gossip.
 /// Without either there are none.
 class neighbours final : private core::group_presence,
                          private core::presence::watcher,

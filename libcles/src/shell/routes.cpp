@@ -64,7 +64,7 @@ std::string routes::address_of(std::string_view target) const {
                                          "' needs a node that routes: give this one cles::routing() as "
                                          "service_options::routing, or say with call_options::at where another is");
     }
-    const auto unknown = own_name + " knows no way to '" + std::string{target} + "': ";
+    const auto unknown = own_name + " cannot find '" + std::string{target} + "': ";
     const auto& neighbours = engine_.neighbours();
     if (const auto heard = neighbours.find(target)) {
         if (const auto second = neighbours.second_of(target)) {

@@ -19,7 +19,7 @@ class routing_host {
 
     /// Who is there is still being asked: `any` and `all` wait.
     virtual void hold() = 0;
-    /// Whoever is to be heard of has been.
+    /// The nodes that are to be found have been.
     virtual void release(time_point now) = 0;
     /// Passes updates on that have come since the last time.
     virtual void drain(time_point now) = 0;

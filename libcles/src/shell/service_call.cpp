@@ -65,7 +65,7 @@ void service_call::delegate(std::string_view command, const call_options& option
     }
 }
 
-// Not from inside the call that asks: whoever asks may hold a lock, or not have written down yet that it has asked.
+// Not from inside the call that asks: the caller may hold a lock, or not have written down yet that it has asked.
 void service_call::answer_later(answer_callback answered, errc why, const char* words) {
     boost::asio::post(executor_, [weak = weak_from_this(), answered = std::move(answered), why, words] {
         try {

@@ -16,7 +16,7 @@ struct group_datagram {
     const protocol::request_line* said; ///< null: nothing that a group is for
 };
 
-/// What comes from a multicast group, on the executor of whoever listens.
+/// What comes from a multicast group, on the executor of the listener.
 class group_events {
   public:
     group_events() = default;

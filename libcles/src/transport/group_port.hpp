@@ -18,7 +18,7 @@
 
 namespace cles::transport {
 
-/// A node's place in a multicast group, by one interface: where it hears the group, and a socket of its own to send
+/// A node's place in a multicast group, by one interface: where it receives the group, and a socket of its own to send
 /// from, which tells the others who it is for as long as the node runs.
 class group_port : public std::enable_shared_from_this<group_port> {
   public:

@@ -60,7 +60,7 @@ group_receiver::group_receiver(const asio::any_io_executor& executor, const ip_i
                                const udp::endpoint& group)
     : group_(group), interface_(by.index), socket_(executor, udp::v4()) {
     socket_.set_option(asio::socket_base::reuse_address{true});
-    set_ip_option(socket_, IP_MULTICAST_ALL, 0); // else it hears groups that other programs have joined
+    set_ip_option(socket_, IP_MULTICAST_ALL, 0); // else it receives groups that other programs have joined
     socket_.bind(group_);
     set_ip_option(socket_, IP_ADD_MEMBERSHIP, membership(group_, interface_));
     socket_.non_blocking(true);
@@ -138,7 +138,7 @@ void group_receiver::hand_over() {
             next_ = 0;
             tell_others();
         });
-    } catch (...) { // a handler's, for whoever runs the context; it is none of the business of all else that has come
+    } catch (...) { // a handler's, for the thread that runs the context; what else has come is not affected
         go_on_soon();
         throw;
     }

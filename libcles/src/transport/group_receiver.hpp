@@ -34,7 +34,7 @@ class group_receiver : public std::enable_shared_from_this<group_receiver> {
     /// one but what a reading of it keeps. The listener stays until it is removed. What it sends itself, from `source`,
     /// it need not hear; where it is alone, the system does not even bring it here.
     void add(group_events& listener, const udp::endpoint& source);
-    /// It hears nothing more, from inside a call as well. With the last the socket is closed.
+    /// It receives nothing more, from inside a call as well. With the last the socket is closed.
     void remove(const group_events& listener);
 
     [[nodiscard]] bool is_for(const boost::asio::any_io_executor& executor, const ip_interface& by,

@@ -173,7 +173,7 @@ void inproc_link::hand_over() {
     handing_ = true;
     try {
         hand_over_batch();
-    } catch (...) { // a handler's, for whoever runs the context; the other lines are none of its business
+    } catch (...) { // a handler's, for the thread that runs the context; the other lines are not affected
         handing_ = false;
         continue_later();
         throw;

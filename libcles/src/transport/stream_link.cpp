@@ -96,7 +96,7 @@ void stream_link::hand_over() {
     bool more = true;
     try {
         more = hand_over_batch();
-    } catch (...) { // a handler's, for whoever runs the context; the other lines are none of its business
+    } catch (...) { // a handler's, for the thread that runs the context; the other lines are not affected
         handing_ = false;
         continue_later();
         throw;

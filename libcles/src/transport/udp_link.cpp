@@ -67,7 +67,7 @@ void udp_link::flush() {
     send_rest();
 }
 
-// All of it at once: whoever flushes may count on it that what he finds here next time is new.
+// All of it at once: the flushing code relies on it that what it finds here next time is new.
 void udp_link::take_output() {
     if (sending_.empty()) {
         sending_.swap(output_);

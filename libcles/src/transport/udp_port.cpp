@@ -101,7 +101,7 @@ void udp_port::hand_over() {
     bool left = false;
     try {
         left = arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) { hand_over(one); });
-    } catch (...) { // a handler's, for whoever runs the context; the other datagrams are none of its business
+    } catch (...) { // a handler's, for the thread that runs the context; the other datagrams are not affected
         go_on_soon();
         throw;
     }

@@ -29,7 +29,7 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
 
     explicit udp_port(udp::socket socket);
 
-    /// Listens: from now on, whoever sends something becomes a link.
+    /// Listens: from now on, each source that sends something becomes a link.
     void accept(std::function<void(link_ptr)> on_link);
     /// The one link of a socket that is connected.
     link_ptr connect_link(const udp::endpoint& peer, identity who);

@@ -3,9 +3,11 @@
 #include <cles/plugin_abi.h>
 
 #include <csignal>
+#include <cstdio>
 #include <cstdlib>
 #include <stdexcept>
 
+#include <sys/prctl.h>
 #include <unistd.h>
 
 namespace {
@@ -25,10 +27,35 @@ constexpr cles_text text_of(const char* text, size_t size) { return {text, size}
     return depth < 0 ? 0 : deeper(depth + 1) + room[0];
 }
 
+// Whether this is a process that only tries the library, and dies with its parent.
+[[maybe_unused]] bool is_tried() {
+    int with_parent = 0;
+    return ::prctl(PR_GET_PDEATHSIG, &with_parent) == 0 && with_parent == SIGKILL;
+}
+
 [[maybe_unused]] int32_t check(const cles_host* host, cles_text) {
 #if defined(FAULT_CRASHES_IN_CHECK)
     (void)host;
     std::abort();
+#elif defined(FAULT_TALKS_AND_CRASHES)
+    (void)host;
+    for (int line = 0; line < 5000; ++line) {
+        std::fprintf(stderr, "looked at sensor %d\n", line);
+    }
+    std::fprintf(stderr, "assertion failed: no sensor is left\n");
+    std::abort();
+#elif defined(FAULT_LEAVES_A_PROCESS)
+    (void)host;
+    if (is_tried() && ::fork() == 0) { // which keeps stdout open
+        ::alarm(20);
+        hang();
+    }
+    return 0;
+#elif defined(FAULT_CLOSES_OUTPUT_AND_HANGS)
+    (void)host;
+    ::close(STDOUT_FILENO);
+    ::close(STDERR_FILENO);
+    hang();
 #elif defined(FAULT_REFUSES_SETTING)
     host->refuse_setting(host, text_of("cameras[1].rate", 15), text_of("60 at most", 10));
     return 1;

@@ -93,6 +93,15 @@ void set_over(bool value) {
     over = value;
     changed.notify_all();
 }
+// Its callback holds its thread until the plugin is stopped.
+void blocks_when_stopped(void*, cles_job job, const cles_request*) {
+    const cles_callback callback{[](void*) {
+                                     std::unique_lock lock{mutex};
+                                     changed.wait(lock, [] { return over; });
+                                 },
+                                 [](void*) {}, nullptr};
+    the_host->on_stop(the_host, job, &callback);
+}
 void release(void*, cles_job job, const cles_request*) {
     {
         const std::scoped_lock lock{mutex};
@@ -174,6 +183,7 @@ int32_t start(const cles_host* host, cles_text) {
     add(host, "asks", asks);
     add(host, "told", what_it_was_told, CLES_PULL, CLES_TASK_INLINE_OK);
     add(host, "hangs", hangs, CLES_PULL);
+    add(host, "blocks_when_stopped", blocks_when_stopped);
     add(host, "release", release, CLES_PUSH, CLES_TASK_INLINE_OK);
     add(host, "show", show, CLES_PULL);
     add(host, "undecided", undecided, CLES_BIND, CLES_TASK_INLINE_OK);

@@ -4,7 +4,9 @@
 
 #include <boost/system/error_code.hpp>
 
+#include <atomic>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 #include <string>
@@ -22,6 +24,16 @@ using namespace std::chrono_literals;
         std::this_thread::sleep_for(1h);
     }
 }
+
+// What a callback blocks on goes with the library's global objects, unless the process ends without destroying them.
+std::atomic<int> blocked_callbacks{0};
+struct global_state {
+    ~global_state() {
+        if (blocked_callbacks > 0) {
+            std::abort();
+        }
+    }
+} const state;
 
 // Writes down when it was called, by the clock that Python calls `time.monotonic_ns`; in one piece, whoever else
 // writes.
@@ -57,7 +69,10 @@ void register_stops(cles::registrar& to) {
         mark(file, "begun");
     });
     to.on_delegate("blocks_when_stopped", [](const cles::request& asked, const cles::responder& answer) {
-        answer.on_stop([answer] { hang(); });
+        answer.on_stop([answer] {
+            ++blocked_callbacks;
+            hang();
+        });
         mark(std::string{asked.parameter(0)}, "begun");
     });
 }

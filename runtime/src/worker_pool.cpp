@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "crew.hpp"
+#include "worker_pool.hpp"
 
 #include "job_record.hpp"
 
@@ -30,7 +30,7 @@ std::size_t workers_of(const pool_options& options) {
 
 } // namespace
 
-crew::crew(const pool_options& options, result_box& box)
+worker_pool::worker_pool(const pool_options& options, result_box& box)
     : box_(box), threads_(workers_of(options)), queue_(std::max<std::size_t>(options.queue, 1)),
       watch_(workers_of(options), std::min<std::size_t>(options.replacements, most_replacements), options.grace) {
     mirror();
@@ -38,12 +38,12 @@ crew::crew(const pool_options& options, result_box& box)
 
 // -- what waits ----------------------------------------------------------------------------------------------------
 
-bool crew::wants_worker() const noexcept {
+bool worker_pool::wants_worker() const noexcept {
     // Those that are awake and have no job yet are about to take one.
     return !ended_ && !held_ && awake_ < watch_.allowed() && queue_.size() > awake_ - at_work_;
 }
 
-void crew::mirror() noexcept {
+void worker_pool::mirror() noexcept {
     queued_.store(static_cast<std::uint32_t>(queue_.size()), std::memory_order_relaxed);
     running_.store(at_work_, std::memory_order_relaxed);
     usable_.store(static_cast<std::uint32_t>(watch_.usable()), std::memory_order_relaxed);
@@ -54,18 +54,18 @@ void crew::mirror() noexcept {
 }
 
 // To be called when a worker begins or ends a job.
-void crew::note_progress(time_point now) noexcept {
+void worker_pool::note_progress(time_point now) noexcept {
     const bool all = at_work_ >= watch_.allowed();
     held_since_.store(all ? now.time_since_epoch().count() : 0, std::memory_order_relaxed);
 }
 
-std::chrono::nanoseconds crew::held_for(time_point now) const noexcept {
+std::chrono::nanoseconds worker_pool::held_for(time_point now) const noexcept {
     const auto since = held_since_.load(std::memory_order_relaxed);
     return since == 0 ? std::chrono::nanoseconds{0}
                       : std::max<std::chrono::nanoseconds>(now - time_point{time_point::duration{since}}, {});
 }
 
-crew::admission crew::push(job_record& job) {
+worker_pool::admission worker_pool::push(job_record& job) {
     const std::lock_guard lock{mutex_};
     if (closed_ || watch_.usable() == 0) {
         return admission::no_workers;
@@ -79,7 +79,7 @@ crew::admission crew::push(job_record& job) {
     return wants_worker() ? admission::wants_workers : admission::queued;
 }
 
-bool crew::resume(job_record& job, std::function<void()> part) {
+bool worker_pool::resume(job_record& job, std::function<void()> part) {
     bool wanted = false;
     {
         const std::lock_guard lock{mutex_};
@@ -103,7 +103,7 @@ bool crew::resume(job_record& job, std::function<void()> part) {
     return true;
 }
 
-bool crew::take_back(job_record& job) {
+bool worker_pool::take_back(job_record& job) {
     const std::lock_guard lock{mutex_};
     if (job.where != job_record::place::queued || job.begun) {
         return false;
@@ -114,12 +114,12 @@ bool crew::take_back(job_record& job) {
     return true;
 }
 
-void crew::hold() noexcept {
+void worker_pool::hold() noexcept {
     const std::lock_guard lock{mutex_};
     held_ = !closed_;
 }
 
-void crew::release() {
+void worker_pool::release() {
     {
         const std::lock_guard lock{mutex_};
         held_ = false;
@@ -127,19 +127,20 @@ void crew::release() {
     wake();
 }
 
-void crew::hurry(const job_record& job, time_point now) {
+void worker_pool::expect_end(const job_record& job, time_point now) {
     const std::lock_guard lock{mutex_};
     if (job.where == job_record::place::at_work) {
         watch_.stop(job.worker, &job, now);
     }
 }
 
-void crew::close(const std::function<void(job_record&)>& dropped) {
+void worker_pool::close(const std::function<void(job_record&)>& dropped) {
     std::vector<job_record*> left;
     {
         const std::lock_guard lock{mutex_};
         closed_ = true;
         held_ = false;
+        executor_due_.store(time_point::max(), std::memory_order_relaxed); // nothing is read any more
         std::vector<job_record*> begun;
         while (auto* next = queue_.pop()) {
             auto& job = static_cast<job_record&>(*next);
@@ -160,7 +161,7 @@ void crew::close(const std::function<void(job_record&)>& dropped) {
     }
 }
 
-std::size_t crew::join(std::chrono::milliseconds limit) {
+std::size_t worker_pool::join(std::chrono::milliseconds limit) {
     const auto end = std::chrono::steady_clock::now() + limit;
     wake();
     {
@@ -178,7 +179,7 @@ std::size_t crew::join(std::chrono::milliseconds limit) {
 }
 
 // Of jobs that no worker came to.
-void crew::drop_called_back() {
+void worker_pool::drop_called_back() {
     std::vector<std::function<void()>> parts;
     std::vector<job_record*> left;
     {
@@ -200,7 +201,7 @@ void crew::drop_called_back() {
 
 // -- workers -------------------------------------------------------------------------------------------------------
 
-void crew::wake() {
+void worker_pool::wake() {
     for (;;) {
         {
             const std::lock_guard lock{mutex_};
@@ -213,7 +214,7 @@ void crew::wake() {
     }
 }
 
-void crew::enlist() {
+void worker_pool::enlist() {
     boost::asio::post(threads_.get_executor(), [weak = self_] {
         if (const auto self = weak.lock()) {
             self->work();
@@ -222,26 +223,25 @@ void crew::enlist() {
 }
 
 // What a worker does with a job when it no longer counts as being at it.
-void crew::part_with(job_record* job, bool may_keep, streak& so_far, time_point now,
-                     std::vector<std::function<void()>>& dropped) {
+void worker_pool::part_with(job_record* job, bool may_keep, streak& so_far, time_point now,
+                            std::vector<std::function<void()>>& dropped) {
     dropped.clear();
     if (job != nullptr && job->settle(may_keep) && may_keep) {
         so_far.keep(now);
     }
     if (!may_keep && so_far.release()) {
-        box_.hurry();
+        box_.flush();
     }
 }
 
 // With the lock: a job that the worker has taken, but must not begin.
-void crew::put_back(job_record& job) {
+void worker_pool::put_back(job_record& job) {
     job.begun = false;
     job.where = job_record::place::queued;
     queue_.push_begun(job); // the next one of its requester, as it was
-    held_ = !closed_;
 }
 
-void crew::work() {
+void worker_pool::work() {
     std::vector<std::function<void()>> parts;
     job_record* done = nullptr;
     streak so_far;
@@ -290,12 +290,12 @@ void crew::work() {
         --at_work_;
         note_progress(now);
         figures_.revived += watch_.end(place) ? 1 : 0;
+        missed = missed && !closed_; // at the end it is dropped
         if (missed) {
             done = nullptr;
             put_back(job);
-            missed = held_;
             mirror();
-            continue;
+            break;
         }
         service_time_.add(ended - now);
         now = ended;
@@ -321,7 +321,8 @@ void crew::work() {
     }
 }
 
-void crew::watch(time_point now, const std::function<void(const worker_watch::finding&, const job_record&)>& found) {
+void worker_pool::watch(time_point now,
+                        const std::function<void(const worker_watch::finding&, const job_record&)>& found) {
     struct lost {
         worker_watch::finding what;
         job_record* job;
@@ -359,7 +360,7 @@ void crew::watch(time_point now, const std::function<void(const worker_watch::fi
     }
 }
 
-crew::figures crew::count() const {
+worker_pool::figures worker_pool::count() const {
     const std::lock_guard lock{mutex_};
     auto result = figures_;
     result.stuck_now = static_cast<std::uint32_t>(watch_.stuck());

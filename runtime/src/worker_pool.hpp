@@ -29,16 +29,17 @@ class job_record;
 ///
 /// A worker that is awake takes one job after another until there is none; so a worker is only woken where there is
 /// more to do than are awake, and a burst of jobs costs one wake-up, not one for each.
-class crew {
+class worker_pool {
   public:
-    crew(const pool_options& options, result_box& box);
-    crew(const crew&) = delete;
-    crew& operator=(const crew&) = delete;
-    ~crew() = default;
+    worker_pool(const pool_options& options, result_box& box);
+    worker_pool(const worker_pool&) = delete;
+    worker_pool& operator=(const worker_pool&) = delete;
+    ~worker_pool() = default;
 
     /// To be called first, with what keeps this alive while a worker is in it. \param missed called on a worker which
-    /// has found that the executor is late (`expect_executor`) and that no job begins until `release`
-    void start(std::weak_ptr<crew> self, std::function<void()> missed) {
+    /// has found that the executor is late (`expect_executor`). The worker has put its job back and looks for no other:
+    /// the executor is to call `wake` once it has read what came meanwhile.
+    void start(std::weak_ptr<worker_pool> self, std::function<void()> missed) {
         self_ = std::move(self);
         missed_ = std::move(missed);
     }
@@ -57,16 +58,17 @@ class crew {
     /// Takes out a job that has not begun. False where it has.
     bool take_back(job_record& job);
     /// The executor will have been back by then. Where it has not, the process was stopped, or the executor held up:
-    /// then workers know of no withdrawal that came meanwhile, and begin no job.
+    /// workers do not know of the withdrawals that came meanwhile, and begin no job.
     void expect_executor(time_point until) noexcept { executor_due_.store(until, std::memory_order_relaxed); }
     [[nodiscard]] bool executor_is_late(time_point now) const noexcept {
         return now > executor_due_.load(std::memory_order_relaxed);
     }
-    /// No job begins, and nothing is called back, until `release`.
+    /// No job begins, and nothing is called back, until `release`. Only the executor holds, so that each hold has its
+    /// release.
     void hold() noexcept;
     void release();
-    /// A job that is to stop had better end soon.
-    void hurry(const job_record& job, time_point now);
+    /// The job has been told to stop: from now on its worker counts as late.
+    void expect_end(const job_record& job, time_point now);
     /// Calls `found` for each worker that has become stuck, once replacements are at work.
     void watch(time_point now, const std::function<void(const worker_watch::finding&, const job_record&)>& found);
     /// No job begins any more. Those that have not are handed over.
@@ -109,7 +111,7 @@ class crew {
 
     result_box& box_;
     worker_threads threads_;
-    std::weak_ptr<crew> self_;
+    std::weak_ptr<worker_pool> self_;
     std::function<void()> missed_;
     std::atomic<time_point> executor_due_{time_point::max()};
     mutable brief_mutex mutex_; // of all that follows
@@ -119,7 +121,7 @@ class crew {
     std::uint32_t at_work_ = 0;
     service_time service_time_;
     figures figures_;
-    bool held_ = false;   // nothing does, for now
+    bool held_ = false;   // no job begins, and nothing is called back
     bool closed_ = false; // no job begins
     bool ended_ = false;  // nothing is called back
     std::condition_variable_any at_rest_;
