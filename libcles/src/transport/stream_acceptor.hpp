@@ -69,9 +69,7 @@ class stream_acceptor : public std::enable_shared_from_this<stream_acceptor<Prot
                 self->on_link_ = nullptr;
                 return;
             }
-            if (!code) {
-                self->accept();
-            } else if (is_the_peers(code)) {
+            if (!code || is_the_peers(code)) {
                 self->accept();
             } else {
                 self->accept_later();

@@ -125,6 +125,7 @@ class tcp_call : public std::enable_shared_from_this<tcp_call> {
   private:
     void connect(const std::vector<asio::ip::address>& addresses, std::chrono::milliseconds left) {
         std::vector<tcp::endpoint> endpoints;
+        endpoints.reserve(addresses.size());
         for (const auto& address : addresses) {
             endpoints.emplace_back(address, where_.port);
         }
