@@ -43,6 +43,17 @@ class logged_link final : public cles::link,
     }
     [[nodiscard]] std::uint64_t sent() const noexcept override { return inside_->sent(); }
     [[nodiscard]] std::uint64_t received() const noexcept override { return inside_->received(); }
+    [[nodiscard]] std::size_t buffered() const noexcept override {
+        return inside_->buffered() + output_.capacity() + urgent_.capacity();
+    }
+    void shrink() override {
+        for (auto* waiting : {&output_, &urgent_}) {
+            if (waiting->empty()) {
+                std::string{}.swap(*waiting);
+            }
+        }
+        inside_->shrink();
+    }
     void pause(bool stop) override { inside_->pause(stop); }
     void finish() override {
         hand_over();
@@ -111,8 +122,12 @@ class logged_link final : public cles::link,
             say(">", std::string_view{from}.substr(at, end - at));
             at = end + 1;
         }
-        to += from;
-        from.clear();
+        if (to.empty()) {
+            to.swap(from);
+        } else {
+            to += from;
+            from.clear();
+        }
     }
     void hand_over() {
         move_lines(urgent_, inside_->urgent_output());
@@ -175,6 +190,10 @@ class logged_transport final : public cles::link_transport {
 };
 
 } // namespace
+
+cles::link_ptr logged(cles::link_ptr inside, std::string where, cles::log_sink log) {
+    return std::make_shared<logged_link>(std::move(inside), std::move(where), std::move(log));
+}
 
 void log_wire(const cles::log_sink& log) {
     for (const auto* scheme : {"tcp", "udp", "unix"}) {

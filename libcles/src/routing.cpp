@@ -21,7 +21,10 @@ class host final : public detail::routing_host {
 
     void hold() override { routing_->hold(); }
     void release(time_point now) override { routing_->release(now); }
-    void drain(time_point now) override { routing_->drain(now); }
+    void go_on(time_point now) override {
+        routing_->begin_ready(now);
+        routing_->drain(now);
+    }
     void stop() override {
         routing_->stop();
         ways_.stop();

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "tasks.hpp"
 
+#include <cles/setting_error.hpp>
+
 #include "order.hpp"
 #include "training.hpp"
 
@@ -76,17 +78,21 @@ void train(const cles::request& asked, const cles::responder& answer, const data
 
 } // namespace
 
+void settings::check() const {
+    if (const auto n = per_class.value_or(recipe{}.per_class); n == 0 || n > most_per_class) {
+        throw cles::setting_error("per_class", "per_class: 1 to " + std::to_string(most_per_class));
+    }
+    if (!std::isfinite(separation.value_or(recipe{}.separation))) {
+        throw cles::setting_error("separation", "separation: a number");
+    }
+}
+
 void register_tasks(cles::registrar& to, const settings& wanted) {
+    wanted.check();
     recipe from;
     from.seed = wanted.seed.value_or(from.seed);
     from.per_class = wanted.per_class.value_or(from.per_class);
     from.separation = wanted.separation.value_or(from.separation);
-    if (from.per_class == 0 || from.per_class > most_per_class) {
-        refuse("per_class: 1 to " + std::to_string(most_per_class));
-    }
-    if (!std::isfinite(from.separation)) {
-        refuse("separation: a number");
-    }
     const auto data = std::make_shared<const data_set>(from);
     to.on_pull("sgd", [data] { return data->made_from(); },
                {.description = "What the data for sgd/train is made from", .idempotent = true, .inline_ok = true});

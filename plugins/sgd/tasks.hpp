@@ -15,6 +15,9 @@ struct settings {
     std::optional<std::uint64_t> seed{};
     std::optional<std::uint64_t> per_class{}; ///< 1 to 10^7
     std::optional<double> separation{};
+
+    /// \throws cles::setting_error
+    void check() const;
 };
 BOOST_DESCRIBE_STRUCT(settings, (), (seed, per_class, separation))
 

@@ -32,8 +32,9 @@ namespace {
 /// A hub that routes, and a client that knows nobody else. The others run on a context of their own, so that they are
 /// reached by links.
 struct fixture {
-    std::unique_ptr<cles::service> serving(const std::string& name, bool in_group = true) {
-        cles::service_options options{.name = name};
+    std::unique_ptr<cles::service> serving(const std::string& name, bool in_group = true,
+                                           cles::service_options options = {}) {
+        options.name = name;
         options.listen = {"tcp://127.0.0.1:0"};
         if (in_group) {
             options.multicast = where;
@@ -207,6 +208,35 @@ BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_node_dies, fixture) {
     for (int i = 0; i < 20; ++i) {
         BOOST_TEST(asked("PULL any:who").text == "{\"value\":\"car1\"}");
     }
+}
+
+// The node that is chosen has no room for the link, and says so on a line of its own that answers nothing.
+BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_full_node_refuses_the_link, fixture) {
+    cles::service_options loaded;
+    loaded.load = [] { return cles::node_load{.queued = 50, .running = 1, .workers = 1}; };
+    const auto second = serving("car2", true, std::move(loaded));
+    start_hub();
+    until_all_answer(1, "PULL all:who");
+    cles::service_options small;
+    small.limits.links = 1;
+    small.load = [] { return cles::node_load{.workers = 1}; };
+    const auto first = serving("car1", true, std::move(small));
+    first->on_bind("place");
+    scripted_peer inside{there, first->endpoints().front()};
+    BOOST_TEST(inside.ask("BIND self:place") == "{}");
+    // It offers what car2 does, so that it need not be asked for that first.
+    std::string metrics;
+    until([&] {
+        const auto answer = asked("PULL any:who");
+        BOOST_TEST(!answer.code, answer.why);
+        BOOST_TEST(answer.text == "{\"value\":\"car2\"}");
+        metrics = inside.ask("PULL self:cles/metrics");
+        return metrics.find("\"links_refused\":0,") == std::string::npos;
+    });
+    // By its name it is busy, as car1 says.
+    const auto named = asked("PULL car1:who");
+    BOOST_TEST((named.code == errc::busy), named.why);
+    BOOST_TEST(named.why == "car1 has as many links as it may");
 }
 
 BOOST_FIXTURE_TEST_CASE(the_hub_asks_any_and_all_for_itself_too, fixture) {

@@ -232,8 +232,10 @@ void ask(cles::service& by, asking how, const std::string& node, int which, cons
 }
 
 /// Begins three requests, of which the second acts, and has them end there. Whoever is asked is silent, or answers.
+/// `reports`: of the second.
 template <class Act>
-void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>& calls) {
+void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>& calls,
+               std::function<void(double, std::string_view)> reports = {}) {
     const std::string node = where == place::not_connected                      ? "nowhere"
                              : where == place::reply || where == place::refusal ? "car2"
                                                                                 : "car1";
@@ -245,7 +247,13 @@ void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>
     }
     const auto bystander = [&](std::size_t i) { return handler{&w, &calls[i], deed::nothing}; };
     ask(*w.tower, how, node, 0, options, asio::bind_cancellation_slot(w.first.slot(), bystander(0)));
-    ask(*w.tower, how, node, 1, options, asio::bind_cancellation_slot(w.second.slot(), std::move(acting)));
+    {
+        auto second = options;
+        if (reports) {
+            second.on_progress(std::exchange(reports, {}));
+        }
+        ask(*w.tower, how, node, 1, second, asio::bind_cancellation_slot(w.second.slot(), std::move(acting)));
+    }
     ask(*w.tower, how, node, 2, options, asio::bind_cancellation_slot(w.third.slot(), bystander(2)));
     if (where == place::lost) {
         auto peer = w.silent.accept();
@@ -259,6 +267,41 @@ void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>
         w.tower->stop();
     }
     BOOST_TEST(calls[1] == 0); // never from inside the call
+    BOOST_TEST(w.acted == 0);
+}
+
+/// Tasks whose handlers act, one of each form, and "quick", which counts.
+void offer_acting(world& w, deed does, int& quick) {
+    w.tower->on_pull("plain", [&w, does] {
+        w.act(does);
+        return 1;
+    });
+    w.tower->on_pull("later", [&w, does](const cles::request&, const cles::responder& r) {
+        w.act(does);
+        r.done(1);
+    });
+    w.tower->on_pull("awaited", [&w, does]() -> asio::awaitable<int> {
+        w.act(does);
+        co_return 1;
+    });
+    w.tower->on_pull("quick", [&quick] { return ++quick; });
+}
+
+constexpr std::array acting{"plain", "later", "awaited"};
+
+/// The requests 1, of one that acted, and 2, of "quick", have been answered, where anybody is left to answer.
+void check_answers(world& w, scripted_peer& peer, deed does, int quick) {
+    w.run_what_is_ready();
+    BOOST_TEST(w.thrown == 0);
+    if (w.tower && does != deed::stops_service) {
+        const auto one = peer.line();
+        const auto other = peer.line();
+        const auto& mine = one.starts_with("id=1 ") ? one : other;
+        BOOST_TEST((mine.find(does == deed::throws ? "failed" : "\"value\":1}") != std::string::npos), mine);
+        BOOST_TEST(quick == 1);
+    }
+    w.acted = does == deed::throws ? 0 : 1;
+    w.check_that_it_lives(does);
 }
 
 /// Begins three operations, each with a handler and a cancellation slot of its own: the second handler acts.
@@ -439,36 +482,96 @@ BOOST_DATA_TEST_CASE(who_is_told_to_stop_may_do_anything, data::make(every_deed)
 
 // What a handler throws is its answer; the lines behind it are served.
 BOOST_DATA_TEST_CASE(a_handler_for_requests_may_do_anything, data::make(every_deed), does) {
-    for (const auto* task : {"plain", "later", "awaited"}) {
+    for (const auto* task : acting) {
         BOOST_TEST_CONTEXT(task) {
             world w;
-            w.tower->on_pull("plain", [&] {
-                w.act(does);
-                return 1;
-            });
-            w.tower->on_pull("later", [&](const cles::request&, const cles::responder& r) {
-                w.act(does);
-                r.done(1);
-            });
-            w.tower->on_pull("awaited", [&]() -> asio::awaitable<int> {
-                w.act(does);
-                co_return 1;
-            });
-            int plain = 0;
-            w.tower->on_pull("quick", [&] { return ++plain; });
+            int quick = 0;
+            offer_acting(w, does, quick);
             scripted_peer peer{w.io, w.tower->endpoints().front()};
             peer.send("PULL self:" + std::string{task} + " id=1\nPULL self:quick id=2\n");
+            w.until([&] { return w.acted == 1; });
+            check_answers(w, peer, does, quick);
+        }
+    }
+}
+
+// As one of those that `any` or `all` mean.
+BOOST_DATA_TEST_CASE(a_handler_that_is_chosen_may_do_anything, data::make({"any", "all"}) * every_deed, target, does) {
+    for (const auto* task : acting) {
+        BOOST_TEST_CONTEXT(task) {
+            cles::service_options routes;
+            routes.routing = cles::routing();
+            world w{std::move(routes)};
+            int quick = 0;
+            offer_acting(w, does, quick);
+            scripted_peer peer{w.io, w.tower->endpoints().front()};
+            peer.send("PULL " + std::string{target} + ":" + task + " id=1\nPULL self:quick id=2\n");
+            w.until([&] { return w.acted == 1; });
+            check_answers(w, peer, does, quick);
+        }
+    }
+}
+
+// It begins in a turn of its link, wherever the request before it ends: there the library may go through a list that
+// the handler changes.
+BOOST_DATA_TEST_CASE(a_handler_whose_request_has_waited_may_do_anything,
+                     data::make({place::reply, place::deadline}) * every_deed, where, does) {
+    for (const auto* task : acting) {
+        BOOST_TEST_CONTEXT(task) {
+            world w;
+            int quick = 0;
+            offer_acting(w, does, quick);
+            std::vector<cles::responder> begun;
+            w.tower->on_delegate("job",
+                                 [&](const cles::request&, cles::responder r) { begun.push_back(std::move(r)); });
+            scripted_peer peer{w.io, w.tower->endpoints().front()};
+            peer.send("DELEGATE self:job deadline=" + std::string{where == place::deadline ? "30" : "20000"} +
+                      "\nPULL self:" + task + "\nPULL self:quick id=2\n");
+            w.until([&] { return begun.size() == 1; });
+            w.until([&] { return quick == 1; }); // all that has come has been read
+            BOOST_TEST(peer.line().starts_with("id=2 "));
+            if (where == place::reply) {
+                begun[0].done(1);
+                BOOST_TEST(w.acted == 0); // not from inside the call
+            }
             w.until([&] { return w.acted == 1; });
             w.run_what_is_ready();
             BOOST_TEST(w.thrown == 0);
             if (w.tower && does != deed::stops_service) {
-                const auto one = peer.line();
-                const auto other = peer.line();
-                const auto& mine = one.starts_with("id=1 ") ? one : other;
-                BOOST_TEST((mine.find(does == deed::throws ? "failed" : "{\"value\":1}") != std::string::npos), mine);
-                BOOST_TEST(plain == 1);
+                BOOST_TEST((peer.line().find(where == place::reply ? "value" : "deadline") != std::string::npos));
+                BOOST_TEST((peer.line().find(does == deed::throws ? "failed" : "value") != std::string::npos));
             }
             w.acted = does == deed::throws ? 0 : 1;
+            w.check_that_it_lives(does);
+        }
+    }
+}
+
+// By the program, when it is asked for its load: nothing is begun for a service that is gone.
+BOOST_DATA_TEST_CASE(a_service_that_is_stopped_while_it_chooses_begins_nothing,
+                     data::make({deed::stops_service, deed::destroys_service}), does) {
+    for (const auto* task : acting) {
+        BOOST_TEST_CONTEXT(task) {
+            world* within = nullptr;
+            cles::service_options routes;
+            routes.routing = cles::routing();
+            routes.load = [&] {
+                if (within != nullptr) {
+                    std::exchange(within, nullptr)->act(does);
+                }
+                return cles::node_load{.running = 7};
+            };
+            world w{std::move(routes)};
+            int begun = 0;
+            w.tower->on_pull("plain", [&] { return ++begun; });
+            w.tower->on_pull("later", [&](const cles::request&, const cles::responder& r) { r.done(++begun); });
+            w.tower->on_pull("awaited", [&]() -> asio::awaitable<int> { co_return ++begun; });
+            scripted_peer peer{w.io, w.tower->endpoints().front()};
+            within = &w;
+            peer.send("PULL any:" + std::string{task} + " id=1\n");
+            w.until([&] { return w.acted == 1; });
+            w.run_what_is_ready();
+            BOOST_TEST(begun == 0);
             w.check_that_it_lives(does);
         }
     }

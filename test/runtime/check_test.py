@@ -9,7 +9,7 @@ import subprocess
 import time
 import unittest
 
-from daemon import CLESD, FAULTY, STUBBORN, Folder, clean_environment, clesd
+from daemon import CLESD, FAULTY, PLUGINS, STUBBORN, Folder, clean_environment, clesd
 from support import PATIENCE, finish, read_line, wait_until
 
 SLOWNESS = max(PATIENCE / 30, 1)  # of sanitizers
@@ -160,6 +160,19 @@ class Check(unittest.TestCase):
         self.refused(plugin + "      numer: 7\n", 5, "plugins[0].config.numer", "it has no setting 'numer'")
         self.refused(f"plugins:\n  - path: {STUBBORN}\n    config: {{a: 1}}\n", 3, "plugins[0].config.a",
                      "it has no settings")
+        # Those that come along.
+        for name, key, value, words in (("fmv", "streams", "65", "1 to 64"),
+                                        ("fmv", "idle_s", "0", "1 to 3600"),
+                                        ("primes", "limit", "1000000000001", "at most"),
+                                        ("sgd", "per_class", "0", "1 to 10000000"),
+                                        ("sgd", "per_class", "10000001", "1 to 10000000"),
+                                        ("sgd", "separation", "far", "expected"),
+                                        ("strike", "weapons", "1001", "1000 at most"),
+                                        ("strike", "speed", "0", "more than 0"),
+                                        ("system", "interval_ms", "9", "interval_ms")):
+            with self.subTest(f"{name} {key}: {value}"):
+                self.refused(f"node: a\nplugins:\n  - path: {PLUGINS}/libcles-{name}.so\n    config:\n"
+                             f"      {key}: {value}\n", 5, f"plugins[0].config.{key}", words)
         # As far as the file knows the key that the plugin names.
         self.refused(f"plugins:\n  - path: {FAULTY}/refuses_setting.so\n    config:\n      cameras:\n"
                      "        - rate: 30\n        - name: left\n          rate: 90\n", 7,

@@ -17,6 +17,8 @@ CLESD = os.environ.get("CLESD", "clesd")
 # Plugins that are wrong in one way each, and one whose tasks are.
 FAULTY = os.environ.get("FAULTY_PLUGINS", "")
 STUBBORN = os.environ.get("STUBBORN_PLUGIN", "")
+# Where those are that come along.
+PLUGINS = os.environ.get("PLUGINS", "")
 
 DEFAULTS = "node: sat1\nlisten: tcp://127.0.0.1:0\nmulticast: off\nworkers: 2\nlog: {level: debug, format: json}\n"
 

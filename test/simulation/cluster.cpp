@@ -129,7 +129,13 @@ void cluster::start(unsigned host) {
 void cluster::start_routing() {
     auto& hub = *nodes_[hub_host];
     ways_.push_back(std::make_unique<ways>(hub));
-    routing_ = std::make_shared<core::routing>(hub.node(), *ways_.back(), hub.run_number() * 7U, [] {});
+    // What is ready to begin does so in a turn of the hub.
+    const auto wake = [this, weak = std::weak_ptr{nodes_[hub_host]}] {
+        if (const auto n = weak.lock()) {
+            n->later({}, [this, n = n.get()] { routing_->begin_ready(n->now()); });
+        }
+    };
+    routing_ = std::make_shared<core::routing>(hub.node(), *ways_.back(), hub.run_number() * 7U, wake);
 }
 
 void cluster::offer(node_run& n, const std::shared_ptr<work_pool>& pool) {

@@ -33,8 +33,11 @@ class recording_outlet : public core::outlet {
     void close() override { ++closes; }
     void retire() override { ++retires; }
 
+    /// What a link does before it sends: has more served, where something waits.
+    virtual void turn() {}
     /// What has been sent since the last time.
     std::string take() {
+        turn();
         held_.resize(0);
         return std::exchange(urgent_, {}) + std::exchange(text_, {});
     }

@@ -55,10 +55,18 @@ struct routing_fixture {
         routing->drain(node.clock.now());
     }
 
+    void have_turn() { routing->begin_ready(node.clock.now()); }
+
     test_node node;
     recorded_ways ways;
     int wakes = 0;
-    std::shared_ptr<core::routing> routing = std::make_shared<core::routing>(node.host, ways, 7, [this] { ++wakes; });
+    bool waits_for_turn = false; ///< what is to begin soon waits for `have_turn`; else it begins at once
+    std::shared_ptr<core::routing> routing = std::make_shared<core::routing>(node.host, ways, 7, [this] {
+        ++wakes;
+        if (!waits_for_turn) {
+            have_turn();
+        }
+    });
     test_link link{node};
     std::map<std::string, std::uint64_t> seq;
 };

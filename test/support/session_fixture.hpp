@@ -122,6 +122,11 @@ class test_link final : public recording_outlet, public core::binder {
     void overlong(std::string_view head) { session_.on_overlong(head, at_.clock.now()); }
     void half_close() { session_.on_end(at_.clock.now()); }
     void reset() { session_.on_lost("the link was lost"); }
+    void turn() override {
+        if (session_.serving().has_more()) {
+            serve_more();
+        }
+    }
     /// The link has sent what there was.
     void serve_more() { session_.serving().serve_more(at_.clock.now()); }
     /// The peer has ended in the middle of a line.

@@ -132,6 +132,44 @@ BOOST_AUTO_TEST_CASE(who_is_busy_is_passed_over) {
     BOOST_TEST(link.take() == "id=7 [1]\n");
 }
 
+// A lost link fails all that was asked over it, in a loop; the handler of this node that is next may do anything.
+BOOST_AUTO_TEST_CASE(it_goes_on_to_another_node_in_a_turn) {
+    offer("car2", task("DELEGATE", "work"));
+    link.ask("DELEGATE any:work id=7");
+    node.on_later(verb::delegate, "work");
+    waits_for_turn = true;
+    ways.to("car2").refuses(full);
+    BOOST_TEST(node.started.empty());
+    have_turn();
+    BOOST_REQUIRE_EQUAL(node.started.size(), 1U);
+    node.started.at(0)->call->done("[1]");
+    BOOST_TEST(link.take() == "id=7 [1]\n");
+}
+
+BOOST_AUTO_TEST_CASE(withdrawn_before_it_goes_on_it_asks_nobody) {
+    for (const auto* how : {"withdrawn", "late", "lost", "stopped"}) {
+        fixture f;
+        f.offer("car2", f.task("DELEGATE", "work"));
+        f.link.ask("DELEGATE any:work id=7 deadline=100");
+        f.node.on_later(verb::delegate, "work");
+        f.waits_for_turn = true;
+        f.ways.to("car2").refuses(full);
+        const std::string_view what = how;
+        if (what == "withdrawn") {
+            f.link.ask("PUSH self:cles/cancel/7 reply=no");
+        } else if (what == "late") {
+            f.node.pass(100ms);
+        } else if (what == "lost") {
+            f.link.reset();
+        } else {
+            f.routing->stop();
+        }
+        f.have_turn();
+        BOOST_TEST(f.node.started.empty(), how);
+        BOOST_TEST(f.ways.count() == 2U, how); // its description, and the request
+    }
+}
+
 BOOST_AUTO_TEST_CASE(who_was_busy_is_not_asked_for_as_long_as_it_said) {
     two_others("DELEGATE", "work");
     link.ask("DELEGATE any:work id=7");

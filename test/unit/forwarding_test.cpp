@@ -40,6 +40,7 @@ BOOST_AUTO_TEST_CASE(the_time_left_goes_with_it) {
     link.ask("PULL car2:other");
     node.pass(200ms);
     ways.to("car2").answers("{}");
+    link.turn();
     BOOST_TEST(ways.to("car2").text.starts_with("PULL car2:other"));
     BOOST_TEST((ways.to("car2").deadline == node.clock.now() - 200ms + 5s)); // its turn came late, its time has run
 }

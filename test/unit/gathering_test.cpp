@@ -5,6 +5,8 @@
 #include <boost/test/unit_test.hpp>
 
 #include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -39,6 +41,33 @@ BOOST_AUTO_TEST_CASE(all_who_offer_it_are_asked_this_node_too) {
     ways.to("car2").answers("[2]");
     BOOST_TEST(link.take() == R"(id=7 {"results":{"car1":{"value":1},"car2":[2],"car3":{"value":3}},"errors":{}})"
                               "\n");
+}
+
+// Its handler may do anything, and is not to come between those that are asked.
+BOOST_AUTO_TEST_CASE(this_node_comes_last) {
+    std::size_t asked = 0;
+    node.on(verb::pull, "speed", [&](const cles::request&, cles::json_writer& w) {
+        asked = ways.count_open();
+        w.value(std::int64_t{1});
+    });
+    link.ask("PULL all:speed id=7");
+    BOOST_TEST(asked == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(after_a_wait_it_begins_in_a_turn) {
+    node.on_later(verb::delegate, "work");
+    hear("car5", "unknown");
+    link.ask("DELEGATE all:work id=7 deadline=1000");
+    waits_for_turn = true;
+    node.pass(500ms); // those that are known are asked
+    BOOST_TEST(node.started.empty());
+    BOOST_TEST(ways.to("car2").text.find("work") == std::string::npos, ways.to("car2").text);
+    have_turn();
+    BOOST_TEST(node.started.size() == 1U);
+    BOOST_TEST(ways.to("car2").text.find("work") != std::string::npos, ways.to("car2").text);
+    ways.to("car5").answers(description("car5", "")); // it does not begin once more
+    have_turn();
+    BOOST_TEST(node.started.size() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(failures_stand_apart_and_whole) {

@@ -114,6 +114,7 @@ BOOST_AUTO_TEST_CASE(the_last_unbind_closes) {
     link.half_close();
     BOOST_TEST(link.finishes == 0);
     started(0).call->done("[1]");
+    link.turn();
     BOOST_TEST(link.finishes == 1);
 }
 

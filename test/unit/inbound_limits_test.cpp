@@ -169,9 +169,11 @@ BOOST_AUTO_TEST_CASE(a_link_whose_waiting_requests_take_too_much_room_is_not_rea
     BOOST_TEST(to.pauses == 1);
     for (std::size_t done = 0; done < 3; ++done) { // the 6 that wait shrink to 3
         small.node.started.at(done)->call->done("[1]");
+        to.turn();
         BOOST_TEST(to.paused);
     }
     small.node.started.at(3)->call->done("[1]");
+    to.turn();
     BOOST_TEST(!to.paused);
     BOOST_TEST(to.pauses == 2);
 }

@@ -5,6 +5,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
 #include <cstddef>
 #include <memory>
 #include <string>
@@ -173,6 +174,38 @@ BOOST_AUTO_TEST_CASE(requests_that_a_peer_does_not_take_are_busy_past_the_share)
     BOOST_TEST(!result->ended); // what keeps the network together
 }
 
+// However they end: nothing that is kept of them is of a call.
+BOOST_AUTO_TEST_CASE(bindings_that_have_been_decided_count_no_more) {
+    node.on_later(verb::bind, "lane");
+    node.on_later(verb::bind, "road");
+    test_link link{node};
+    const auto at_rest = [&] {
+        node.started.clear();
+        static_cast<void>(link.take());
+        link.settle();
+        return used() == 0;
+    };
+    for (const auto* noun : {"lane", "road"}) {
+        const std::string bind = "BIND car1:" + std::string{noun} + "/a id=7 deadline=100";
+        link.ask(bind);
+        BOOST_TEST(used() != 0U);
+        node.started.at(0)->call->done("{}");
+        BOOST_TEST(at_rest());
+        link.ask(bind);
+        node.started.at(0)->call->fail({.code = cles::errc::denied, .message = "not you"});
+        BOOST_TEST(at_rest());
+        link.ask(bind);
+        node.pass(std::chrono::milliseconds{100});
+        BOOST_TEST(at_rest());
+        link.ask(bind);
+        link.ask("PUSH self:cles/cancel/7 reply=no");
+        BOOST_TEST(at_rest());
+        link.ask(bind);
+        link.ask("BIND car1:" + std::string{noun} + "/a lease=0");
+        BOOST_TEST(at_rest());
+    }
+}
+
 // The sum over all that says what it holds is what the node says it holds, at every step, and nothing is left at the
 // end.
 BOOST_AUTO_TEST_CASE(all_parts_add_up) {
@@ -212,6 +245,10 @@ BOOST_AUTO_TEST_CASE(all_parts_add_up) {
         node.started.erase(node.started.begin());
         next->call->done(body(2'000));
         adds_up();
+        while (b->session().serving().has_more()) { // until the next one begins
+            b->turn();
+            adds_up();
+        }
     }
     a->make_room();
     adds_up();

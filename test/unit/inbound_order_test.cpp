@@ -23,7 +23,10 @@ struct fixture {
         node.on_later(verb::push, "store");
     }
     cles::test::test_node::running& started(std::size_t i) { return *node.started.at(i); }
-    void finish(std::size_t i, std::string_view json) { started(i).call->done(json); }
+    void finish(std::size_t i, std::string_view json) {
+        started(i).call->done(json);
+        link.turn();
+    }
 
     cles::test::test_node node;
     cles::test::test_link link{node};
@@ -57,6 +60,38 @@ BOOST_AUTO_TEST_CASE(a_plain_handler_waits_its_turn_too) {
     BOOST_TEST(counted == 0);
     finish(0, "[1]");
     BOOST_TEST(counted == 1);
+}
+
+// A call may end while the library goes through its deadlines, or what another node has said. A handler that is begun
+// there might end what is gone through.
+BOOST_AUTO_TEST_CASE(what_waited_begins_in_a_turn_of_its_link_and_never_where_the_call_before_it_ends) {
+    for (const bool late : {false, true}) {
+        fixture f;
+        f.link.ask("DELEGATE car1:work deadline=100");
+        f.link.ask("PUSH car1:count");
+        f.link.ask("PULL car1:slow");
+        const auto wakes = f.link.wakes;
+        if (late) {
+            f.node.pass(100ms);
+        } else {
+            f.started(0).call->done("[1]");
+        }
+        BOOST_TEST(f.counted == 0);
+        BOOST_TEST(f.node.started.size() == 1U);
+        BOOST_TEST(f.link.wakes > wakes);
+        f.link.turn();
+        BOOST_TEST(f.counted == 1);
+        BOOST_TEST(f.node.started.size() == 2U);
+        BOOST_TEST(f.link.sent() == (late ? "deadline, ok" : "ok, ok"));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_line_that_comes_before_that_turn_waits_behind) {
+    link.ask("DELEGATE car1:work");
+    link.ask("PUSH car1:count");
+    started(0).call->done("[1]");
+    link.session().on_line("PULL car1:speed", node.clock.now());
+    BOOST_TEST(link.take() == "[1]\n{\"value\":1}\n{\"v\":3}\n");
 }
 
 BOOST_AUTO_TEST_CASE(what_waited_sees_its_own_line) {
@@ -156,7 +191,7 @@ BOOST_AUTO_TEST_CASE(a_second_request_with_an_id_in_flight_is_bad_request_and_cl
 BOOST_AUTO_TEST_CASE(a_handler_may_answer_another_request_while_it_runs) {
     node.on(verb::push, "release", [this](const cles::request& r, cles::json_writer& w) {
         finish(0, "[1]");
-        // The request that was let go on meanwhile has used the link's memory: what this one is shown must have stayed.
+        // The request that was let go on has used the link's memory: what this one is shown must have stayed.
         w.value(r.parameter(0));
     });
     node.on(verb::pull, "echo", [](const cles::request& r, cles::json_writer& w) { w.value(r.parameter(0)); });

@@ -92,6 +92,27 @@ BOOST_AUTO_TEST_CASE(what_does_not_end_in_time_is_cut_short) {
     BOOST_TEST(link.session().serving().in_flight() == 0U);
 }
 
+// There is no other turn before the last line.
+BOOST_AUTO_TEST_CASE(what_waits_when_it_is_cut_short_is_busy_before_the_last_line) {
+    constexpr std::size_t more_than_one_turn_serves = 400;
+    node.on_later(verb::delegate, "work");
+    link.ask("DELEGATE self:work");
+    for (std::size_t i = 0; i < more_than_one_turn_serves; ++i) {
+        link.ask("DELEGATE self:work");
+    }
+    link.session().serving().cut_short();
+    link.session().say_that_it_leaves();
+    const auto lines = link.take_lines();
+    BOOST_REQUIRE_EQUAL(lines.size(), more_than_one_turn_serves + 2);
+    BOOST_TEST(cles::test::kind_of(lines[0]) == "unavailable");
+    for (std::size_t i = 1; i <= more_than_one_turn_serves; ++i) {
+        BOOST_REQUIRE(cles::test::kind_of(lines[i]) == "busy");
+    }
+    BOOST_TEST(lines.back() + "\n" == farewell);
+    BOOST_TEST(node.started.size() == 1U);
+    BOOST_TEST(link.session().serving().in_flight() == 0U);
+}
+
 BOOST_AUTO_TEST_CASE(the_last_line_says_that_it_leaves) {
     link.session().serving().begin_nothing();
     link.session().say_that_it_leaves();

@@ -4,9 +4,12 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <chrono>
 #include <string>
 
 BOOST_FIXTURE_TEST_SUITE(relayed_bindings, cles::test::routing_fixture)
+
+using namespace std::chrono_literals;
 
 BOOST_AUTO_TEST_CASE(bound_again_a_noun_keeps_its_place_and_has_new_terms) {
     link.ask("BIND car2:pose id=7");
@@ -37,6 +40,31 @@ BOOST_AUTO_TEST_CASE(with_the_link_all_goes) {
     ways.bound("car3:pose").binds("{}");
     BOOST_TEST(ways.count_bound() == 0U);
     BOOST_TEST(link.session().serving().bindings() == 0U);
+}
+
+// However they end, and whenever the other node answers.
+BOOST_AUTO_TEST_CASE(a_binding_whose_call_has_ended_counts_no_more) {
+    const auto at_rest = [&] {
+        static_cast<void>(link.take());
+        link.settle();
+        return link.account->used() == 0;
+    };
+    link.ask("BIND car2:pose id=7 deadline=100");
+    BOOST_TEST(link.account->used() != 0U);
+    node.pass(100ms);
+    BOOST_TEST(at_rest());
+    link.ask("BIND car2:pose id=7");
+    link.ask("PUSH self:cles/cancel/7 reply=no");
+    BOOST_TEST(at_rest());
+    link.ask("BIND car2:pose id=7");
+    link.ask("BIND car2:pose lease=0");
+    BOOST_TEST(at_rest());
+    link.ask("BIND car2:pose id=7");
+    ways.bound("car2:pose").binds("{}");
+    BOOST_TEST(at_rest());
+    link.ask("BIND car3:pose id=7");
+    ways.bound("car3:pose").refuses(cles::errc::denied, "not you");
+    BOOST_TEST(at_rest());
 }
 
 BOOST_AUTO_TEST_CASE(a_binding_that_is_withdrawn_before_it_is_answered_is_none) {

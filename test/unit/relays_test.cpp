@@ -21,6 +21,24 @@ BOOST_AUTO_TEST_CASE(a_binding_of_another_node_is_answered_when_that_has) {
     BOOST_TEST(link.take() == "id=7 {\"x\":1}\n");
 }
 
+// A client may ask again and again for what another node never answers.
+BOOST_AUTO_TEST_CASE(who_waits_no_more_is_not_kept) {
+    const auto from = routing->relayed();
+    const auto kept = std::make_shared<int>();
+    int told = 0;
+    auto waits = std::make_shared<int>();
+    const auto tell = [kept, &told](cles::core::topic*, std::string_view, const cles::protocol::failure&) { ++told; };
+    for (int i = 0; i < 100; ++i) {
+        from->join("car2", "pose", "hops=7 via=car1", waits, tell);
+        waits = std::make_shared<int>();
+    }
+    from->join("car2", "pose", "hops=7 via=car1", waits, tell);
+    BOOST_TEST(kept.use_count() < 5);
+    ways.bound("car2:pose").binds("{}");
+    BOOST_TEST(told == 1);
+    BOOST_TEST(kept.use_count() == 2); // this and `tell`
+}
+
 BOOST_AUTO_TEST_CASE(updates_are_passed_on_as_they_came) {
     link.ask("BIND car2:pose");
     ways.bound("car2:pose").binds("{}");

@@ -22,6 +22,22 @@ BOOST_AUTO_TEST_CASE(any_and_all_wait_for_the_first_round) {
     BOOST_TEST(link.take() == "id=7 {\"value\":1}\nid=8 {\"results\":{\"car1\":{\"value\":1}},\"errors\":{}}\n");
 }
 
+// What has waited is gone through in a loop, and a handler may do anything.
+BOOST_AUTO_TEST_CASE(what_has_waited_begins_in_a_turn) {
+    routing->hold();
+    node.on_later(verb::delegate, "work");
+    for (const auto* id : {"7", "8"}) {
+        link.ask("DELEGATE any:work id=" + std::string{id});
+        link.ask("DELEGATE all:work id=1" + std::string{id});
+    }
+    waits_for_turn = true;
+    routing->release(node.clock.now());
+    BOOST_TEST(node.started.empty());
+    BOOST_TEST(wakes != 0);
+    have_turn();
+    BOOST_TEST(node.started.size() == 4U);
+}
+
 BOOST_AUTO_TEST_CASE(names_do_not_wait_here) {
     routing->hold();
     link.ask("PULL car2:speed id=7");

@@ -87,7 +87,7 @@ void all_binding::follow() {
 
 void all_binding::join(const std::string& node) {
     parts_[node];
-    place_.from()->join(node, path_, adverbs_,
+    place_.from()->join(node, path_, adverbs_, weak_from_this(),
                         [weak = weak_from_this(), node](topic* t, std::string_view last, const protocol::failure& why) {
                             if (const auto self = weak.lock(); self && !self->closed_) {
                                 self->on_told(node, t, last, why);

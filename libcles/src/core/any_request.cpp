@@ -29,10 +29,17 @@ any_request::any_request(std::shared_ptr<routing> by, const protocol::request_li
     : routing_(std::move(by)), request_(r), peer_(peer), call_(std::move(answers)), due_(due) {}
 
 bool any_request::begin(time_point now) {
+    if (going_on_) {
+        ask_another(now);
+        return true;
+    }
     if (routing_->is_held()) {
         return false;
     }
     const auto chosen = routing_->choose(*request_, asked_, now);
+    if (over()) { // the program was asked for its load, and has stopped the service
+        return true;
+    }
     if (!chosen.nobody()) {
         ask(chosen, now);
         return true;
@@ -128,11 +135,11 @@ void any_request::on_failure(std::size_t, leg_failure why) {
     const auto now = routing_->host().time.now();
     note_end(&why, now);
     if (!call_->ended()) {
-        go_on(std::move(why), now);
+        go_on(std::move(why));
     }
 }
 
-void any_request::go_on(leg_failure why, time_point now) {
+void any_request::go_on(leg_failure why) {
     const auto busy = why.told.code == errc::busy;
     const auto begun = why.begun;
     const bool lost = begun && why.told.code == errc::unavailable;
@@ -148,22 +155,37 @@ void any_request::go_on(leg_failure why, time_point now) {
     if (busy && (!last_busy_ || told.retry_ms.value_or(0) < last_busy_->retry_ms.value_or(0))) {
         last_busy_ = told;
     }
-    if (repeat) {
-        if (const auto next = routing_->choose(*request_, asked_, now); !next.nobody()) {
-            ticket_ = 0;
-            // It may be what calls: it goes when it has returned.
-            const auto done = std::move(here_);
-            ask(next, now);
-            return;
-        }
+    if (!repeat) {
+        give_up(std::move(told), begun);
+        return;
     }
+    ticket_ = 0;
+    going_on_ = leg_failure{.told = std::move(told), .begun = begun};
+    routing_->begin_soon(shared_from_this());
+}
+
+void any_request::ask_another(time_point now) {
+    const auto why = *std::exchange(going_on_, std::nullopt);
+    const auto done = std::move(here_);
+    const auto next = routing_->choose(*request_, asked_, now);
+    if (over()) {
+        return;
+    }
+    if (!next.nobody()) {
+        ask(next, now);
+    } else {
+        give_up(why.told, why.begun);
+    }
+}
+
+void any_request::give_up(protocol::failure why, bool begun) {
     // Busy promises that the work was not begun.
     if (!begun && lost_) {
-        told = *lost_;
+        why = *lost_;
     } else if (!begun && last_busy_) {
-        told = *last_busy_;
+        why = *last_busy_;
     }
-    call_->fail(std::move(told));
+    call_->fail(std::move(why));
 }
 
 } // namespace cles::core

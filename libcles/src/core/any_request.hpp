@@ -33,7 +33,7 @@ class any_request final : public routing::errand, public leg_events, public std:
     void ask(const chooser::chosen& chosen, time_point now);
     /// Goes on after this node, which has refused it before it began.
     void go_on_from_here(const protocol::failure& why);
-    /// Chooses. False where it has to wait for others to be heard of.
+    /// Chooses one, or another. False where it has to wait for others to be heard of.
     bool begin(time_point now) override;
     [[nodiscard]] bool over() const override { return call_->ended(); }
 
@@ -42,7 +42,9 @@ class any_request final : public routing::errand, public leg_events, public std:
     void on_failure(std::size_t leg, leg_failure why) override;
     void on_progress(std::size_t leg, double fraction, std::string_view json) override;
 
-    void go_on(leg_failure why, time_point now);
+    void go_on(leg_failure why);
+    void ask_another(time_point now);
+    void give_up(protocol::failure why, bool begun);
     [[nodiscard]] bool may_repeat(const leg_failure& why) const noexcept;
     void follow_stop();
     void stop();
@@ -59,6 +61,7 @@ class any_request final : public routing::errand, public leg_events, public std:
     int busy_ = 0;
     std::optional<protocol::failure> last_busy_;
     std::optional<protocol::failure> lost_; // a node that may have begun it
+    std::optional<leg_failure> going_on_;   // after this, to another one
     std::uint64_t ticket_ = 0;
     std::unique_ptr<local_request> here_;
 };

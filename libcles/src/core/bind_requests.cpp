@@ -149,7 +149,10 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
     if (!c) {
         return;
     }
-    std::erase_if(asking_, [](const asking& a) { return a.answers->ended(); });
+    std::erase_if(asking_, [](const asking& a) {
+        const auto waits = a.answers.lock();
+        return !waits || waits->ended();
+    });
     asking_.push_back({std::string{path}, c});
     const auto decision = std::make_shared<bind_decision>(
         shared_node_, [this, c, path = std::string{path}, terms = terms_of(r), lease = lease_of(r),
@@ -178,9 +181,12 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
 
 void bind_requests::withdraw(std::string_view path) {
     for (const auto& a : std::vector<asking>{asking_}) {
-        if (a.path == path && !a.answers->ended()) {
-            a.answers->fail({.code = errc::cancelled, .message = node_.name + ": it was unbound"});
-            a.answers->stop();
+        if (a.path != path) {
+            continue;
+        }
+        if (const auto c = a.answers.lock(); c && !c->ended()) {
+            c->fail({.code = errc::cancelled, .message = node_.name + ": it was unbound"});
+            c->stop();
         }
     }
 }

@@ -43,7 +43,7 @@ class bind_requests {
   private:
     struct asking {
         std::string path;
-        std::shared_ptr<call> answers;
+        std::weak_ptr<call> answers; // which counts what it holds until it goes
     };
 
     void drop(const std::string& noun);

@@ -6,6 +6,7 @@
 #include "core/request_checks.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace cles::core {
@@ -18,7 +19,7 @@ bool gathering::begin(time_point now) {
     if (begun_ || over()) {
         return true;
     }
-    if (routing_->expects_more()) {
+    if (routing_->expects_more() && !has_waited_) {
         if (!armed()) {
             routing_->host().deadlines.arm(*this, stop_waiting_at(due_, now));
         }
@@ -61,18 +62,20 @@ void gathering::ask_all(time_point now) {
     routing_->host().deadlines.arm(*this, answer_by_);
     const auto adverbs = onward_adverbs(*request_, routing_->host().name);
     open_ = parts_.size();
-    asking_ = true;
+    std::optional<std::size_t> own;
     for (std::size_t i = 0; i < parts_.size() && !ended_; ++i) {
         auto& p = parts_[i];
         if (p.node == routing_->host().name) {
-            p.here = std::make_unique<local_request>(routing_->shared_host(), self, i);
-            p.here->run(*request_, peer_, answer_by_, now);
+            own = i;
         } else {
             p.ticket = send_onward(routing_->out(), *request_, p.node, adverbs, answer_by_, self, i);
         }
     }
-    asking_ = false;
-    follow();
+    if (own && !ended_) { // last, since its handler may do anything
+        auto& here = parts_[*own].here;
+        here = std::make_unique<local_request>(routing_->shared_host(), self, *own);
+        here->run(*request_, peer_, answer_by_, now);
+    }
 }
 
 void gathering::on_result(std::size_t leg, std::string_view json) {
@@ -107,12 +110,11 @@ void gathering::on_failure(std::size_t leg, leg_failure why) {
 // How far all of them are cannot be told from one.
 void gathering::on_progress(std::size_t, double, std::string_view) {}
 
-void gathering::on_deadline(time_point now) {
+void gathering::on_deadline(time_point) {
     const auto self = shared_from_this();
     if (!begun_) { // there are always some who have not said what they offer yet
-        if (!over()) {
-            ask_whom_is_known(now);
-        }
+        has_waited_ = true;
+        routing_->begin_soon(self);
         return;
     }
     for (auto& p : parts_) {
@@ -124,7 +126,7 @@ void gathering::on_deadline(time_point now) {
 }
 
 void gathering::follow() {
-    if (asking_ || ended_) {
+    if (ended_) {
         return;
     }
     if (bytes_ > routing_->host().bounds.line) { // it will not fit, whatever follows

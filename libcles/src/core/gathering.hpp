@@ -65,7 +65,7 @@ class gathering final : public routing::errand,
     std::size_t open_ = 0;
     std::size_t bytes_ = 0; // of results
     bool begun_ = false;
-    bool asking_ = false;
+    bool has_waited_ = false; // as long as it may
     bool ended_ = false;
 };
 

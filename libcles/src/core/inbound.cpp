@@ -143,7 +143,9 @@ void inbound::drop_all() {
     }
 }
 
+// Whoever waits has no other turn before the link ends, and is not begun any more.
 void inbound::cut_short() {
+    begins_nothing_ = true;
     auto running = std::vector<std::shared_ptr<call>>{};
     for (const auto& [id, c] : calls_) {
         running.push_back(c);
@@ -156,6 +158,9 @@ void inbound::cut_short() {
             refuse(*c, {.code = errc::unavailable, .message = node_->name + " shut down before this had ended"});
             c->stop();
         }
+    }
+    while (has_more()) {
+        serve_waiting(node_->time.now());
     }
 }
 
@@ -243,7 +248,11 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
         bound_.serve_elsewhere(r, due, now, *this);
         finish_if_done();
     } else if (!node_->way->route(r, peer_, due, now, *this)) {
-        serve_here(r, arrived, now);
+        if (lost_) { // by the program, when it was asked for its load
+            replies_.fail(r, protocol::failure{.code = errc::unavailable, .message = {}});
+        } else {
+            serve_here(r, arrived, now);
+        }
     }
 }
 
@@ -328,6 +337,10 @@ std::shared_ptr<call> inbound::begin_call(const protocol::request_line& r, call:
 }
 
 std::shared_ptr<call> inbound::open_call(const protocol::request_line& r, time_point due, time_point now) {
+    if (lost_) {
+        replies_.fail(r, protocol::failure{.code = errc::unavailable, .message = {}});
+        return nullptr;
+    }
     if (const auto why = no_room_to_run(*node_)) {
         replies_.fail(r, *why);
         return nullptr;
@@ -390,8 +403,10 @@ void inbound::detach(call& c) {
     if (c.wanted().id != 0) {
         calls_.erase(c.wanted().id);
     } else {
+        // Who waits for it begins in the link's next turn. A call may end where the library goes through what it holds,
+        // and what a handler does there (it may destroy the service) would change that.
         anonymous_.reset();
-        serve_waiting(now);
+        finish_if_done();
     }
 }
 

@@ -29,7 +29,7 @@ class execution;
 /// Serves the requests that one link brings (docs/protocol.md, "Order" and "Ends").
 ///
 /// Requests with an id start at once. Those without wait for each other. Plain handlers are run in line and answered
-/// into the link's output; other handlers become calls.
+/// into the link's output; other handlers become calls. Handlers are begun by `on_request` and `serve_more` only.
 class inbound final : private call_owner, private call_opener {
   public:
     inbound(std::shared_ptr<node> host, outlet& out, binder& updates, const identity& peer);
@@ -52,7 +52,7 @@ class inbound final : private call_owner, private call_opener {
     }
     /// Nothing is begun any more: what comes, and what waits for its turn, is `busy`. What runs is still answered.
     void begin_nothing() noexcept { begins_nothing_ = true; }
-    /// Answers what still runs with `unavailable`, and tells it to stop.
+    /// Answers what still runs with `unavailable`, and tells it to stop; what waits is `busy`.
     void cut_short();
 
     /// Whether requests wait whose turn has come, but which are too many for one turn.

@@ -20,20 +20,26 @@ relayed_bindings::~relayed_bindings() { clear(); }
 
 void relayed_bindings::bind(std::string_view node, std::string_view path, std::string_view adverbs,
                             binding::terms wanted, bool wants_mark, const std::shared_ptr<call>& c) {
-    std::erase_if(asking_, [](const asking& a) { return a.answers->ended(); });
+    std::erase_if(asking_, [](const asking& a) {
+        const auto waits = a.answers.lock();
+        return !waits || waits->ended();
+    });
     auto noun = noun_of(node, path);
     asking_.push_back({noun, c});
-    from_->join(node, path, adverbs,
-                [this, c, wanted, wants_mark, noun](topic* t, std::string_view last, const protocol::failure& why) {
-                    if (c->ended()) { // and this may be gone with its link
+    from_->join(node, path, adverbs, c,
+                [this, weak = std::weak_ptr{c}, wanted, wants_mark, noun](topic* t, std::string_view last,
+                                                                          const protocol::failure& why) {
+                    const auto waits = weak.lock();
+                    if (!waits || waits->ended()) { // and this may be gone with its link
                         return;
                     }
                     if (t == nullptr) {
-                        c->fail(why);
+                        waits->fail(why);
                         return;
                     }
-                    if (!c->can_answer(last.size())) {
-                        c->fail({.code = errc::busy, .message = "no memory is left for the answer (limits.memory)"});
+                    if (!waits->can_answer(last.size())) {
+                        waits->fail(
+                            {.code = errc::busy, .message = "no memory is left for the answer (limits.memory)"});
                         return;
                     }
                     // Bound before the answer, which may set off what else the peer asked for; updates follow it later.
@@ -42,9 +48,9 @@ void relayed_bindings::bind(std::string_view node, std::string_view path, std::s
                         by_name_.push_back(noun);
                     }
                     if (wants_mark) {
-                        c->set_head(protocol::mark_text(from_->mark_of(*t)));
+                        waits->set_head(protocol::mark_text(from_->mark_of(*t)));
                     }
-                    c->done(last);
+                    waits->done(last);
                 });
 }
 
@@ -54,8 +60,11 @@ bool relayed_bindings::binds(std::string_view target, std::string_view path) {
 
 void relayed_bindings::withdraw(std::string_view noun) {
     for (const auto& a : std::vector<asking>{asking_}) {
-        if (a.noun == noun && !a.answers->ended()) {
-            a.answers->fail({.code = errc::cancelled, .message = "it was unbound"});
+        if (a.noun != noun) {
+            continue;
+        }
+        if (const auto c = a.answers.lock(); c && !c->ended()) {
+            c->fail({.code = errc::cancelled, .message = "it was unbound"});
         }
     }
 }

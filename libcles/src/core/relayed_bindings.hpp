@@ -55,7 +55,7 @@ class relayed_bindings {
   private:
     struct asking {
         std::string noun;
-        std::shared_ptr<call> answers;
+        std::weak_ptr<call> answers; // which counts what it holds until it goes
     };
     void withdraw(std::string_view noun);
 

@@ -19,12 +19,15 @@ class relays::relay final : public feed_events {
     void start(std::string_view node, std::string_view path, std::string_view adverbs) {
         ticket_ = owner_.out_.bind(node, path, adverbs, *this);
     }
-    void join(told tell) {
+    void join(const std::weak_ptr<const void>& whose, told tell) {
         if (bound_) {
             tell(&topic_, last_value(), {});
-        } else {
-            waiting_.push_back(std::move(tell));
+            return;
         }
+        if (waiting_.size() == waiting_.capacity()) { // before there are more: those who have given up
+            std::erase_if(waiting_, [](const waiter& w) { return w.whose.expired(); });
+        }
+        waiting_.push_back({whose, std::move(tell)});
     }
 
     [[nodiscard]] std::optional<update_mark> mark() const { return fresh_ ? std::nullopt : topic_.last_mark(); }
@@ -33,14 +36,21 @@ class relays::relay final : public feed_events {
     [[nodiscard]] bool is_wanted() const noexcept { return topic_.is_bound() || !waiting_.empty() || telling_; }
 
   private:
+    struct waiter {
+        std::weak_ptr<const void> whose;
+        told tell;
+    };
+
     void on_bound(std::string_view last) override {
         bound_ = true;
         last_ = last;
         fresh_ = last_ != topic_.last_body(); // a node that says which update it is has had it told as one
         held_last_.resize(last_.size());
         telling_ = true;
-        for (auto& tell : std::exchange(waiting_, {})) {
-            tell(&topic_, last_, {});
+        for (const auto& w : std::exchange(waiting_, {})) {
+            if (!w.whose.expired()) {
+                w.tell(&topic_, last_, {});
+            }
         }
         telling_ = false;
         if (!fresh_) {
@@ -53,8 +63,10 @@ class relays::relay final : public feed_events {
     void on_refused(const protocol::failure& why) override {
         const auto waiting = std::exchange(waiting_, {});
         const auto held = owner_.all_.extract(topic_.path());
-        for (const auto& tell : waiting) {
-            tell(nullptr, {}, why);
+        for (const auto& w : waiting) {
+            if (!w.whose.expired()) {
+                w.tell(nullptr, {}, why);
+            }
         }
     }
     void on_update(std::string_view line, std::string_view body) override {
@@ -83,18 +95,19 @@ class relays::relay final : public feed_events {
     bool fresh_ = false;
     std::string last_;
     memory_reservation held_last_;
-    std::vector<told> waiting_;
+    std::vector<waiter> waiting_;
 };
 
 relays::relays(node& host, onward& out, std::function<void()> wake) : node_(host), out_(out), wake_(std::move(wake)) {}
 
 relays::~relays() = default;
 
-void relays::join(std::string_view node, std::string_view path, std::string_view adverbs, told tell) {
+void relays::join(std::string_view node, std::string_view path, std::string_view adverbs,
+                  const std::weak_ptr<const void>& whose, told tell) {
     const auto noun = std::string{node} + ":" + std::string{path};
     auto at = all_.find(noun);
     if (at != all_.end()) {
-        at->second->join(std::move(tell));
+        at->second->join(whose, std::move(tell));
         return;
     }
     if (all_.size() >= node_.bounds.nouns || stopped_) {
@@ -106,7 +119,7 @@ void relays::join(std::string_view node, std::string_view path, std::string_view
         return;
     }
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
-    at->second->join(std::move(tell));
+    at->second->join(whose, std::move(tell));
     at->second->start(node, path, adverbs);
 }
 

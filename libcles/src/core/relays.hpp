@@ -31,8 +31,9 @@ class relays final : public topic_source {
 
     /// The topic to bind to, with the noun's last value; or null, and why there is none.
     using told = std::function<void(topic*, std::string_view last, const protocol::failure& why)>;
-    /// Has a noun bound. Tells of it once, at once where it is bound already.
-    void join(std::string_view node, std::string_view path, std::string_view adverbs, told tell);
+    /// Has a noun bound. Tells of it once, at once where it is bound already, as long as `whose` lives.
+    void join(std::string_view node, std::string_view path, std::string_view adverbs,
+              const std::weak_ptr<const void>& whose, told tell);
 
     /// Which update the last value of a topic is; nothing where that is not known.
     [[nodiscard]] std::optional<update_mark> mark_of(const topic& t) const;

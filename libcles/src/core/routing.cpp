@@ -13,7 +13,7 @@ namespace cles::core {
 
 routing::routing(std::shared_ptr<node> host, onward& out, std::uint32_t seed, std::function<void()> wake)
     : node_(std::move(host)), out_(out), catalogue_(*node_, out, *this), chooser_(*node_, catalogue_, seed),
-      relays_(std::make_shared<relays>(*node_, out, std::move(wake))) {
+      relays_(std::make_shared<relays>(*node_, out, wake)), wake_(std::move(wake)) {
     node_->way = this;
 }
 
@@ -25,6 +25,7 @@ void routing::stop() {
         catalogue_.stop();
         relays_->stop();
         waiting_.clear();
+        ready_.clear();
     }
 }
 
@@ -117,12 +118,29 @@ void routing::release(time_point now) {
     on_offers(now);
 }
 
+void routing::begin_soon(std::shared_ptr<errand> e) {
+    if (!stopped_) {
+        ready_.push_back(std::move(e));
+        wake_();
+    }
+}
+
+// What a handler makes ready has another turn; it may stop this as well.
+void routing::begin_ready(time_point now) {
+    for (auto left = ready_.size(); left != 0 && !ready_.empty(); --left) {
+        auto next = std::move(ready_.front());
+        ready_.pop_front();
+        if (!next->over()) {
+            begin(std::move(next), now);
+        }
+    }
+}
+
 // Each in its order; those for which nothing has changed go on waiting.
-void routing::on_offers(time_point now) {
-    for (auto all = std::exchange(waiting_, {}); !all.empty() && !stopped_; all.pop_front()) {
-        auto& next = all.front();
-        if (!next->over() && !next->begin(now)) {
-            waiting_.push_back(std::move(next));
+void routing::on_offers(time_point) {
+    for (auto all = std::exchange(waiting_, {}); !all.empty(); all.pop_front()) {
+        if (!all.front()->over()) {
+            begin_soon(std::move(all.front()));
         }
     }
     for (const auto& weak : std::vector<std::weak_ptr<all_binding>>{all_}) {

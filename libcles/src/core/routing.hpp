@@ -9,6 +9,7 @@
 #include "core/router.hpp"
 
 #include <cstdint>
+#include <deque>
 #include <functional>
 #include <list>
 #include <memory>
@@ -23,7 +24,7 @@ class all_binding;
 /// `any`, asks all for `all` (docs/protocol.md, "Routing").
 class routing final : public router, private catalogue::listener, public std::enable_shared_from_this<routing> {
   public:
-    /// `wake` is called when there are updates to `drain`.
+    /// `wake` is called when there is something to do in a turn: updates to `drain`, or what is ready to begin.
     routing(std::shared_ptr<node> host, onward& out, std::uint32_t seed, std::function<void()> wake);
     ~routing();
 
@@ -42,17 +43,23 @@ class routing final : public router, private catalogue::listener, public std::en
     void bind(const protocol::request_line& request, relayed_bindings& place, time_point due, time_point now,
               call_opener& from) override;
     std::shared_ptr<relays> relayed() override { return relays_; }
+    /// Begins what has become ready. Runs handlers of this node's.
+    void begin_ready(time_point now);
     /// Passes updates on that have come since the last time.
     void drain(time_point now) { relays_->drain(now); }
 
     /// A request that may have to wait until somebody is known who offers it.
+    ///
+    /// Where it is begun, handlers of this node are, and they may do anything. So it is begun where its line is read,
+    /// or in a turn: never where something has become known, where another node has answered, or at a deadline, since
+    /// the library goes through all of these in loops.
     class errand {
       public:
         errand() = default;
         errand(const errand&) = delete;
         errand& operator=(const errand&) = delete;
         virtual ~errand() = default;
-        /// False where it still has to.
+        /// Begins it or goes on with it. False where it still has to wait.
         virtual bool begin(time_point now) = 0;
         /// Nobody waits for it any more.
         [[nodiscard]] virtual bool over() const = 0;
@@ -71,6 +78,8 @@ class routing final : public router, private catalogue::listener, public std::en
     [[nodiscard]] const std::vector<catalogue::offer>& offers(verb v, std::string_view task) const {
         return catalogue_.offers(v, task);
     }
+    /// Has it begun in the next turn, and keeps it until then.
+    void begin_soon(std::shared_ptr<errand> e);
     [[nodiscard]] bool is_held() const noexcept { return held_; }
     [[nodiscard]] bool expects_more() const noexcept { return held_ || catalogue_.expects_more(); }
     [[nodiscard]] protocol::failure nobody_offers(const protocol::request_line& r) const;
@@ -86,6 +95,8 @@ class routing final : public router, private catalogue::listener, public std::en
     chooser chooser_;
     std::shared_ptr<relays> relays_;
     std::list<std::shared_ptr<errand>> waiting_;
+    std::deque<std::shared_ptr<errand>> ready_; // for the next turn
+    std::function<void()> wake_;
     std::vector<std::weak_ptr<all_binding>> all_;
     bool held_ = false;
     bool stopped_ = false;

@@ -89,6 +89,9 @@ void turns::carry_on() {
         return;
     }
     host_.route_on(time_.now());
+    if (host_.stopped()) {
+        return;
+    }
     const auto gone = publish(false);
     round{*this}.each([](turn_taker& one) {
         one.flush();

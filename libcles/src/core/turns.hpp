@@ -51,7 +51,7 @@ class turn_host {
     /// There are no more turns.
     [[nodiscard]] virtual bool stopped() const = 0;
     [[nodiscard]] virtual publications& published() = 0;
-    /// Carries on what waits to be passed on to other nodes.
+    /// Carries on what waits to be passed on to other nodes, or to begin here. Handlers run.
     virtual void route_on(time_point now) = 0;
     /// Something has happened.
     virtual void settle() = 0;

@@ -182,6 +182,9 @@ void connection::flush() {
         return;
     }
     serve_more();
+    if (gone_) { // by a handler
+        return;
+    }
     send_output();
     follow_backlog();
     if (may_serve_more()) {

@@ -187,7 +187,7 @@ void engine::post_turn() {
 
 void engine::route_on(time_point now) {
     if (routing_) {
-        routing_->drain(now);
+        routing_->go_on(now);
     }
 }
 

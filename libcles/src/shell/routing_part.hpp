@@ -21,8 +21,9 @@ class routing_host {
     virtual void hold() = 0;
     /// The nodes that are to be found have been.
     virtual void release(time_point now) = 0;
-    /// Passes updates on that have come since the last time.
-    virtual void drain(time_point now) = 0;
+    /// Begins what has become ready, and passes updates on that have come since the last time: in a turn, since
+    /// handlers run.
+    virtual void go_on(time_point now) = 0;
     virtual void stop() = 0;
 };
 
