@@ -2,11 +2,12 @@
 # SPDX-License-Identifier: BSL-1.0
 """Two daemons of one name: the second ends, and says who has it, unless it is told to go on."""
 
+import contextlib
 import signal
 import time
 import unittest
 
-from daemon import DEFAULTS, STUBBORN, Daemon, body
+from daemon import DEFAULTS, STUBBORN, Daemon, body, wait_until_running
 from support import free_port, wait_until
 
 
@@ -34,23 +35,31 @@ class Clash(unittest.TestCase):
         peers = self.first.ask("PULL self:cles/peers")
         self.assertEqual(body(peers)["peers"], [])
 
-    def test_a_signal_while_it_gives_way_is_its_first(self):
-        second = self.daemon(f"plugins: [{STUBBORN}]\ndrain: 3s\n")
+    @contextlib.contextmanager
+    def giving_way_with_a_job(self, drain):
+        """A second one that gives way when a job runs there: it learns of the first by a seed that it is told later."""
+        text = f"plugins: [{STUBBORN}]\ndrain: {drain}\n"
+        second = Daemon(text, base=DEFAULTS)
+        self.addCleanup(second.__exit__)
         with second.connect() as link:
-            link.send("DELEGATE self:never_ends id=1 deadline=60000")
+            link.send("DELEGATE self:never_ends id=1 deadline=600000")
+            wait_until_running(second, 1)
+            second.write(DEFAULTS + text + f"seeds: [{self.first.url}]\n")
+            second.send_signal(signal.SIGHUP)
             second.wait_for_entry("stopping: ")
-            given = time.monotonic()
+            yield second
+
+    def test_a_signal_while_it_gives_way_is_its_first(self):
+        with self.giving_way_with_a_job("3s") as second:
+            signalled = time.monotonic()
             code, _ = second.stop()
-            self.assertGreater(time.monotonic() - given, 2)
+            self.assertGreater(time.monotonic() - signalled, 2)
         self.assertEqual(code, 3)
         second.wait_for_entry("SIGTERM: it is stopping already")
         self.assertNotIn("on a second signal", second.log())
 
     def test_a_second_signal_ends_it_also_while_it_gives_way(self):
-        second = self.daemon(f"plugins: [{STUBBORN}]\ndrain: 10min\n")
-        with second.connect() as link:
-            link.send("DELEGATE self:never_ends id=1 deadline=60000")
-            second.wait_for_entry("stopping: ")
+        with self.giving_way_with_a_job("10min") as second:
             second.send_signal(signal.SIGTERM)
             second.wait_for_entry("SIGTERM: it is stopping already")
             self.assertEqual(second.stop()[0], 3)
