@@ -50,7 +50,8 @@ node::node(node_setup setup, const core::clock& source, std::function<void()> wa
       completions(std::move(setup.complete)), memory(bounds.memory),
       kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
       kept_requests(std::make_shared<memory_account>(memory)), others(name, setup.epoch, deadlines, bounds.peers),
-      published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, name, epoch, std::move(wake)),
+      published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch,
+                std::move(wake)),
       remembered{.limit = bounds.remembered} {
     others.begin(setup.pool, started);
 }

@@ -397,8 +397,8 @@ void engine::stop() {
     if (outside_updates_) {
         outside_updates_->close();
     }
-    while (auto result = node_->published.next_result()) {
-        asio::post(executor_, [result = std::move(*result)]() mutable { result.tell(); });
+    for (auto& operation : node_->published.take_waiters()) {
+        fail_later(std::move(operation), errc::stopped, "the service has been stopped");
     }
     tell(node_->published.take_waiters());
     neighbours_->stop();
