@@ -193,8 +193,10 @@ void engine::route_on(time_point now) {
 
 // -- asking --------------------------------------------------------------------------------------------------------
 
-void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message) {
-    node_->completions.put(core::completion{core::completion::failure{std::move(operation), code, std::move(message)}});
+void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message,
+                        core::completion::progress_function progress) {
+    node_->completions.put(core::completion{
+        core::completion::failure{std::move(operation), code, std::move(message), std::move(progress)}});
 }
 
 std::uint64_t engine::send(const outgoing& request, const call_options& options, pending_ptr operation) {
@@ -388,11 +390,6 @@ void engine::stop() {
     }
     turns_.stop();
     // Whoever waits hears of it on the executor, never from inside this call.
-    const auto tell = [this](std::vector<pending_ptr> waiting) {
-        for (auto& operation : waiting) {
-            fail_later(std::move(operation), errc::stopped, "the service has been stopped");
-        }
-    };
     feeds_.stop();
     if (outside_updates_) {
         outside_updates_->close();
@@ -400,19 +397,18 @@ void engine::stop() {
     for (auto& operation : node_->published.take_waiters()) {
         fail_later(std::move(operation), errc::stopped, "the service has been stopped");
     }
-    tell(node_->published.take_waiters());
     neighbours_->stop();
     if (group_) {
         group_->stop();
     }
-    tell(routes_.stop());
+    routes_.stop();
     if (departure_) {
         if (auto operation = departure_->give_up()) {
             fail_later(std::move(operation), errc::stopped, "the service has been stopped");
         }
     }
     for (const auto& c : connections_.all()) {
-        tell(c->session().asking().take_all());
+        c->session().asking().stop();
         c->flush();
         c->abandon("the service has been stopped");
     }

@@ -102,7 +102,8 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     std::uint64_t send(const outgoing& request, const call_options& options, pending_ptr operation);
     void cancel(std::uint64_t ticket);
     /// Completes an operation that failed while it began; not from inside the call.
-    void fail_later(pending_ptr operation, boost::system::error_code code, std::string message);
+    void fail_later(pending_ptr operation, boost::system::error_code code, std::string message,
+                    core::completion::progress_function progress = {});
 
     // For the feeds.
     [[nodiscard]] shell::feed_links& feeds() noexcept { return feeds_; }
