@@ -76,6 +76,17 @@ void node::say(log_level level, const log_entry& what) const noexcept {
     }
 }
 
+void node::say_soon(log_level level, std::string what, std::string peer) {
+    if (log) {
+        completions.call([log = log, level, what = std::move(what), peer = std::move(peer)] {
+            try {
+                log(level, {what, peer});
+            } catch (...) { // there is nobody to tell
+            }
+        });
+    }
+}
+
 namespace {
 
 // What the program counts, as members of an object; empty where its function throws or writes no JSON.

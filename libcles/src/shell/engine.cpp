@@ -104,10 +104,6 @@ void engine::start(const std::vector<std::string>& listen_at) {
     listeners_.open_local_doors();
 }
 
-void engine::say_soon(log_level level, std::string what) const {
-    node_->completions.call([host = node_, level, what = std::move(what)] { host->say(level, what); });
-}
-
 void engine::expire(bool was_away) {
     struct settling {
         engine& by;
