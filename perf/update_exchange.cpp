@@ -170,18 +170,21 @@ class binder {
 };
 
 template <class T>
-update_tally take(asio::io_context& io, cles::service& client, const update_load& load) {
-    gathering all{io, client, load};
+update_tally take(asio::io_context& io, const std::vector<std::unique_ptr<cles::service>>& clients,
+                  const update_load& load) {
+    gathering all{io, *clients.front(), load};
     std::vector<std::unique_ptr<binder<T>>> binders;
     for (std::size_t i = 0; i < load.binders; ++i) {
         binders.push_back(std::make_unique<binder<T>>(all));
-        binders.back()->start(io, client);
+        binders.back()->start(io, *clients[i]);
     }
     io.restart();
     run(io, load.how);
     // What is still under way refers to the binders.
     if (all.failed()) {
-        client.stop();
+        for (const auto& each : clients) {
+            each->stop();
+        }
     }
     for (auto& each : binders) {
         each->close();
@@ -203,8 +206,9 @@ void serve_updates(std::string_view url, const run_options& how, const child_pro
     run(io, how);
 }
 
-update_tally take_updates(asio::io_context& io, cles::service& client, const update_load& load) {
-    return load.form == value_form::raw ? take<json_text>(io, client, load) : take<localization>(io, client, load);
+update_tally take_updates(asio::io_context& io, const std::vector<std::unique_ptr<cles::service>>& clients,
+                          const update_load& load) {
+    return load.form == value_form::raw ? take<json_text>(io, clients, load) : take<localization>(io, clients, load);
 }
 
 } // namespace cles::perf

@@ -12,7 +12,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string_view>
+#include <vector>
 
 /// BIND and UPDATE of the localization packet, published as fast as all binders can take it.
 namespace cles::perf {
@@ -47,8 +49,11 @@ struct update_load {
     std::uint32_t keep = 0; ///< updates that the publisher queues for a slow binder; 0: the protocol's default
 };
 
-/// Binds all, has the updates published, and takes them until every binder has had the last one.
+/// Binds all, each at a client of its own, since feeds of one would share a link; has the updates published, and takes
+/// them until every binder has had the last one.
+/// \pre there are as many clients as binders
 /// \throws cles::error, std::runtime_error where a value came changed
-update_tally take_updates(boost::asio::io_context& io, cles::service& client, const update_load& load);
+update_tally take_updates(boost::asio::io_context& io, const std::vector<std::unique_ptr<cles::service>>& clients,
+                          const update_load& load);
 
 } // namespace cles::perf

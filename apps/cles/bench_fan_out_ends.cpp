@@ -99,7 +99,7 @@ void fan_out_by_cles::connect(std::size_t binders) {
     }
     clients_.clear();
     services_.clear();
-    for (std::size_t i = 0; i < (multicast_.is_on() ? binders : 1); ++i) {
+    for (std::size_t i = 0; i < binders; ++i) { // feeds of one service would share a link
         cles::service_options client{
             .name = "bench" + std::to_string(i), .peers = {{"car1", url_}}, .multicast = multicast_};
         services_.push_back(std::make_unique<cles::service>(*io_, std::move(client)));

@@ -13,7 +13,11 @@
 #include <boost/asio/io_context.hpp>
 
 #include <algorithm>
+#include <cstddef>
+#include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <unistd.h>
 
@@ -33,19 +37,29 @@ std::uint64_t updates_of(const bench_options& options) {
                : std::clamp<std::uint64_t>(deliveries_of_a_pass / options.binders.front(), 1, most_updates);
 }
 
+using clients = std::vector<std::unique_ptr<cles::service>>;
+
+clients clients_of(boost::asio::io_context& io, const std::string& url, std::size_t count) {
+    clients all;
+    for (std::size_t i = 0; i < count; ++i) {
+        cles::service_options options{.name = "bench" + std::to_string(i), .peers = {{"car1", url}}};
+        all.push_back(std::make_unique<cles::service>(io, std::move(options)));
+    }
+    return all;
+}
+
 double count_bytes(const std::string& url) {
     perf::byte_tap tap{cles::parse_url(url)};
     boost::asio::io_context io{1};
-    cles::service client{io, {.name = "bench", .peers = {{"car1", tap.url()}}}};
-    perf::take_updates(io, client, {.binders = 1, .updates = updates_whose_bytes_count});
+    perf::take_updates(io, clients_of(io, tap.url(), 1), {.binders = 1, .updates = updates_whose_bytes_count});
     return rounded(static_cast<double>(tap.to_client()) / static_cast<double>(updates_whose_bytes_count));
 }
 
-update_figures take(boost::asio::io_context& io, cles::service& client, pid_t publisher,
+update_figures take(boost::asio::io_context& io, const clients& binders, pid_t publisher,
                     const perf::update_load& load) {
     const auto publisher_before = perf::cpu_used(publisher);
     const auto binder_before = perf::cpu_used(::getpid());
-    const auto tally = perf::take_updates(io, client, load);
+    const auto tally = perf::take_updates(io, binders, load);
     const auto binder = perf::cpu_used(::getpid()) - binder_before;
     const auto published = perf::cpu_used(publisher) - publisher_before;
 
@@ -72,7 +86,7 @@ update_report bench_updates(const bench_options& options) {
     perf::pin_to(cores.client);
 
     boost::asio::io_context io{1};
-    cles::service client{io, {.name = "bench", .peers = {{"car1", url}}}};
+    const auto binders = clients_of(io, url, options.binders.front());
 
     std::vector<update_figures> raw;
     std::vector<update_figures> typed;
@@ -85,10 +99,10 @@ update_report bench_updates(const bench_options& options) {
     for (std::size_t round = 0; round < options.rounds; ++round) {
         progress.step("updates as text");
         load.form = perf::value_form::raw;
-        raw.push_back(take(io, client, publisher.id(), load));
+        raw.push_back(take(io, binders, publisher.id(), load));
         progress.step("updates as C++ values");
         load.form = perf::value_form::typed;
-        typed.push_back(take(io, client, publisher.id(), load));
+        typed.push_back(take(io, binders, publisher.id(), load));
     }
 
     update_report report{.transport = to_string(options.transport),

@@ -53,10 +53,10 @@ class delegates final : public caller {
 
 class feeds final : public fan_out {
   public:
-    /// A client opens a link for each of its feeds; by multicast each feed has a service of its own.
+    /// Each feed has a service of its own, and so a link: those of one service would share it.
     feeds(const std::string& where, const multicast_options& multicast, std::size_t count)
         : binding_{.style = handler_style::callback, .multicast = multicast.is_on()} {
-        for (std::size_t i = 0; i < (multicast.is_on() ? count : 1); ++i) {
+        for (std::size_t i = 0; i < count; ++i) {
             cles::service_options options{
                 .name = "bench" + std::to_string(i), .peers = {{"car1", where}}, .multicast = multicast};
             services_.push_back(std::make_unique<cles::service>(io_, std::move(options)));

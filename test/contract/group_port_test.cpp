@@ -6,6 +6,7 @@
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/multicast.hpp>
+#include <boost/asio/post.hpp>
 #include <boost/asio/strand.hpp>
 #include <boost/system/system_error.hpp>
 #include <boost/test/unit_test.hpp>
@@ -14,6 +15,7 @@
 #include <cerrno>
 #include <cstring>
 #include <deque>
+#include <functional>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -42,6 +44,9 @@ struct member final : cles::transport::group_events {
         heard.emplace_back(datagram.text);
         sources.push_back(datagram.from);
         said.push_back(datagram.said != nullptr);
+        if (during) {
+            during();
+        }
         if (throw_at_next) {
             throw_at_next = false;
             throw std::runtime_error("a handler's");
@@ -57,6 +62,7 @@ struct member final : cles::transport::group_events {
     std::vector<std::string> heard;
     std::vector<udp::endpoint> sources;
     std::deque<bool> said;
+    std::function<void()> during{};
     int batches = 0;
     bool close_at_next = false;
     bool throw_at_next = false;
@@ -82,6 +88,23 @@ BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixtu
     one.port->send("garbage\n");
     run_until(io, [&] { return two.heard.size() == 2; });
     BOOST_TEST(!two.said[1]);
+}
+
+// Each hears it in a function of its own.
+BOOST_FIXTURE_TEST_CASE(what_one_does_about_a_datagram_is_done_before_the_next_hears_it, fixture) {
+    member one{io, where};
+    member two{io, where};
+    asio::io_context elsewhere;
+    member sender{elsewhere, where};
+    int done_first = 0;
+    one.during = [&] { asio::post(io, [&] { done_first += two.heard.size() < one.heard.size() ? 1 : 0; }); };
+    for (const auto* line : {"1\n", "2\n", "3\n"}) {
+        sender.port->send(line);
+        const auto count = one.heard.size() + 1;
+        run_until(io, [&] { return two.heard.size() == count; });
+        BOOST_TEST(one.heard.size() == count);
+    }
+    BOOST_TEST(done_first == 3);
 }
 
 BOOST_FIXTURE_TEST_CASE(who_is_alone_on_its_executor_does_not_hear_itself, fixture) {

@@ -199,6 +199,21 @@ BOOST_DATA_TEST_CASE(two_feeds_and_a_close, every_fault, how) {
     });
 }
 
+// Requests go by the link that the feed is on.
+BOOST_DATA_TEST_CASE(requests_beside_a_feed, every_fault, how) {
+    replay(how, [](nodes& n) {
+        feed_log feed;
+        feed.bind(n.tower, "car1:place");
+        run_until(n.io, [&] { return feed.binds != 0; });
+        for (int i = 0; i < 2; ++i) {
+            answer<int> a;
+            n.tower.async_pull<int>("car1:speed", a.options(), a.take());
+            run_until(n.io, [&] { return a.done(); });
+            check_ended_once(a);
+        }
+    });
+}
+
 // Ends in the middle of everything, wherever that is.
 BOOST_DATA_TEST_CASE(a_stop, every_fault, how) {
     replay(how, [](nodes& n) {

@@ -105,6 +105,66 @@ BOOST_DATA_TEST_CASE(several_feeds_on_one_noun_each_get_everything, carriers, ki
               [&] { return all[0]->items.size() == 3 && all[2]->items.size() == 3 && all[3]->items.size() == 3; });
 }
 
+BOOST_AUTO_TEST_CASE(feeds_of_one_noun_and_the_same_terms_share_a_link_and_a_binding) {
+    nodes n{carrier::tcp4};
+    const auto links = [&n] {
+        answer<> told;
+        n.tower->async_pull("car1:cles/metrics", told.take());
+        run_until(n.io, [&] { return told.done(); });
+        const auto at = told.value.text.find("\"links_accepted\":");
+        return std::stoi(told.value.text.substr(at + 17));
+    };
+    n.car->update("place", 1);
+    std::vector<std::unique_ptr<feed_log>> all;
+    for (int i = 0; i < 20; ++i) {
+        all.push_back(std::make_unique<feed_log>());
+        n.until_bound(*all.back());
+        run_until(n.io, [&] { return !all.back()->items.empty(); });
+        BOOST_TEST(all.back()->items.front().value.text == value(1));
+    }
+    BOOST_TEST(links() == 1);
+    n.car->update("place", 2);
+    const auto all_have = [&](std::size_t count) {
+        return std::all_of(all.begin(), all.end(), [count](const auto& f) { return f->bodies().size() == count; });
+    };
+    run_until(n.io, [&] { return all_have(1); });
+    all.erase(all.begin(), all.begin() + 19); // the one that made it among them
+    run_ready(n.io);
+    n.car->update("place", 3);
+    run_until(n.io, [&] { return all_have(2); });
+    feed_log thinned; // what it is to be sent is not the same
+    n.until_bound(thinned, "car1:place", cles::bind_options{}.every(10ms));
+    BOOST_TEST(links() == 2);
+    all.clear();
+    thinned.close();
+    run_ready(n.io);
+    n.car->update("place", 4);
+    run_ready(n.io);
+    answer<> told;
+    n.tower->async_pull("self:cles/metrics", told.take());
+    run_until(n.io, [&] { return told.done(); });
+    BOOST_TEST(told.value.text.find("\"updates_dropped\":0,") != std::string::npos, told.value.text);
+}
+
+BOOST_DATA_TEST_CASE(feeds_that_share_a_binding_come_back_together, two_carriers, kind) {
+    nodes n{kind};
+    feed_log one;
+    feed_log two;
+    n.until_bound(one);
+    n.until_bound(two);
+    n.restart();
+    n.car->update("place", 1);
+    for (const auto* each : {&one, &two}) {
+        run_until(n.io, [&] { return each->count(feed_event::rebound) == 1; });
+        BOOST_TEST(each->count(feed_event::lost) == 1U);
+        run_until(n.io, [&] { return each->items.back().value.text == value(1); });
+    }
+    n.car->update("place", 2);
+    run_until(n.io, [&] { return one.bodies().size() == 1 && two.bodies().size() == 1; });
+    BOOST_TEST(one.bodies().back() == value(2));
+    BOOST_TEST(two.bodies().back() == value(2));
+}
+
 BOOST_DATA_TEST_CASE(a_closed_feed_is_unbound_at_the_publisher, carriers, kind) {
     nodes n{kind};
     feed_log feed;
@@ -315,6 +375,112 @@ std::string answer_bind(scripted_peer& publisher, std::string_view last = "{}") 
 std::string update(int seq, std::string_view epoch, int value) {
     return "UPDATE car1:place seq=" + std::to_string(seq) + " epoch=" + std::string{epoch} +
            " {\"value\":" + std::to_string(value) + "}\n";
+}
+
+std::string id_of(const std::string& request) {
+    const auto at = request.find("id=");
+    return request.substr(at, request.find(' ', at) - at);
+}
+
+// A feed that is bound, and one that joins it, at a publisher that says which features it has.
+struct joined {
+    explicit joined(std::string_view features, const cles::bind_options& options = {}) {
+        one.bind(tower, "car1:place");
+        publisher = std::make_unique<scripted_peer>(listener.accept());
+        answer_bind(*publisher);
+        run_until(io, [&] { return one.bound; });
+        two.bind(tower, "car1:place", options);
+        const auto asked = publisher->line();
+        BOOST_TEST(asked.starts_with("PULL self:cles id="), asked);
+        publisher->send(id_of(asked) + " {\"features\":" + std::string{features} + "}\n");
+        asked_again = publisher->line();
+        BOOST_TEST(asked_again.starts_with("BIND car1:place id="), asked_again);
+    }
+
+    boost::asio::io_context io;
+    scripted_listener listener{io};
+    cles::service tower{io, {.name = "tower", .peers = {{"car1", listener.url()}}}};
+    feed_log one;
+    feed_log two;
+    std::unique_ptr<scripted_peer> publisher;
+    std::string asked_again;
+};
+
+// What is queued for the link is older than the value that the second BIND is answered with.
+BOOST_AUTO_TEST_CASE(a_feed_that_joins_gets_nothing_older_than_its_current_value) {
+    joined at{R"(["mark"])"};
+    BOOST_TEST(at.asked_again.find(" mark=yes") != std::string::npos, at.asked_again);
+    at.publisher->send(id_of(at.asked_again) + " seq=10 epoch=0000000a " + value(10) + "\n" + update(9, "0000000a", 9) +
+                       update(10, "0000000a", 10) + update(11, "0000000a", 11));
+    run_until(at.io, [&] { return at.one.bodies().size() == 3 && at.two.bodies().size() == 1; });
+    BOOST_TEST((at.two.items.front().kind == feed_event::current));
+    BOOST_TEST(at.two.items.front().value.text == value(10));
+    BOOST_TEST(at.two.bodies().front() == value(11));
+    BOOST_TEST(at.two.missed() == 0U);
+    feed_log third; // the publisher is asked once what it can do
+    third.bind(at.tower, "car1:place");
+    const auto asked = answer_bind(*at.publisher);
+    BOOST_TEST(asked.starts_with("BIND car1:place id="), asked);
+    run_until(at.io, [&] { return third.bound; });
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_that_joins_and_is_refused_leaves_the_other_bound) {
+    joined at{"[]"};
+    BOOST_TEST(at.asked_again.find(" mark=yes") == std::string::npos, at.asked_again);
+    at.publisher->send(id_of(at.asked_again) + R"( {"error":"denied","message":"no"})" + "\n");
+    run_until(at.io, [&] { return at.two.binds == 1; });
+    BOOST_TEST(at.two.code == errc::denied);
+    at.publisher->send(update(1, "0000000a", 1));
+    run_until(at.io, [&] { return at.one.bodies().size() == 1; });
+    at.one.close();
+    const auto next = at.publisher->line(); // nothing has been unbound before
+    BOOST_TEST(next.find("lease=0") != std::string::npos, next);
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_that_is_refused_unbinds_what_another_has_left_to_it) {
+    joined at{"[]"};
+    at.one.close(); // the binding stays for the other
+    run_ready(at.io);
+    at.publisher->send(id_of(at.asked_again) + R"( {"error":"busy","message":"no"})" + "\n");
+    run_until(at.io, [&] { return at.two.binds == 1; });
+    const auto next = at.publisher->line();
+    BOOST_TEST(next.find("lease=0") != std::string::npos, next);
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_that_joins_has_a_deadline_of_its_own) {
+    joined at{"[]", cles::bind_options{}.deadline(50ms)};
+    run_until(at.io, [&] { return at.two.binds == 1; });
+    BOOST_TEST(at.two.code == errc::deadline);
+    at.publisher->send(id_of(at.asked_again) + " {}\n" + update(1, "0000000a", 1));
+    run_until(at.io, [&] { return at.one.bodies().size() == 1; });
+    at.one.close();
+    const auto next = at.publisher->line();
+    BOOST_TEST(next.find("lease=0") != std::string::npos, next);
+}
+
+BOOST_AUTO_TEST_CASE(a_feed_that_joins_may_be_cancelled_before_it_is_bound) {
+    joined at{"[]"};
+    {
+        boost::asio::cancellation_signal signal;
+        int ended = 0;
+        at.tower.async_bind("car1:place",
+                            boost::asio::bind_cancellation_slot(
+                                signal.slot(), [&](boost::system::error_code code, const cles::feed<cles::json_text>&) {
+                                    BOOST_TEST(code == errc::cancelled);
+                                    ++ended;
+                                }));
+        const auto third = at.publisher->line();
+        signal.emit(boost::asio::cancellation_type::terminal);
+        run_until(at.io, [&] { return ended == 1; });
+        at.publisher->send(id_of(at.asked_again) + " " + value(1) + "\n" + id_of(third) + " {}\n" +
+                           update(2, "0000000a", 2));
+    }
+    run_until(at.io, [&] { return at.one.bodies().size() == 1 && at.two.bodies().size() == 1; });
+    BOOST_TEST(at.two.items.front().value.text == value(1));
+    at.one.close();
+    at.two.close();
+    const auto next = at.publisher->line();
+    BOOST_TEST(next.find("lease=0") != std::string::npos, next);
 }
 
 BOOST_AUTO_TEST_CASE(what_is_missing_shows_as_a_gap_and_what_is_old_does_not_show) {

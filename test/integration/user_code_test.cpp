@@ -359,15 +359,18 @@ BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_
     check_that_three_are_called(w, does, calls);
 }
 
-BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_deed), does) {
+// Those of one noun share a binding.
+BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_deed) * data::make({false, true}), does,
+                     share) {
     for (const auto where : {place::reply, place::lost, place::cancelled, place::stop}) {
         BOOST_TEST_CONTEXT("at " << where) {
             world w;
             std::vector<std::unique_ptr<cles::feed<cles::json_text>>> feeds;
-            for (const auto* noun : {"car2:place", "car2:place1", "car2:place2"}) {
-                w.tower->async_bind(noun, [&](boost::system::error_code, cles::feed<cles::json_text> made) {
-                    feeds.push_back(std::make_unique<cles::feed<cles::json_text>>(std::move(made)));
-                });
+            for (const std::string noun : {"car2:place", "car2:place1", "car2:place2"}) {
+                w.tower->async_bind(share ? "car2:place" : noun,
+                                    [&](boost::system::error_code, cles::feed<cles::json_text> made) {
+                                        feeds.push_back(std::make_unique<cles::feed<cles::json_text>>(std::move(made)));
+                                    });
             }
             w.until([&] { return feeds.size() == 3; });
             std::array<int, 3> calls{};
@@ -445,6 +448,60 @@ BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_dee
     BOOST_TEST(b.code.failed() == ended);
     BOOST_TEST(a.calls == 1);
     BOOST_TEST(b.calls == 1);
+}
+
+// It goes with its operation, or behind it; never inside a call of the library.
+BOOST_DATA_TEST_CASE(what_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
+                     does) {
+    if (does == deed::throws) { // no destructor does
+        return;
+    }
+    for (const bool sent : {false, true}) { // or it waits for its link
+        if (sent && where != place::cancelled && where != place::stop) {
+            continue;
+        }
+        world w;
+        int calls = 0;
+        const std::string node = where == place::not_connected                      ? "nowhere"
+                                 : where == place::reply || where == place::refusal ? "car2"
+                                                                                    : "car1";
+        if (where == place::refusal) {
+            w.car = std::make_unique<cles::service>(w.io, listening("car2"));
+            w.tower->set_peer("car2", w.car->endpoints().front());
+        }
+        {
+            cles::call_options options;
+            options.deadline(where == place::deadline ? 30ms : 20s);
+            options.on_progress([doing = std::make_shared<doer>(w, does)](double, std::string_view) {});
+            w.tower->async_delegate(
+                node + ":work", cles::json_text{}, options,
+                asio::bind_cancellation_slot(w.second.slot(),
+                                             [&](boost::system::error_code, const cles::json_text&) { ++calls; }));
+        }
+        if (where == place::lost || sent) {
+            auto peer = w.silent.accept();
+            peer.line();
+            if (where == place::lost) {
+                peer.reset();
+            } else if (where == place::stop) {
+                w.tower->stop();
+            } else {
+                w.second.emit(asio::cancellation_type::terminal);
+            }
+            BOOST_TEST(w.acted == 0);
+            w.until([&] { return w.acted == 1; });
+        } else {
+            if (where == place::stop) {
+                w.tower->stop();
+            } else if (where == place::cancelled) {
+                w.second.emit(asio::cancellation_type::terminal);
+            }
+            BOOST_TEST(w.acted == 0);
+            w.until([&] { return w.acted == 1; });
+        }
+        BOOST_TEST(calls == 1);
+        w.check_that_it_lives(does);
+    }
 }
 
 BOOST_DATA_TEST_CASE(who_is_told_to_stop_may_do_anything, data::make(every_deed), does) {

@@ -80,7 +80,10 @@ class faulty_link final : public link, public link_events, public std::enable_sh
     [[nodiscard]] std::uint64_t sent() const noexcept override { return inside_->sent(); }
     [[nodiscard]] std::uint64_t received() const noexcept override { return inside_->received(); }
     void pause(bool stop) override { inside_->pause(stop); }
-    void finish() override { inside_->finish(); }
+    void finish() override {
+        finished_ = true;
+        inside_->finish();
+    }
     void close() override {
         silent_ = true;
         inside_->close();
@@ -98,6 +101,7 @@ class faulty_link final : public link, public link_events, public std::enable_sh
         } else if (plan_.how() == fault::ended) {
             ended_ = true;
             owner->on_end();
+            lose_if_kept();
         } else {
             fail();
         }
@@ -132,9 +136,21 @@ class faulty_link final : public link, public link_events, public std::enable_sh
   private:
     void fail() {
         silent_ = true;
+        lose_later();
+    }
+    void lose_later() {
         asio::post(executor_, [self = shared_from_this()] {
             self->inside_->close();
             self->on_lost(asio::error::connection_reset);
+        });
+    }
+    // What this end says to the end of stream still arrives. But the other end has not ended its side, so that what it
+    // writes from then on would reset the link, as what it wrote just now does.
+    void lose_if_kept() {
+        asio::post(executor_, [self = shared_from_this()] {
+            if (!self->finished_ && !self->silent_) {
+                self->lose_later();
+            }
         });
     }
 
@@ -144,6 +160,7 @@ class faulty_link final : public link, public link_events, public std::enable_sh
     std::shared_ptr<link_events> owner_{};
     bool silent_ = false; // nothing passes any more
     bool ended_ = false;
+    bool finished_ = false; // by this end
 };
 
 namespace {

@@ -10,7 +10,7 @@ namespace cles::test {
 enum class fault : std::uint8_t {
     lost,  ///< the link is lost there; a dial is refused
     cut,   ///< of what is written there, the first half arrives, and then the link is lost
-    ended, ///< the peer seems to end its side there
+    ended, ///< the peer seems to end its side there; since it goes on writing, a link that is kept is lost soon after
 };
 
 std::ostream& operator<<(std::ostream& out, fault kind);

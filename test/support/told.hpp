@@ -58,7 +58,7 @@ class told_feed final : public core::subscription {
         : subscription(std::move(target), std::move(path), thinned, limits{}.publishers), tell_(std::move(tell)) {}
 
   private:
-    bool on_event(const detail::raw_event& event) override {
+    bool on_event(const detail::raw_event& event, core::feed_mailbox::hand_over) override {
         if (!event.has_json()) {
             return false;
         }

@@ -2,6 +2,7 @@
 #include <cles/error.hpp>
 
 #include "core/completion_queue.hpp"
+#include "shell/probe_reply.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -186,6 +187,11 @@ BOOST_FIXTURE_TEST_CASE(an_answer_is_told_at_once_and_what_is_thrown_leaves_the_
     BOOST_TEST((said == lines{"1 has {}", "2 failed busy: full"}));
     BOOST_CHECK_THROW(node.host->completions.rethrow(), thrown_by_test);
     BOOST_TEST(run() == 0);
+}
+
+BOOST_AUTO_TEST_CASE(the_answer_to_a_probe_is_the_librarys_own) {
+    const cles::detail::pending_ptr probe{new cles::shell::probe_reply{{}, 1, "tcp://127.0.0.1:1"}};
+    BOOST_TEST(!probe->calls_user());
 }
 
 BOOST_AUTO_TEST_SUITE_END()

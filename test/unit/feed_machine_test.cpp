@@ -127,6 +127,38 @@ BOOST_AUTO_TEST_CASE(the_last_value_comes_as_the_first_event) {
     BOOST_TEST(next() == "update 5 {}");
 }
 
+// Each has a mailbox of its own.
+BOOST_AUTO_TEST_CASE(of_feeds_that_share_a_binding_one_that_overflows_loses_nothing_for_the_other) {
+    cles::core::feed_machine full{host, deadlines, completions, cles::limits{.feed = 2}, "car1", "speed", false, 7};
+    cles::core::subscriptions both;
+    for (auto* each : {&feed, &full}) {
+        auto [operation, result] = cles::test::record();
+        each->share_by("every=0");
+        BOOST_TEST(both.add(*each));
+        each->start(std::move(operation));
+        each->on_bound("{}");
+    }
+    for (int seq = 1; seq <= 4; ++seq) {
+        const auto line = "UPDATE car1:speed seq=" + std::to_string(seq) + " epoch=0000000a {}";
+        cles::protocol::request_line update;
+        cles::protocol::malformed_request error;
+        BOOST_REQUIRE(cles::protocol::parse_request(line, update, error));
+        BOOST_TEST(both.deliver(both.find(line, update)));
+        BOOST_TEST(next() == "update " + std::to_string(seq) + " {}");
+    }
+    const auto next_of_full = [&full] {
+        wait w;
+        BOOST_TEST(full.mail().next(event_ptr{&w}));
+        full.mail().pump();
+        return w.text;
+    };
+    BOOST_TEST(next_of_full() == "gap 2");
+    BOOST_TEST(next_of_full() == "update 3 {}");
+    both.remove(full);
+    full.close(cles::errc::cancelled);
+    both.remove(feed);
+}
+
 BOOST_AUTO_TEST_CASE(a_value_that_says_which_update_it_is_is_told_as_one_where_it_is_news) {
     bound();
     update(seventh.seq, "5f3a09c1", "{\"v\":2}");

@@ -317,4 +317,26 @@ BOOST_AUTO_TEST_CASE(a_noun_with_a_lease_does_not_retire) {
     BOOST_TEST(few.node.host->published.find("job/1") == nullptr);
 }
 
+// The log is the program's, and may do anything.
+BOOST_AUTO_TEST_CASE(that_an_update_is_too_large_is_logged_when_nothing_is_looked_at_any_more) {
+    std::vector<cles::core::completion> due;
+    std::vector<std::string> logged;
+    test_node noisy{{},
+                    {},
+                    [&](cles::log_level, const cles::log_entry& what) { logged.emplace_back(what.text); },
+                    [&](cles::core::completion c) { due.push_back(std::move(c)); }};
+    cles::core::group_bindings in_it{*noisy.host, out, 7U};
+    cles::protocol::request_line r;
+    cles::protocol::malformed_request why;
+    BOOST_REQUIRE(cles::protocol::parse_request("BIND all:speed", r, why));
+    in_it.bind(source_at(1), r, noisy.clock.now());
+    noisy.publish_now("speed", "[\"" + std::string(2000, 'x') + "\"]");
+    BOOST_TEST(noisy.counts().updates_too_large == 1U);
+    BOOST_TEST(logged.empty());
+    BOOST_REQUIRE(due.size() == 1U);
+    due.front()();
+    BOOST_REQUIRE(logged.size() == 1U);
+    BOOST_TEST(logged.front().starts_with("too_large: UPDATE car1:speed"), logged.front());
+}
+
 BOOST_AUTO_TEST_SUITE_END()

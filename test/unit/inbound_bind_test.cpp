@@ -8,6 +8,7 @@
 #include <chrono>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace inbound_bind {
@@ -297,19 +298,23 @@ BOOST_AUTO_TEST_CASE(a_publisher_that_waits_for_room_goes_on_when_the_slow_binde
 
 BOOST_AUTO_TEST_CASE(a_publisher_that_waits_for_room_goes_on_when_the_slow_binder_leaves) {
     for (const bool by_reset : {true, false}) {
-        cles::test::test_link slow{node};
+        std::vector<cles::core::completion> due;
+        cles::test::test_node waits{{}, {}, {}, [&](cles::core::completion c) { due.push_back(std::move(c)); }};
+        cles::test::test_link slow{waits};
+        waits.open("pose");
         slow.ask("BIND car1:pose keep=1");
         slow.takes = false;
-        node.publish_now("pose", "[1]");
+        waits.publish_now("pose", "[1]");
         auto [operation, result] = cles::test::record();
-        BOOST_TEST(!node.host->published.publish_when_room("pose", "[2]", operation));
+        BOOST_TEST(!waits.host->published.publish_when_room("pose", "[2]", operation));
         if (by_reset) {
             slow.reset();
         } else {
             slow.ask("BIND car1:pose lease=0");
         }
         BOOST_TEST(!result->ended); // not from inside what is said on a link
-        node.drain();
+        BOOST_REQUIRE(due.size() == 1U);
+        due.front()();
         BOOST_TEST(result->ended);
     }
 }

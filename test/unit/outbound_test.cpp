@@ -252,16 +252,26 @@ BOOST_AUTO_TEST_CASE(an_answer_that_is_longer_than_a_line_fails_its_request_and_
     BOOST_TEST((eight->code == errc::unavailable));
 }
 
-BOOST_AUTO_TEST_CASE(what_waits_can_be_taken_out_without_a_word) {
-    const auto result = send(7);
-    {
-        const auto taken = link.session().asking().take_all();
-        BOOST_TEST(taken.size() == 1U);
-        BOOST_TEST(!result->ended);
-    }
-    BOOST_TEST(result->discarded);
-    BOOST_TEST(in_flight() == 0U);
-    BOOST_TEST(node.host->deadlines.size() == 0U);
+BOOST_AUTO_TEST_CASE(what_waits_when_the_node_stops_leaves_by_the_completion_queue_with_what_reports_its_progress) {
+    std::vector<cles::core::completion> due;
+    cles::test::test_node stopping{{}, {}, {}, [&](cles::core::completion c) { due.push_back(std::move(c)); }};
+    cles::test::test_link to{stopping};
+    auto [operation, result] = cles::test::record();
+    auto kept = std::make_shared<int>(0);
+    const std::weak_ptr<int> report{kept};
+    const auto now = stopping.clock.now();
+    to.session().asking().send({.verb = verb::pull, .noun = "car2:speed", .id = 1}, now + 1s, now, std::move(operation),
+                               [kept = std::move(kept)](double, std::string_view) {});
+    to.session().asking().stop();
+    BOOST_TEST(to.session().asking().in_flight() == 0U);
+    BOOST_TEST(stopping.host->deadlines.size() == 0U);
+    BOOST_TEST(!result->ended);
+    BOOST_TEST(!report.expired());
+    BOOST_REQUIRE(due.size() == 1U);
+    due.front()();
+    BOOST_TEST((result->code == errc::stopped));
+    due.clear();
+    BOOST_TEST(report.expired());
 }
 
 BOOST_AUTO_TEST_CASE(a_session_that_goes_discards_what_waits) {

@@ -9,6 +9,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -27,7 +28,8 @@ using cles::test::recording_binder;
 struct fixture {
     explicit fixture(cles::limits wanted = {})
         : bounds(wanted),
-          all({deadlines, counts, bounds.binding_bytes}, bounds, "car1", "5f3a09c1", [this] { ++wakes; }) {}
+          all({deadlines, counts, bounds.binding_bytes}, bounds, completions, "car1", "5f3a09c1", [this] { ++wakes; }) {
+    }
 
     void bind(recording_binder& b, std::string_view path, std::uint32_t keep = 64) {
         all.open(path).bind(b, {.keep = keep});
@@ -37,8 +39,8 @@ struct fixture {
         tell();
     }
     void tell() {
-        while (auto result = all.next_result()) {
-            result->tell();
+        for (; !due.empty(); due.pop_front()) {
+            due.front()();
         }
     }
     /// Publishes when there is room. Null: at once.
@@ -52,6 +54,8 @@ struct fixture {
     cles::core::counters counts;
     cles::limits bounds;
     int wakes = 0;
+    std::deque<cles::core::completion> due;
+    cles::core::completion_queue completions{[this](cles::core::completion c) { due.push_back(std::move(c)); }};
     cles::core::publications all;
 };
 
@@ -301,8 +305,8 @@ BOOST_AUTO_TEST_CASE(a_noun_cannot_retire_or_be_published_while_a_value_of_it_is
 struct bounded : fixture {
     bounded() {
         all_ = std::make_unique<cles::core::publications>(
-            cles::core::topic_context{deadlines, counts, bounds.binding_bytes, values}, bounds, "car1", "5f3a09c1",
-            [] {});
+            cles::core::topic_context{deadlines, counts, bounds.binding_bytes, values}, bounds, completions, "car1",
+            "5f3a09c1", [] {});
     }
     static std::string large(std::size_t bytes) { return "[\"" + std::string(bytes, 'x') + "\"]"; }
 
@@ -416,6 +420,30 @@ BOOST_AUTO_TEST_SUITE(when_room)
 BOOST_AUTO_TEST_CASE(it_publishes_at_once_where_there_is_room) {
     BOOST_TEST(when_room("speed", "[1]") == nullptr);
     BOOST_TEST(all.find("speed")->last_body() == "[1]");
+}
+
+// With all else that completes, in the order in which it does.
+BOOST_AUTO_TEST_CASE(what_comes_of_it_leaves_by_the_completion_queue) {
+    auto [operation, published] = cles::test::record();
+    std::vector<std::string> seen;
+    completions.call([&] { seen.push_back(published->ended ? "late" : "before"); });
+    BOOST_TEST(all.publish_when_room("speed", "[1]", operation));
+    completions.call([&] { seen.push_back(published->ended ? "behind" : "early"); });
+    BOOST_TEST(!published->ended);
+    BOOST_TEST(due.size() == 3U);
+    tell();
+    BOOST_TEST(seen == (std::vector<std::string>{"before", "behind"}), boost::test_tools::per_element());
+    recording_binder slow;
+    bind(slow, "speed", 1);
+    slow.room = 0;
+    when_room("speed", "[2]");
+    drain();
+    auto [waiting, withdrawn] = cles::test::record();
+    BOOST_TEST(!all.publish_when_room("speed", "[3]", waiting, 7));
+    BOOST_TEST(all.cancel(7));
+    BOOST_TEST(!withdrawn->ended);
+    tell();
+    BOOST_TEST((withdrawn->code == errc::cancelled));
 }
 
 BOOST_AUTO_TEST_CASE(it_waits_until_every_binders_queue_has_room) {

@@ -22,7 +22,7 @@ class listener final : public cles::core::subscription {
     std::string heard;
 
   private:
-    bool on_event(const cles::detail::raw_event& event) override {
+    bool on_event(const cles::detail::raw_event& event, cles::core::feed_mailbox::hand_over) override {
         if (!event.has_json()) {
             return false;
         }

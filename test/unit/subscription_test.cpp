@@ -15,14 +15,18 @@ using cles::feed_event;
 class recorder final : public cles::core::subscription {
   public:
     using subscription::subscription;
+    [[nodiscard]] bool is_bound() const noexcept override { return bound; }
 
     std::vector<std::string> events;
+    std::vector<cles::core::feed_mailbox::hand_over> when; // each was to be handed over
+    bool bound = true;
 
   private:
-    bool on_event(const cles::detail::raw_event& event) override {
+    bool on_event(const cles::detail::raw_event& event, cles::core::feed_mailbox::hand_over how) override {
         if (!event.has_json()) {
             return false;
         }
+        when.push_back(how);
         if (event.kind == feed_event::gap) {
             events.push_back("gap of " + std::to_string(event.missed));
         } else {
@@ -32,6 +36,16 @@ class recorder final : public cles::core::subscription {
         return true;
     }
 };
+
+/// Hands an update to whom it is for. False where it is news to nobody.
+bool hear(cles::core::subscriptions& all, std::uint64_t seq) {
+    const auto line = "UPDATE car1:speed seq=" + std::to_string(seq) + " epoch=0000000a {}";
+    cles::protocol::request_line update;
+    cles::protocol::malformed_request error;
+    BOOST_REQUIRE(cles::protocol::parse_request(line, update, error));
+    const auto found = all.find(line, update);
+    return found.whose != nullptr && all.deliver(found);
+}
 
 bool take(recorder& s, std::string_view line) {
     cles::protocol::request_line update;
@@ -150,20 +164,12 @@ BOOST_AUTO_TEST_CASE(those_of_one_noun_and_the_same_terms_share_a_binding) {
     BOOST_TEST(!all.admits(none));
     BOOST_TEST(all.add(two));
     BOOST_TEST(!all.add(none));
-    const auto hear = [&all](std::uint64_t seq) {
-        const auto line = "UPDATE car1:speed seq=" + std::to_string(seq) + " epoch=0000000a {}";
-        cles::protocol::request_line update;
-        cles::protocol::malformed_request error;
-        BOOST_REQUIRE(cles::protocol::parse_request(line, update, error));
-        const auto found = all.find(line, update);
-        return found.whose != nullptr && all.deliver(found);
-    };
-    BOOST_TEST(hear(1));
+    BOOST_TEST(hear(all, 1));
     BOOST_TEST(one.events.size() == 1U);
     BOOST_TEST(two.events.size() == 1U);
-    BOOST_TEST(!hear(1));
+    BOOST_TEST(!hear(all, 1));
     all.remove(one);
-    BOOST_TEST(hear(2));
+    BOOST_TEST(hear(all, 2));
     BOOST_TEST(one.events.size() == 1U);
     BOOST_TEST(two.events.size() == 2U);
     BOOST_TEST(all.has("car1", "speed"));
@@ -171,6 +177,75 @@ BOOST_AUTO_TEST_CASE(those_of_one_noun_and_the_same_terms_share_a_binding) {
     BOOST_TEST(all.empty());
     BOOST_TEST(all.add(thinned));
     all.remove(thinned);
+}
+
+// User code runs in the last call alone, when nothing is looked at any more.
+BOOST_AUTO_TEST_CASE(of_those_that_share_all_but_the_last_are_handed_an_update_later) {
+    using cles::core::feed_mailbox;
+    cles::core::subscriptions all;
+    recorder one{"car1", "speed", false, 16};
+    recorder two{"car1", "speed", false, 16};
+    for (auto* each : {&one, &two}) {
+        each->share_by("every=0");
+        all.add(*each);
+    }
+    BOOST_TEST(hear(all, 1));
+    BOOST_TEST((one.when == std::vector{feed_mailbox::hand_over::later}));
+    BOOST_TEST((two.when == std::vector{feed_mailbox::hand_over::now}));
+    all.remove(two);
+    BOOST_TEST(hear(all, 2));
+    BOOST_TEST((one.when.back() == feed_mailbox::hand_over::now));
+}
+
+BOOST_AUTO_TEST_CASE(what_comes_for_others_before_its_own_answer_is_not_for_one_that_shares) {
+    cles::core::subscriptions all;
+    recorder one{"car1", "speed", false, 16};
+    recorder two{"car1", "speed", false, 16};
+    for (auto* each : {&one, &two}) {
+        each->share_by("every=0");
+        each->bound = false;
+        all.add(*each);
+    }
+    BOOST_TEST(!all.has_bound_for(two));
+    BOOST_TEST(!hear(all, 1));
+    two.bound = true; // the answers may come in any order
+    BOOST_TEST(!all.has_bound_for(two));
+    BOOST_TEST(all.has_bound_for(one));
+    BOOST_TEST(hear(all, 2));
+    BOOST_TEST(one.events.empty());
+    BOOST_TEST(two.events.size() == 1U);
+    two.bound = false;
+    BOOST_TEST(!hear(all, 3));
+}
+
+// Whoever leaves leaves the binding to the others, of which each may turn out to be the last.
+BOOST_AUTO_TEST_CASE(who_has_shared_a_binding_knows_it_until_it_is_on_a_link_anew) {
+    cles::core::subscriptions all;
+    recorder one{"car1", "speed", false, 16};
+    recorder two{"car1", "speed", false, 16};
+    one.share_by("every=0");
+    two.share_by("every=0");
+    all.add(one);
+    BOOST_TEST(!one.has_shared());
+    all.add(two);
+    all.remove(one);
+    BOOST_TEST(one.has_shared());
+    BOOST_TEST(two.has_shared());
+    all.remove(two);
+    BOOST_TEST(two.has_shared());
+    all.add(one);
+    BOOST_TEST(!one.has_shared());
+    all.remove(one);
+}
+
+BOOST_AUTO_TEST_CASE(updates_up_to_a_mark_are_old_and_what_is_missing_behind_it_is_a_gap) {
+    recorder s{"car1", "speed", false, 16};
+    s.skip_to({.seq = 10, .epoch = 0xa});
+    BOOST_TEST(!take(s, "UPDATE car1:speed seq=9 epoch=0000000a"));
+    BOOST_TEST(!take(s, "UPDATE car1:speed seq=10 epoch=0000000a"));
+    BOOST_TEST(take(s, "UPDATE car1:speed seq=13 epoch=0000000a"));
+    const std::vector<std::string> expected{"gap of 2", "car1 13 {}"};
+    BOOST_TEST(s.events == expected, boost::test_tools::per_element());
 }
 
 BOOST_AUTO_TEST_SUITE_END()

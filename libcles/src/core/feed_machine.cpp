@@ -29,7 +29,7 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
     // The events are queued before the caller learns that it is bound, so that it finds them in their order.
     const std::string body{last};
     if (was_bound_) {
-        on_event({.kind = feed_event::rebound});
+        mail_.put({.kind = feed_event::rebound});
     }
     was_bound_ = true;
     if (mark) {
@@ -39,7 +39,7 @@ void feed_machine::on_bound(std::string_view last, const std::optional<update_ma
         }
     }
     if (body != "{}") {
-        on_event({.kind = feed_event::current, .body = body, .checked = true});
+        mail_.put({.kind = feed_event::current, .body = body, .checked = true});
     }
     if (first_) {
         completions_.succeed(std::move(first_), body);
@@ -104,7 +104,7 @@ void feed_machine::on_lost(std::string_view why, time_point now) {
         return;
     }
     pause(now);
-    on_event({.kind = feed_event::lost, .text = why});
+    mail_.put({.kind = feed_event::lost, .text = why});
 }
 
 void feed_machine::pause(time_point now) {

@@ -86,13 +86,17 @@ class feed_machine final : public subscription, private deadline, private renewa
     [[nodiscard]] waiting abandon();
     [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
     [[nodiscard]] bool is_bound() const noexcept override { return state_ == state::bound; }
+    /// It is bound, or was.
+    [[nodiscard]] bool was_bound() const noexcept { return was_bound_; }
     /// Who waits for the answer to the first BIND has not been told yet.
     [[nodiscard]] bool is_starting() const noexcept { return first_ != nullptr; }
 
   private:
     enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
 
-    bool on_event(const detail::raw_event& event) override { return mail_.put(event); }
+    bool on_event(const detail::raw_event& event, feed_mailbox::hand_over when) override {
+        return mail_.put(event, when);
+    }
     void on_deadline(time_point now) override;
     void renew(time_point until) override { host_.renew(*this, until); }
     void pause(time_point now);

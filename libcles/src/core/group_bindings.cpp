@@ -158,10 +158,10 @@ void group_bindings::note_too_large(std::string_view line) {
         return;
     }
     noted_at_ = now;
-    node_.say(log_level::warning, std::string{wire_name(errc::too_large)} + ": " +
-                                      std::string{line.substr(0, line.find(" seq="))} + " has " +
-                                      std::to_string(line.size()) + " bytes, and by multicast at most " +
-                                      std::to_string(protocol::datagram_bytes) + " are sent");
+    node_.say_soon(log_level::warning, std::string{wire_name(errc::too_large)} + ": " +
+                                           std::string{line.substr(0, line.find(" seq="))} + " has " +
+                                           std::to_string(line.size()) + " bytes, and by multicast at most " +
+                                           std::to_string(protocol::datagram_bytes) + " are sent");
 }
 
 } // namespace cles::core

@@ -50,7 +50,8 @@ node::node(node_setup setup, const core::clock& source, std::function<void()> wa
       completions(std::move(setup.complete)), memory(bounds.memory),
       kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
       kept_requests(std::make_shared<memory_account>(memory)), others(name, setup.epoch, deadlines, bounds.peers),
-      published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, name, epoch, std::move(wake)),
+      published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch,
+                std::move(wake)),
       remembered{.limit = bounds.remembered} {
     others.begin(setup.pool, started);
 }
@@ -72,6 +73,17 @@ void node::say(log_level level, const log_entry& what) const noexcept {
             log(level, what);
         }
     } catch (...) { // there is nobody to tell
+    }
+}
+
+void node::say_soon(log_level level, std::string what, std::string peer) {
+    if (log) {
+        completions.call([log = log, level, what = std::move(what), peer = std::move(peer)] {
+            try {
+                log(level, {what, peer});
+            } catch (...) { // there is nobody to tell
+            }
+        });
     }
 }
 

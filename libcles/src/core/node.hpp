@@ -82,6 +82,8 @@ struct node {
     // What the user's functions throw stays inside these.
     [[nodiscard]] node_load load_now() const noexcept;
     void say(log_level level, const log_entry& what) const noexcept;
+    /// The same from inside a loop over what the log's reader could change.
+    void say_soon(log_level level, std::string what, std::string peer = {});
 };
 
 /// What it offers: the value of `tasks` in the reply to `PULL self:cles`.

@@ -166,6 +166,7 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         protocol::failure why;
         if (protocol::parse_failure(reply.body, why)) {
             auto* operation = e->operation.release();
+            const auto progress = std::move(e->progress); // the user's too: it goes when the operation has ended
             recycle(std::move(e));
             node_.completions.now([&] { operation->refuse(why.code, why.message, reply.body); });
             return;
@@ -182,6 +183,7 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         }
     }
     if (ended) {
+        const auto progress = std::move(e->progress);
         recycle(std::move(e));
     } else {
         ++node_.counts.replies_dropped;
@@ -213,13 +215,12 @@ void outbound::lose(errc why, std::string_view message) {
     }
 }
 
-std::vector<detail::pending_ptr> outbound::take_all() {
-    std::vector<detail::pending_ptr> taken;
-    for (auto& [id, e] : std::exchange(waiting_, {})) {
+void outbound::stop() {
+    for (const auto& [id, e] : std::exchange(waiting_, {})) {
         node_.deadlines.disarm(*e);
-        taken.push_back(std::move(e->operation));
+        node_.completions.put(completion{completion::failure{std::move(e->operation), errc::stopped,
+                                                             "the service has been stopped", std::move(e->progress)}});
     }
-    return taken;
 }
 
 } // namespace cles::core

@@ -18,10 +18,10 @@ std::string_view task_of(std::string_view path) { return path.substr(0, path.fin
 
 } // namespace
 
-publications::publications(topic_context shared, const cles::limits& bounds, std::string publisher, std::string epoch,
-                           std::function<void()> wake)
-    : shared_(std::move(shared)), bounds_(bounds), publisher_(std::move(publisher)), epoch_(std::move(epoch)),
-      wake_(std::move(wake)) {}
+publications::publications(topic_context shared, const cles::limits& bounds, completion_queue& completions,
+                           std::string publisher, std::string epoch, std::function<void()> wake)
+    : shared_(std::move(shared)), bounds_(bounds), completions_(completions), publisher_(std::move(publisher)),
+      epoch_(std::move(epoch)), wake_(std::move(wake)) {}
 
 topic* publications::find(std::string_view path) noexcept {
     if (recent_ != nullptr && recent_->path() == path) {
@@ -226,7 +226,7 @@ bool publications::publish_when_room(std::string_view path, std::string_view bod
         return false;
     }
     publish_lossless(path, body);
-    keep({.operation = std::move(operation)});
+    completions_.succeed(std::move(operation), "{}");
     return true;
 }
 
@@ -236,46 +236,33 @@ bool publications::cancel(std::uint64_t ticket) {
         const auto found =
             std::find_if(waiting.begin(), waiting.end(), [ticket](const auto& w) { return w.ticket == ticket; });
         if (found != waiting.end()) {
-            publication_result result{
-                .operation = std::move(found->operation), .code = errc::cancelled, .why = "the update was withdrawn"};
+            auto operation = std::move(found->operation);
             waiting.erase(found);
-            keep(std::move(result));
+            completions_.fail(std::move(operation), errc::cancelled, "the update was withdrawn");
             return true;
         }
     }
     return false;
 }
 
-// Told later, one by one: a publisher that goes on at once may publish again, or throw, or end it all.
-void publications::keep(publication_result result) {
-    results_.push_back(std::move(result));
-    if (results_.size() == 1) {
-        wake_();
-    }
-}
-
-std::optional<publication_result> publications::next_result() {
-    if (results_.empty()) {
-        return std::nullopt;
-    }
-    auto next = std::move(results_.front());
-    results_.pop_front();
-    return next;
-}
-
 void publications::admit(topic& t) {
     auto& waiting = t.waiters();
     while (!waiting.empty() && t.has_room()) {
-        publication_result result;
+        boost::system::error_code code;
+        std::string why;
         try {
             publish_lossless(t.path(), waiting.front().body);
         } catch (const error& e) {
-            result.code = e.code();
-            result.why = e.message();
+            code = e.code();
+            why = e.message();
         }
-        result.operation = std::move(waiting.front().operation);
+        auto operation = std::move(waiting.front().operation);
         waiting.pop_front(); // only now: a topic for which nobody waits may go where publishing fails
-        keep(std::move(result));
+        if (code) {
+            completions_.fail(std::move(operation), code, why);
+        } else {
+            completions_.succeed(std::move(operation), "{}");
+        }
     }
 }
 

@@ -4,17 +4,15 @@
 #include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
 
-#include "core/publication_result.hpp"
+#include "core/completion_queue.hpp"
 #include "core/text_map.hpp"
 #include "core/topic.hpp"
 #include "core/topic_source.hpp"
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -35,9 +33,9 @@ struct task_nouns {
 /// ones: those retire for them that nobody is bound to, the one that was used longest ago first.
 class publications final : public topic_source {
   public:
-    /// `wake` is called when there is something to drain or to tell, once until `drain` and until all is told.
-    publications(topic_context shared, const cles::limits& bounds, std::string publisher, std::string epoch,
-                 std::function<void()> wake);
+    /// `wake` is called when there is something to drain, once until `drain`.
+    publications(topic_context shared, const cles::limits& bounds, completion_queue& completions, std::string publisher,
+                 std::string epoch, std::function<void()> wake);
 
     /// Publishes what `write` writes (a body, or a scalar that is wrapped). The path is canonical.
     /// \throws cles::error: `too_large`, `busy`, `failed`; what `write` throws. Nothing is published then, but nouns
@@ -45,17 +43,13 @@ class publications final : public topic_source {
     void publish(std::string_view path, const std::function<void(json_writer&)>& write);
     /// Publishes JSON that is known to be valid and without white space.
     void publish_body(std::string_view path, std::string_view body);
-    /// Publishes a body of any kind now, or once every binder has room, and takes the operation: what comes of it is
-    /// among the results. True: now. \throws as `publish`; the operation is left then
+    /// Publishes a body of any kind now, or once every binder has room, and takes the operation, which ends by the
+    /// completion queue. True: now. \throws as `publish`; the operation is left then
     bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation,
                            std::uint64_t ticket = 0);
     /// Withdraws what waits for room: it is not published, and its operation fails with `cancelled`. False where
     /// nothing of that number waits.
     bool cancel(std::uint64_t ticket);
-    /// The next that has come of `publish_when_room`, to be told by the caller, of each noun in order. None: nobody
-    /// waits for any.
-    [[nodiscard]] std::optional<publication_result> next_result();
-    [[nodiscard]] bool has_results() const noexcept { return !results_.empty(); }
 
     /// Who is told of each topic that is made from now on, before anything is published there; empty: nobody.
     void on_opened(std::function<void(topic&)> told) { opened_ = std::move(told); }
@@ -106,10 +100,10 @@ class publications final : public topic_source {
     void publish_lossless(std::string_view path, std::string_view body);
     void end(topic& t, std::size_t body_at);
     void mark(topic& t);
-    void keep(publication_result result);
 
     topic_context shared_;
     const cles::limits& bounds_;
+    completion_queue& completions_;
     std::string publisher_;
     std::string epoch_;
     std::function<void()> wake_;
@@ -118,7 +112,6 @@ class publications final : public topic_source {
     text_map<std::unique_ptr<topic>> topics_;
     std::uint64_t highest_retired_ = 0; // the highest `seq` that is not remembered any more
     std::vector<topic*> dirty_;
-    std::deque<publication_result> results_;
     std::uint64_t to_binders_ = 0;
     bool lossless_ = false;
     topic* recent_ = nullptr; // most publish the same noun again

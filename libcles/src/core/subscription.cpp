@@ -4,7 +4,6 @@
 #include "core/update_intake.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 namespace cles::core {
 
@@ -19,29 +18,30 @@ bool overlap(std::string_view a, std::string_view b) noexcept {
 
 } // namespace
 
-bool subscription::take(const protocol::request_line& update) {
+bool subscription::take(const protocol::request_line& update, feed_mailbox::hand_over when) {
     return take_in(each_ ? each_->of(update.noun.target) : order_, update, thinned_,
-                   [this](const detail::raw_event& event) { return on_event(event); });
+                   [this, when](const detail::raw_event& event) { return on_event(event, when); });
+}
+
+const std::vector<subscription*>& subscriptions::all_of(std::string_view path) const {
+    static const std::vector<subscription*> none;
+    const auto found = by_path_.find(path);
+    return found == by_path_.end() ? none : found->second;
 }
 
 bool subscriptions::has(std::string_view target, std::string_view path) const {
-    const auto found = by_path_.find(path);
-    return found != by_path_.end() && std::any_of(found->second.begin(), found->second.end(),
-                                                  [&](const auto* s) { return overlap(s->target(), target); });
+    return std::ranges::any_of(all_of(path), [&](const auto* s) { return overlap(s->target(), target); });
+}
+
+bool subscriptions::has_bound_for(const subscription& s) const {
+    return std::ranges::any_of(
+        all_of(s.path()), [&](const auto* other) { return other != &s && other->is_bound() && other->may_share(s); });
 }
 
 bool subscriptions::admits(const subscription& s) const {
-    const auto found = by_path_.find(s.path());
-    return found == by_path_.end() || std::all_of(found->second.begin(), found->second.end(), [&](const auto* other) {
-               return other->may_share(s) || !overlap(other->target(), s.target());
-           });
-}
-
-bool subscriptions::is_shared(const subscription& s) const {
-    const auto found = by_path_.find(s.path());
-    return found != by_path_.end() && std::any_of(found->second.begin(), found->second.end(), [&](const auto* other) {
-               return other != &s && other->may_share(s);
-           });
+    return std::ranges::all_of(all_of(s.path()), [&](const auto* other) {
+        return other->may_share(s) || !overlap(other->target(), s.target());
+    });
 }
 
 bool subscriptions::add(subscription& s) {
@@ -49,7 +49,14 @@ bool subscriptions::add(subscription& s) {
         return false;
     }
     forget_last();
-    sharing_ += is_shared(s) ? 1 : 0;
+    s.has_shared_ = false;
+    for (auto* other : all_of(s.path())) {
+        if (other->may_share(s)) {
+            other->has_shared_ = true;
+            s.has_shared_ = true;
+        }
+    }
+    sharing_ += s.has_shared_ ? 1 : 0;
     by_path_[s.path()].push_back(&s);
     return true;
 }
@@ -58,7 +65,8 @@ void subscriptions::remove(const subscription& s) {
     forget_last();
     const auto found = by_path_.find(s.path());
     if (found != by_path_.end()) {
-        if (std::erase(found->second, &s) != 0 && is_shared(s)) {
+        if (std::erase(found->second, &s) != 0 &&
+            std::ranges::any_of(found->second, [&](const auto* other) { return other->may_share(s); })) {
             --sharing_;
         }
         if (found->second.empty()) {
@@ -88,22 +96,19 @@ bool subscriptions::deliver(const match& found) {
     if (sharing_ == 0) {
         return found.whose->take(*found.update);
     }
-    // A callback may end it, or others.
-    const std::string path{found.whose->path()};
-    const auto& there = by_path_.find(path)->second;
-    std::vector<subscription*> all;
-    std::copy_if(there.begin(), there.end(), std::back_inserter(all), [&](const auto* other) {
-        return other == found.whose || (other->may_share(*found.whose) && other->is_bound());
-    });
+    // User code may end any of them and add others. So the last gets the update when nothing here is looked at any
+    // more, and the others later.
+    subscription* last = nullptr;
     bool taken = false;
-    for (auto* each : all) {
-        const auto now = by_path_.find(path);
-        if (now != by_path_.end() && std::find(now->second.begin(), now->second.end(), each) != now->second.end() &&
-            each->is_bound()) {
-            taken = each->take(*found.update) || taken;
+    for (auto* each : all_of(found.whose->path())) {
+        if ((each == found.whose || each->may_share(*found.whose)) && (each->is_bound() || !each->has_shared_)) {
+            if (last != nullptr) {
+                taken = last->take(*found.update, feed_mailbox::hand_over::later) || taken;
+            }
+            last = each;
         }
     }
-    return taken;
+    return (last != nullptr && last->take(*found.update)) || taken;
 }
 
 subscriptions::match subscriptions::recognise(std::string_view line) noexcept {

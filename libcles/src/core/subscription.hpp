@@ -2,7 +2,9 @@
 #pragma once
 
 #include <cles/feed_event.hpp>
+#include <cles/update_mark.hpp>
 
+#include "core/feed_mailbox.hpp"
 #include "core/publisher_orders.hpp"
 #include "core/text_map.hpp"
 #include "core/update_order.hpp"
@@ -37,24 +39,32 @@ class subscription {
     [[nodiscard]] bool may_share(const subscription& other) const noexcept {
         return !terms_.empty() && terms_ == other.terms_ && target_ == other.target_ && path_ == other.path_;
     }
+    /// Others have shared its binding, on the link that it is on or was on last: that may be there although its own
+    /// BIND is refused, and after they have gone.
+    [[nodiscard]] bool has_shared() const noexcept { return has_shared_; }
     /// Its BIND has been answered: what comes is for it. (For one alone nothing comes before.)
     [[nodiscard]] virtual bool is_bound() const noexcept { return true; }
 
     /// Hands an update on: first a gap that it shows, then itself. False where it is old or repeated, or its body is no
     /// JSON.
-    bool take(const protocol::request_line& update);
+    bool take(const protocol::request_line& update, feed_mailbox::hand_over when = feed_mailbox::hand_over::now);
+    /// Updates up to this one are old.
+    void skip_to(const update_mark& mark) noexcept { order_.take(mark.epoch, mark.seq); }
 
   protected:
     ~subscription() = default;
 
   private:
+    friend class subscriptions;
+
     /// False where the event's body is not JSON.
-    virtual bool on_event(const detail::raw_event& event) = 0;
+    virtual bool on_event(const detail::raw_event& event, feed_mailbox::hand_over when) = 0;
 
     std::string target_;
     std::string path_;
     std::string terms_;
     bool thinned_;
+    bool has_shared_ = false;
     update_order order_;
     std::unique_ptr<publisher_orders> each_; // where it is bound to all
 };
@@ -67,6 +77,8 @@ class subscriptions {
     bool add(subscription& s);
     [[nodiscard]] bool admits(const subscription& s) const;
     void remove(const subscription& s);
+    /// Another one is bound whose binding this one may share.
+    [[nodiscard]] bool has_bound_for(const subscription& s) const;
     [[nodiscard]] bool has(std::string_view target, std::string_view path) const;
     /// The subscription that an update is for, or null.
     [[nodiscard]] subscription* find(std::string_view publisher, std::string_view path) const;
@@ -86,7 +98,7 @@ class subscriptions {
 
   private:
     void forget_last() noexcept;
-    [[nodiscard]] bool is_shared(const subscription& s) const;
+    [[nodiscard]] const std::vector<subscription*>& all_of(std::string_view path) const;
 
     // Mostly one node publishes a path on a link, so that a short list is quicker than a second key.
     text_map<std::vector<subscription*>> by_path_;

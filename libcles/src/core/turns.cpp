@@ -5,12 +5,6 @@
 #include <iterator>
 
 namespace cles::core {
-namespace {
-
-// Publishers that go on in one turn, before others have theirs.
-constexpr int most_go_on = 8;
-
-} // namespace
 
 class turns::round {
   public:
@@ -84,10 +78,6 @@ void turns::turn() {
 }
 
 void turns::carry_on() {
-    let_publishers_go_on();
-    if (host_.stopped()) {
-        return;
-    }
     host_.route_on(time_.now());
     if (host_.stopped()) {
         return;
@@ -99,21 +89,6 @@ void turns::carry_on() {
     });
     if (gone) {
         gathering_.gone(*gone, time_.now()); // not before: to write to many binders takes longer than updates may wait
-    }
-}
-
-// Each may publish again at once, and then waits here anew. What they do may throw.
-void turns::let_publishers_go_on() {
-    auto& published = host_.published();
-    for (int i = 0; i < most_go_on; ++i) {
-        auto next = published.next_result();
-        if (!next) {
-            return;
-        }
-        if (i == 0) {
-            ask();
-        }
-        next->tell();
     }
 }
 
@@ -143,7 +118,7 @@ void turns::write_what_is_alone() {
 }
 
 void turns::ask_if_something_waits() {
-    if (host_.published().dirty() || host_.published().has_results() || !waiting_.empty()) {
+    if (host_.published().dirty() || !waiting_.empty()) {
         ask();
     }
 }

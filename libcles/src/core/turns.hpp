@@ -75,7 +75,7 @@ class turns {
     void ask();
     /// Has output written then.
     void flush_soon(turn_taker& which);
-    /// Carries on what waits. What a handler or an operation throws passes through; the rest has another turn.
+    /// Carries on what waits. What a handler throws passes through; the rest has another turn.
     void turn();
     /// Lets the program publish or ask for something. What that throws passes through. No handler and no operation runs
     /// in it.
@@ -132,7 +132,6 @@ class turns {
         std::forward<F>(say)();
     }
     void carry_on();
-    void let_publishers_go_on();
     void write_what_is_alone();
     /// Puts what has been published to its binders. How much it was in all; none: nothing, or it waits for more.
     std::optional<std::uint64_t> publish(bool alone);

@@ -104,10 +104,6 @@ void engine::start(const std::vector<std::string>& listen_at) {
     listeners_.open_local_doors();
 }
 
-void engine::say_soon(log_level level, std::string what) const {
-    node_->completions.call([host = node_, level, what = std::move(what)] { host->say(level, what); });
-}
-
 void engine::expire(bool was_away) {
     struct settling {
         engine& by;
@@ -193,8 +189,10 @@ void engine::route_on(time_point now) {
 
 // -- asking --------------------------------------------------------------------------------------------------------
 
-void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message) {
-    node_->completions.put(core::completion{core::completion::failure{std::move(operation), code, std::move(message)}});
+void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message,
+                        core::completion::progress_function progress) {
+    node_->completions.put(core::completion{
+        core::completion::failure{std::move(operation), code, std::move(message), std::move(progress)}});
 }
 
 std::uint64_t engine::send(const outgoing& request, const call_options& options, pending_ptr operation) {
@@ -388,31 +386,25 @@ void engine::stop() {
     }
     turns_.stop();
     // Callers that wait are told on the executor, never from inside this call.
-    const auto tell = [this](std::vector<pending_ptr> waiting) {
-        for (auto& operation : waiting) {
-            fail_later(std::move(operation), errc::stopped, "the service has been stopped");
-        }
-    };
     feeds_.stop();
     if (outside_updates_) {
         outside_updates_->close();
     }
-    while (auto result = node_->published.next_result()) {
-        asio::post(executor_, [result = std::move(*result)]() mutable { result.tell(); });
+    for (auto& operation : node_->published.take_waiters()) {
+        fail_later(std::move(operation), errc::stopped, "the service has been stopped");
     }
-    tell(node_->published.take_waiters());
     neighbours_->stop();
     if (group_) {
         group_->stop();
     }
-    tell(routes_.stop());
+    routes_.stop();
     if (departure_) {
         if (auto operation = departure_->give_up()) {
             fail_later(std::move(operation), errc::stopped, "the service has been stopped");
         }
     }
     for (const auto& c : connections_.all()) {
-        tell(c->session().asking().take_all());
+        c->session().asking().stop();
         c->flush();
         c->abandon("the service has been stopped");
     }

@@ -30,6 +30,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::shell {
@@ -67,7 +68,9 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     [[nodiscard]] std::string stranger(const identity& peer) const;
     void say(log_level level, const log_entry& what) const { node_->say(level, what); }
     /// The same from inside a loop over what the log's reader could change.
-    void say_soon(log_level level, std::string what) const;
+    void say_soon(log_level level, std::string what, std::string peer = {}) const {
+        node_->say_soon(level, std::move(what), std::move(peer));
+    }
     [[nodiscard]] shell::connections& connections() noexcept { return connections_; }
     [[nodiscard]] shell::listeners& listeners() noexcept { return listeners_; }
     [[nodiscard]] shell::routes& routes() noexcept { return routes_; }
@@ -102,7 +105,8 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     std::uint64_t send(const outgoing& request, const call_options& options, pending_ptr operation);
     void cancel(std::uint64_t ticket);
     /// Completes an operation that failed while it began; not from inside the call.
-    void fail_later(pending_ptr operation, boost::system::error_code code, std::string message);
+    void fail_later(pending_ptr operation, boost::system::error_code code, std::string message,
+                    core::completion::progress_function progress = {});
 
     // For the feeds.
     [[nodiscard]] shell::feed_links& feeds() noexcept { return feeds_; }

@@ -12,6 +12,8 @@
 
 #include <boost/asio/post.hpp>
 
+#include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -43,18 +45,23 @@ bool lists_mark(std::string_view description) {
     return found;
 }
 
+/// What the mark of the last value is for, where it was asked for.
+enum class marking : std::uint8_t {
+    none,
+    as_update, ///< the value is an update where it is news
+    up_to_it,  ///< what comes up to it is old: it was queued for those whose binding is shared
+};
+
 /// The answer to a feed's BIND. The feed lives as long as its handle.
 class bind_reply final : public detail::pending {
   public:
     /// `asked`: when the BIND was sent by datagram; nothing for a stream.
     bind_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle, core::feed_machine& feed,
-               std::optional<time_point> asked, bool marked)
-        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked), marked_(marked) {}
+               std::optional<time_point> asked, marking marks)
+        : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked), marks_(marks) {}
 
     verdict offer(std::string_view json) override { return take(json, {}); }
-    verdict offer_marked(std::string_view json, const update_mark& mark) override {
-        return take(json, marked_ ? std::optional{mark} : std::nullopt);
-    }
+    verdict offer_marked(std::string_view json, const update_mark& mark) override { return take(json, mark); }
 
     void fail(boost::system::error_code code, std::string_view message) override {
         const std::unique_ptr<bind_reply> self{this};
@@ -67,7 +74,9 @@ class bind_reply final : public detail::pending {
         if (feed_.is_bound_without_value(code)) {
             bound(*host, "{}", {});
         } else {
-            if (code == errc::deadline) { // the publisher may still answer, and would send updates for ever
+            // It may be bound all the same, and would be sent updates for ever: where the publisher still answers, or
+            // by those who shared its binding and have left it to this one.
+            if (code == errc::deadline || feed_.has_shared()) {
                 host->feeds().unbind(feed_);
             } else {
                 host->feeds().detach(feed_);
@@ -93,7 +102,10 @@ class bind_reply final : public detail::pending {
     }
 
     void bound(const detail::engine& host, std::string_view last, const std::optional<update_mark>& mark) {
-        feed_.on_bound(last, mark);
+        if (mark && marks_ == marking::up_to_it) {
+            feed_.skip_to(*mark);
+        }
+        feed_.on_bound(last, marks_ == marking::as_update ? mark : std::nullopt);
         if (asked_) {
             feed_.on_leased(*asked_, host.bounds().lease);
         }
@@ -103,7 +115,7 @@ class bind_reply final : public detail::pending {
     std::weak_ptr<detail::feed_control> handle_;
     core::feed_machine& feed_;
     std::optional<time_point> asked_;
-    bool marked_; // it was asked which update the value is
+    marking marks_;
 };
 
 /// The answer to a feed's BIND that renews its lease.
@@ -193,6 +205,8 @@ class feed_links::features_reply final : public detail::pending {
 };
 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
+    feed.share_by("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
+                  terms.adverbs);
     feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0});
 }
 
@@ -240,29 +254,35 @@ void feed_links::bind(core::feed_machine& feed) {
 
 void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feeds_.at(&feed);
-    if (e.terms.marked && !c->marks()) {
+    // Of a binding that is there, updates may be queued at the publisher that are older than the value it answers with.
+    const bool joins = !feed.was_bound() && c->session().bound().has_bound_for(feed);
+    auto marks = e.terms.marked ? marking::as_update : joins ? marking::up_to_it : marking::none;
+    if (marks != marking::none && !c->marks()) {
         ask_for_features(feed, c);
         return;
     }
-    const bool marked = e.terms.marked && *c->marks();
+    if (marks != marking::none && !*c->marks()) {
+        marks = marking::none;
+    }
     e.on = c;
     const auto now = engine_.now();
     const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
     auto request = bind_text(e, *c);
     const auto adverbs = e.terms.adverbs + (e.terms.adverbs.empty() ? "mark=yes" : " mark=yes");
-    if (marked) {
+    if (marks != marking::none) {
         request.adverbs = adverbs;
     }
     c->bind(feed, request, core::later(now, time_limit(e.terms.deadline, verb::bind)),
-            detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked, marked)});
+            detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked, marks)});
 }
 
 void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
+    const auto& e = feeds_.at(&feed);
     const auto now = engine_.now();
-    c->session().asking().send(
-        {.verb = verb::pull, .noun = "self:cles", .id = engine_.draw_id()},
-        core::later(now, time_limit({}, verb::pull)), now,
-        detail::pending_ptr{new features_reply(engine_.weak_from_this(), feeds_.at(&feed).handle, feed, c)});
+    const auto limit = std::min(time_limit({}, verb::pull), time_limit(e.terms.deadline, verb::bind));
+    c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = engine_.draw_id()},
+                               core::later(now, limit), now,
+                               detail::pending_ptr{new features_reply(engine_.weak_from_this(), e.handle, feed, c)});
 }
 
 protocol::request_text feed_links::bind_text(entry& e, const connection& c) {

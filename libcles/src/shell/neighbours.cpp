@@ -196,7 +196,7 @@ void neighbours::on_announcement(const core::group_source& from, const protocol:
     std::string why;
     if (!read_announcement(update, said, why)) {
         ++counts.announcements_dropped;
-        engine_.say(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
+        engine_.say_soon(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
         return;
     }
     switch (engine_.node().others.hear(said, *update.epoch, *update.seq, from, now)) {
@@ -264,8 +264,8 @@ void neighbours::follow_run(const std::string& name) {
 }
 
 void neighbours::on_name_taken(const std::string& where) {
-    engine_.say(log_level::error, "the name '" + engine_.node().name + "' is taken: the node at " + where +
-                                      " was there first, and is asked by it");
+    engine_.say_soon(log_level::error, "the name '" + engine_.node().name + "' is taken: the node at " + where +
+                                           " was there first, and is asked by it");
     engine_.on_name_taken(where);
 }
 

@@ -26,6 +26,7 @@ class probe_reply final : public detail::pending {
     void fail(boost::system::error_code code, std::string_view message) override;
     void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override;
     void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
     void tell(core::probe_outcome found) const;

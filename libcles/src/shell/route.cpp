@@ -54,7 +54,8 @@ void route::send(const request& r, detail::pending_ptr operation, core::outbound
         held.resize(bytes);
     } else if (!held.try_resize(bytes)) {
         engine_->fail_later(std::move(operation), errc::busy,
-                            "too much waits for a link to " + address_ + " or others (limits.memory)");
+                            "too much waits for a link to " + address_ + " or others (limits.memory)",
+                            std::move(progress));
         return;
     }
     auto w = std::make_unique<waiting>(*this);
@@ -79,8 +80,9 @@ bool route::cancel(std::uint64_t id) {
         return false;
     }
     auto operation = std::move((*found)->operation);
+    auto report = std::move((*found)->progress);
     requests_.erase(found);
-    engine_->completions().fail(std::move(operation), errc::cancelled, "the request was withdrawn");
+    engine_->completions().fail(std::move(operation), errc::cancelled, "the request was withdrawn", std::move(report));
     return true;
 }
 
@@ -197,17 +199,16 @@ void route::fail(boost::system::error_code code, std::string_view message) {
     }
 }
 
-std::vector<detail::pending_ptr> route::stop() {
+void route::stop() {
     if (const auto give_up = std::exchange(give_up_, nullptr)) {
         give_up();
     }
     binders_.clear();
     links_.clear();
-    std::vector<detail::pending_ptr> taken;
-    for (auto& w : std::exchange(requests_, {})) {
-        taken.push_back(std::move(w->operation));
+    for (const auto& w : std::exchange(requests_, {})) {
+        engine_->fail_later(std::move(w->operation), errc::stopped, "the service has been stopped",
+                            std::move(w->progress));
     }
-    return taken;
 }
 
 } // namespace cles::shell

@@ -58,8 +58,8 @@ class route : public std::enable_shared_from_this<route> {
     void drop(const connection& c);
     /// Closes the links over which nothing goes on.
     void release();
-    /// Gives up, and takes out the requests that wait.
-    [[nodiscard]] std::vector<detail::pending_ptr> stop();
+    /// Gives up, and fails the requests that wait, none inside the call.
+    void stop();
 
     [[nodiscard]] const std::string& address() const noexcept { return address_; }
     /// Nothing is lost with it.

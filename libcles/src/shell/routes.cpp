@@ -172,14 +172,11 @@ void routes::release(std::string_view url) {
     }
 }
 
-std::vector<detail::pending_ptr> routes::stop() {
+void routes::stop() {
     recent_ = nullptr;
-    std::vector<detail::pending_ptr> taken;
     for (auto ended = std::exchange(routes_, {}); const auto& [where, r] : ended) {
-        auto waiting = r->stop();
-        taken.insert(taken.end(), std::make_move_iterator(waiting.begin()), std::make_move_iterator(waiting.end()));
+        r->stop();
     }
-    return taken;
 }
 
 } // namespace cles::shell

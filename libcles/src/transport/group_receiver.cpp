@@ -117,54 +117,71 @@ void group_receiver::filter() {
 void group_receiver::receive() {
     socket_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
         if (!code) {
+            self->more_ = true;
+            self->next_ = self->listeners_.size(); // the number may be another by now
             self->hand_over();
         }
     });
 }
 
+void group_receiver::go_on_soon() {
+    asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+}
+
+// The program's handlers run in it. So each listener is given what has come in a function of its own, and what one does
+// there, or throws, is done before the next is called; a single listener is given the next at once, up to a number.
 void group_receiver::hand_over() {
+    constexpr std::size_t most = 256; // about, since fetches count as well; then others have their turn
     telling_ = true;
-    const auto go_on_soon = [this] {
-        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
-    };
-    bool left = false;
     try {
-        tell_others();
-        left = arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) {
-            said_ = {};
-            const bool good = protocol::parse_group_message(one.text, said_);
-            said_.reading = hearing_ > 1 ? &reading_ : nullptr;
-            told_.emplace(group_datagram{one.from, one.text, good ? &said_ : nullptr});
-            next_ = 0;
-            tell_others();
-        });
+        for (std::size_t told = 0; told < most; told += heard_.size() + 1) {
+            if (next_ == listeners_.size() && !fetch()) {
+                telling_ = false;
+                if (hearing_ != 0) {
+                    receive();
+                }
+                return;
+            }
+            tell_next();
+            if (listeners_.size() > 1 && (next_ != listeners_.size() || more_)) {
+                break;
+            }
+        }
     } catch (...) { // a handler's, for the thread that runs the context; what else has come is not affected
         go_on_soon();
         throw;
     }
-    // NOLINTNEXTLINE(modernize-loop-convert): each may add others, which may move them all
-    for (std::size_t i = 0; i < listeners_.size(); ++i) {
-        if (auto* const events = listeners_[i].events; events != nullptr) {
-            events->on_batch();
-        }
-    }
-    telling_ = false;
-    std::erase_if(listeners_, [](const auto& each) { return each.events == nullptr; });
-    if (left) {
-        go_on_soon();
-    } else if (hearing_ != 0) {
-        receive();
-    }
+    go_on_soon();
 }
 
-void group_receiver::tell_others() {
-    while (told_ && next_ < listeners_.size()) {
-        if (auto* const each = listeners_[next_++].events; each != nullptr) {
-            each->on_datagram(*told_);
+// All have heard what was there. False: no more is.
+bool group_receiver::fetch() {
+    std::erase_if(listeners_, [](const auto& each) { return each.events == nullptr; });
+    heard_.clear();
+    const bool may = more_ && hearing_ != 0;
+    next_ = may ? 0 : listeners_.size();
+    if (may) {
+        more_ = arrived_.fetch(socket_);
+        while (!arrived_.empty()) {
+            const auto one = arrived_.take();
+            auto& kept = heard_.emplace_back(heard{.from = one.from, .text = one.text});
+            kept.good = protocol::parse_group_message(kept.text, kept.said);
         }
     }
-    told_.reset();
-    reading_.clear();
+    return may;
+}
+
+void group_receiver::tell_next() {
+    const auto events = [this] { return listeners_[next_].events; };
+    while (at_ != heard_.size() && events() != nullptr) {
+        auto& one = heard_[at_++];
+        one.said.reading = hearing_ > 1 ? &one.reading : nullptr;
+        events()->on_datagram({one.from, one.text, one.good ? &one.said : nullptr});
+    }
+    at_ = 0;
+    if (auto* const told = listeners_[next_++].events; told != nullptr) {
+        told->on_batch();
+    }
 }
 
 } // namespace cles::transport

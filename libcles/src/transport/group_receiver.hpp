@@ -12,7 +12,7 @@
 
 #include <cstddef>
 #include <memory>
-#include <optional>
+#include <string_view>
 #include <vector>
 
 namespace cles::transport {
@@ -41,26 +41,37 @@ class group_receiver : public std::enable_shared_from_this<group_receiver> {
                               const udp::endpoint& group);
 
   private:
+    struct place {
+        group_events* events; // null: removed while others were told
+        udp::endpoint source;
+    };
+    /// A datagram of the fetch.
+    struct heard {
+        const udp::endpoint& from;
+        std::string_view text;
+        bool good = false;
+        protocol::request_line said{};    // where it is good
+        detail::shared_reading reading{}; // of its body
+    };
+
     void filter();
     void receive();
     void hand_over();
-    void tell_others();
+    void go_on_soon();
+    [[nodiscard]] bool fetch();
+    void tell_next();
 
     udp::endpoint group_;
     int interface_;
     udp::socket socket_;
     datagram_batch arrived_;
-    struct place {
-        group_events* events; // null: removed while others were told
-        udp::endpoint source;
-    };
+    bool more_ = false; // there may be
     std::vector<place> listeners_;
     std::size_t hearing_ = 0; // those that are not null
     bool telling_ = false;
-    std::optional<group_datagram> told_; // not yet to all
-    protocol::request_line said_;        // in it
-    detail::shared_reading reading_;     // of its body
-    std::size_t next_ = 0;               // the first that it has not been told to
+    std::vector<heard> heard_;
+    std::size_t next_ = 0; // the first listener that has not heard all of it
+    std::size_t at_ = 0;   // the first that this one has not heard
 };
 
 } // namespace cles::transport
