@@ -312,6 +312,11 @@ std::optional<std::string_view> neighbours::second_of(std::string_view node) con
     return engine_.node().others.second_of(node);
 }
 
+bool neighbours::expects_more_of(std::string_view node) const noexcept {
+    const auto* const run = round_.over() ? nullptr : engine_.node().others.announced(node);
+    return run != nullptr && run->endpoints.empty() && run->said.sources.size() > 1;
+}
+
 std::string neighbours::why_unknown() const {
     if (group_ == nullptr) {
         return gossiper_ ? "no node that it asks knows of it; " : "";

@@ -60,6 +60,9 @@ class neighbours final : private core::group_presence,
     void ask_for(std::string_view node);
     /// Whether a name that is not known may be heard any moment.
     [[nodiscard]] bool expects_more() const noexcept { return !round_.over(); }
+    /// Whether a node that is known, at no address that can be used, may be heard any moment by another of its
+    /// interfaces.
+    [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
     /// Why a name is not known, as the first part of a sentence; empty without a group.
     [[nodiscard]] std::string why_unknown() const;
 
