@@ -34,8 +34,8 @@ class address_book {
     [[nodiscard]] bool has_url() const { return !at().empty(); }
     /// The multicast group, which only some join.
     [[nodiscard]] cles::multicast_options group() const { return multicast_.where(); }
-    /// Does without multicast from now on, whatever was said.
-    void leave_group() { multicast_.turn_off(); }
+    /// Takes part in multicast by these interfaces alone from now on; by none: does without it.
+    void narrow_group_to(const std::vector<std::string>& interfaces) { multicast_.narrow_to(interfaces); }
     /// --multicast was given.
     [[nodiscard]] bool has_group() const noexcept { return multicast_.is_given(); }
     /// The URL at which requests for this node go; empty where it is one of the peers, or found by its name.

@@ -35,8 +35,9 @@ int examine(doctor_command& wanted, int verbosity) {
     findings found;
     check_config(found);
     check_interfaces(wanted.addresses.group(), found);
-    if (!check_multicast(wanted.addresses.group(), found)) {
-        wanted.addresses.leave_group(); // there is more to be found out without it
+    const auto group = wanted.addresses.group();
+    if (const auto usable = check_multicast(group, found); usable != cles::interfaces_of(group) || usable.empty()) {
+        wanted.addresses.narrow_group_to(usable); // there is more to be found out without the others
     }
     client asker{wanted.addresses, verbosity};
     const auto code = asker.run(ask_around(asker, wanted.addresses, found));

@@ -7,6 +7,9 @@
 
 #include <boost/asio/awaitable.hpp>
 
+#include <string>
+#include <vector>
+
 namespace tool {
 
 class address_book;
@@ -17,11 +20,11 @@ class client;
 /// Whether `clesd` could be started with the configuration that it would use, by its own word.
 void check_config(findings& found);
 
-/// The interfaces of this host, and the one that multicast is to go by.
+/// The interfaces of this host, and those that multicast is to go by.
 void check_interfaces(const cles::multicast_options& where, findings& found);
 
-/// Sends a word to the group and listens for it. \return whether it was heard
-bool check_multicast(const cles::multicast_options& where, findings& found);
+/// Sends a word to the group by each interface and listens for it. \return by which it was heard
+std::vector<std::string> check_multicast(const cles::multicast_options& where, findings& found);
 
 /// Whether the ports that nodes use unless something else is said are free, or theirs; with --at, who is there.
 boost::asio::awaitable<void> check_ports(client& asker, const address_book& addresses, findings& found);

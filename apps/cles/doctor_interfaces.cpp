@@ -28,14 +28,14 @@ const net_interface* better_than_loopback(const std::vector<net_interface>& all)
 }
 
 // What two machines take, by this interface of this one.
-std::string for_other_hosts(const net_interface& by, const cles::multicast_options& where) {
-    return "to reach other hosts: CLES_MULTICAST=" + by.name +
+std::string for_other_hosts(const net_interface& by, const std::string& chosen, const cles::multicast_options& where) {
+    return "to reach other hosts: CLES_MULTICAST=" + chosen +
            " (there their own interface), nodes with --listen tcp://" + by.address + " --insecure, and UDP port " +
            std::to_string(where.port) + " open";
 }
 
-void check_chosen(const cles::multicast_options& where, const std::vector<net_interface>& all, findings& found) {
-    const auto& name = where.interface;
+void check_chosen(const std::string& name, const cles::multicast_options& where, const std::vector<net_interface>& all,
+                  findings& found) {
     const auto at = std::find_if(all.begin(), all.end(), [&](const net_interface& i) { return i.name == name; });
     if (at == all.end()) {
         found.push_back({"interfaces", verdict::failure, "multicast is to go by " + name + ", and there is none",
@@ -50,13 +50,16 @@ void check_chosen(const cles::multicast_options& where, const std::vector<net_in
     } else if (!at->multicast && !at->loopback) {
         found.push_back({"interfaces", verdict::warning, name + " says that it carries no multicast",
                          "ip link set " + name + " multicast on, or find nodes by seeds and --at"});
+    } else if (at->loopback && where.interface != name) {
+        found.push_back({"interfaces", verdict::ok, "multicast goes by " + name + ", for nodes on this host"});
     } else if (at->loopback) {
         const auto* other = better_than_loopback(all);
         found.push_back({"interfaces", verdict::ok,
                          "multicast goes by " + name + ": only nodes on this host find each other",
-                         other == nullptr ? "" : for_other_hosts(*other, where)});
+                         other == nullptr ? "" : for_other_hosts(*other, other->name, where)});
     } else {
-        found.push_back({"interfaces", verdict::ok, "multicast goes by " + name, for_other_hosts(*at, where)});
+        found.push_back(
+            {"interfaces", verdict::ok, "multicast goes by " + name, for_other_hosts(*at, where.interface, where)});
     }
 }
 
@@ -65,8 +68,14 @@ void check_chosen(const cles::multicast_options& where, const std::vector<net_in
 void check_interfaces(const cles::multicast_options& where, findings& found) {
     const auto all = interfaces_of_host();
     found.push_back({"interfaces", verdict::ok, names_of(all)});
-    if (where.is_on()) {
-        check_chosen(where, all, found);
+    const auto chosen = cles::interfaces_of(where);
+    for (const auto& name : chosen) {
+        check_chosen(name, where, all, found);
+    }
+    if (where.is_on() && chosen.empty()) {
+        found.push_back({"interfaces", verdict::failure,
+                         "multicast is to go by 'auto', and no interface is up with an IPv4 address",
+                         "ip link set lo up"});
     }
 }
 

@@ -36,23 +36,23 @@ namespace {
 class group_probe {
   public:
     /// \throws boost::system::system_error, and then `step` says what could not be done
-    group_probe(const cles::multicast_options& where, std::string& step)
+    group_probe(const cles::multicast_options& where, const std::string& interface, std::string& step)
         : group_(asio::ip::make_address_v4(where.group), where.port) {
         const auto all = interfaces_of_host();
         const auto by =
-            std::find_if(all.begin(), all.end(), [&](const net_interface& i) { return i.name == where.interface; });
+            std::find_if(all.begin(), all.end(), [&](const net_interface& i) { return i.name == interface; });
         const auto address =
             by == all.end() || by->address.empty() ? asio::ip::address_v4{} : asio::ip::make_address_v4(by->address);
         ip_mreqn membership{};
         membership.imr_multiaddr.s_addr = htonl(group_.address().to_v4().to_uint());
-        membership.imr_ifindex = static_cast<int>(::if_nametoindex(where.interface.c_str()));
+        membership.imr_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
 
         listener_.set_option(asio::socket_base::reuse_address{true});
         step = "listen to udp port " + std::to_string(where.port);
         listener_.bind(group_);
-        step = "join the group " + where.group + " on " + where.interface;
+        step = "join the group " + where.group + " on " + interface;
         set(listener_, IP_ADD_MEMBERSHIP, membership);
-        step = "send from " + where.interface;
+        step = "send from " + interface;
         sender_.bind({address, 0});
         set(sender_, IP_MULTICAST_IF, membership);
         sender_.set_option(asio::ip::multicast::enable_loopback{true});
@@ -98,7 +98,8 @@ class group_probe {
     udp::socket sender_{io_, udp::v4()};
 };
 
-std::string advice_for(const boost::system::error_code& code, const cles::multicast_options& where) {
+std::string advice_for(const boost::system::error_code& code, const cles::multicast_options& where,
+                       const std::string& interface) {
     if (code == asio::error::address_in_use) {
         const auto holder = holder_of("udp", where.port);
         return "stop " + (holder.empty() ? "the program" : holder) +
@@ -107,20 +108,14 @@ std::string advice_for(const boost::system::error_code& code, const cles::multic
     if (code == asio::error::no_permission || code == asio::error::access_denied) {
         return "a firewall or a sandbox forbids it: allow udp to " + where.group + ":" + std::to_string(where.port);
     }
-    return "is " + where.interface + " up, and does its network carry multicast? cles ls --at URL and seeds need none";
+    return "is " + interface + " up, and does its network carry multicast? cles ls --at URL and seeds need none";
 }
 
-} // namespace
-
-bool check_multicast(const cles::multicast_options& where, findings& found) {
-    if (!where.is_on()) {
-        found.push_back({"multicast", verdict::ok, "is off: nodes are found by --at, --peer and seeds"});
-        return false;
-    }
-    const auto group = where.group + ":" + std::to_string(where.port) + " on " + where.interface;
+bool is_heard(const cles::multicast_options& where, const std::string& interface, findings& found) {
+    const auto group = where.group + ":" + std::to_string(where.port) + " on " + interface;
     std::string step;
     try {
-        group_probe probe{where, step};
+        group_probe probe{where, interface, step};
         probe.send();
         if (probe.hears_itself(1s)) {
             found.push_back({"multicast", verdict::ok, "what is sent to " + group + " is heard"});
@@ -131,9 +126,20 @@ bool check_multicast(const cles::multicast_options& where, findings& found) {
              "a firewall drops it: allow udp from any port to " + where.group + ":" + std::to_string(where.port)});
     } catch (const boost::system::system_error& e) {
         found.push_back({"multicast", verdict::failure, "this host cannot " + step + ": " + e.code().message(),
-                         advice_for(e.code(), where)});
+                         advice_for(e.code(), where, interface)});
     }
     return false;
+}
+
+} // namespace
+
+std::vector<std::string> check_multicast(const cles::multicast_options& where, findings& found) {
+    if (!where.is_on()) {
+        found.push_back({"multicast", verdict::ok, "is off: nodes are found by --at, --peer and seeds"});
+    }
+    auto interfaces = cles::interfaces_of(where);
+    std::erase_if(interfaces, [&](const std::string& each) { return !is_heard(where, each, found); });
+    return interfaces;
 }
 
 } // namespace tool

@@ -37,7 +37,8 @@ std::string as_in_table(const cles::multicast_options& where) {
 } // namespace
 
 bool nobody_listens(const cles::multicast_options& where) {
-    if (!is_loopback(where.interface)) {
+    const auto interfaces = cles::interfaces_of(where);
+    if (!std::all_of(interfaces.begin(), interfaces.end(), is_loopback)) {
         return false;
     }
     std::ifstream sockets{"/proc/net/udp"};

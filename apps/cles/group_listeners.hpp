@@ -5,8 +5,8 @@
 
 namespace tool {
 
-/// Whether it is known, before asking, that nobody can be heard there: the group is that of the loopback interface, and
-/// no program of this host listens to it. To be asked before this program listens there itself.
+/// Whether it is known, before asking, that nobody can be heard there: the group is heard by the loopback interface
+/// alone, and no program of this host listens to it. To be asked before this program listens there itself.
 bool nobody_listens(const cles::multicast_options& where);
 
 } // namespace tool

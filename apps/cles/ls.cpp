@@ -75,7 +75,7 @@ asio::awaitable<void> show(client& asker, const ls_command& wanted) {
         printer{wanted.format, false}.print(to_json(nodes, wanted.tasks));
     }
     if (!is_anybody_there) {
-        note("nobody has announced itself on " + wanted.addresses.group().interface +
+        note("nobody has announced itself on " + names_of(cles::interfaces_of(wanted.addresses.group())) +
              "; --multicast says where else to listen");
     }
 }

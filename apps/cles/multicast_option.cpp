@@ -32,7 +32,7 @@ void multicast_option::add_to(CLI::App& command, const std::string& help) {
                 given_ = text;
             },
             help + " (default CLES_MULTICAST, or else lo)")
-        ->type_name("IFACE[,GROUP[:PORT]]|off");
+        ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto|off");
 }
 
 cles::multicast_options multicast_option::where() const {
@@ -45,6 +45,23 @@ cles::multicast_options multicast_option::where() const {
     cles::multicast_options otherwise{.interface = "lo"};
     otherwise.required = false;
     return otherwise;
+}
+
+void multicast_option::narrow_to(const std::vector<std::string>& interfaces) {
+    if (interfaces.empty()) {
+        turn_off();
+        return;
+    }
+    const auto group = where();
+    given_ = names_of(interfaces, ",") + "," + group.group + ":" + std::to_string(group.port);
+}
+
+std::string names_of(const std::vector<std::string>& interfaces, const char* between) {
+    std::string all;
+    for (const auto& each : interfaces) {
+        all.append(all.empty() ? "" : between).append(each);
+    }
+    return all;
 }
 
 } // namespace tool

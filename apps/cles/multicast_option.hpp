@@ -4,6 +4,7 @@
 #include <cles/multicast.hpp>
 
 #include <string>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -11,7 +12,7 @@ class App;
 
 namespace tool {
 
-/// --multicast: by which interface the command takes part in multicast. Where it is not given, CLES_MULTICAST says so;
+/// --multicast: by which interfaces the command takes part in multicast. Where it is not given, CLES_MULTICAST says so;
 /// where that is not set either, it is loopback, as far as that can be joined.
 class multicast_option {
   public:
@@ -25,9 +26,14 @@ class multicast_option {
 
     /// As if `off` had been given.
     void turn_off() { given_ = "off"; }
+    /// Takes part by these of its interfaces alone; by none: as if `off` had been given.
+    void narrow_to(const std::vector<std::string>& interfaces);
 
   private:
     std::string given_;
 };
+
+/// "lo, eth0"
+std::string names_of(const std::vector<std::string>& interfaces, const char* between = ", ");
 
 } // namespace tool

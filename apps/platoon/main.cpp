@@ -151,7 +151,7 @@ void add_common(CLI::App& command, wishes& wanted) {
 
 void add_group(CLI::App& command, wishes& wanted) {
     command.add_option("-m,--multicast", wanted.group, "Where they hear each other (CLES_MULTICAST, or else lo)")
-        ->type_name("IFACE[,GROUP[:PORT]]");
+        ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto");
     command.add_flag("--insecure", wanted.insecure, "On an interface beyond this host, where nobody proves who he is");
 }
 

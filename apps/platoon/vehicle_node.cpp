@@ -31,13 +31,22 @@ std::string reason_of(const std::exception_ptr& failure) {
     }
 }
 
+// By each interface at its address there, so that whoever hears this one there can ask it.
+std::vector<std::string> listen_at(const cles::multicast_options& group) {
+    std::vector<std::string> urls;
+    for (const auto& interface : cles::interfaces_of(group)) {
+        urls.push_back("tcp://" + own_address(interface) + ":0");
+    }
+    return urls;
+}
+
 } // namespace
 
 std::int64_t monotonic_ns() { return std::chrono::nanoseconds{steady::now().time_since_epoch()}.count(); }
 
 vehicle_node::vehicle_node(vehicle_options options)
     : options_(std::move(options)), service_(io_, {.name = options_.setup.name,
-                                                   .listen = {"tcp://" + own_address(options_.group.interface) + ":0"},
+                                                   .listen = listen_at(options_.group),
                                                    .insecure = options_.insecure,
                                                    .multicast = options_.group}),
       signals_(io_, SIGTERM, SIGINT), radio_(options_.loss, options_.delay, options_.seed) {

@@ -60,7 +60,7 @@ void check(const config& whole) {
     for (std::size_t i = 0; i < whole.listen.size(); ++i) {
         check_exposure(whole, "listen[" + std::to_string(i) + "]", whole.listen[i]);
     }
-    if (whole.multicast.is_on() && whole.multicast.interface != "lo" && !whole.insecure) {
+    if (whole.multicast.is_on() && whole.multicast.interface != "lo" && !whole.insecure) { // `auto` may be any
         throw config_error(whole.place_of("multicast"), "on '" + whole.multicast.interface +
                                                             "' other hosts take part, which takes 'insecure: true'");
     }

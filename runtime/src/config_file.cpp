@@ -43,20 +43,30 @@ config_node::reader span_into(std::chrono::microseconds& to) {
     return [&to](const config_node& v) { to = v.as(to_duration); };
 }
 
+// A text with commas, or a list.
+std::string interfaces_of(const config_node& from) {
+    if (from.is_text()) {
+        return from.as(to_interfaces);
+    }
+    std::string all;
+    from.list([&](const config_node& item) { all += (all.empty() ? "" : ",") + item.as(to_interfaces); });
+    try {
+        return to_interfaces(all);
+    } catch (const bad_value& wrong) {
+        from.refuse(wrong.what());
+    }
+}
+
 multicast_options multicast_of(const config_node& from) {
     if (from.is_text()) {
         return from.as(to_multicast);
     }
     multicast_options read{.interface = "lo"};
-    from.map({{"interface",
-               [&](const config_node& v) {
-                   read.interface = v.as([](const std::string& name) {
-                       if (name.empty() || name == "off") {
-                           throw bad_value("'" + name + "' is no interface; 'multicast: off' turns it off");
-                       }
-                       return name;
-                   });
-               }},
+    if (from.is_list()) {
+        read.interface = interfaces_of(from);
+        return read;
+    }
+    from.map({{"interface", [&](const config_node& v) { read.interface = interfaces_of(v); }},
               {"group",
                [&](const config_node& v) {
                    read.group = v.as([](const std::string& group) { return to_multicast("lo," + group + ":1").group; });

@@ -26,6 +26,7 @@ class config_node {
                 std::map<std::string, std::string>& origins);
 
     [[nodiscard]] bool is_text() const { return value_.IsScalar(); }
+    [[nodiscard]] bool is_list() const { return value_.IsSequence(); }
     [[nodiscard]] const std::string& text() const;
     /// The text as what it stands for; `to` throws bad_value.
     template <class F>

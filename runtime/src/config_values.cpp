@@ -183,6 +183,15 @@ multicast_options to_multicast(std::string_view text) {
     return in_our_words([&] { return parse_multicast(text); });
 }
 
+std::string to_interfaces(std::string_view text) {
+    if (text.empty() || text == "off") {
+        refuse(text, "is no interface; 'multicast: off' turns it off");
+    }
+    multicast_options where{.interface = std::string{text}};
+    in_our_words([&] { check(where); });
+    return std::move(where.interface);
+}
+
 log_level to_log_level(std::string_view text) {
     const auto* const found = std::ranges::find(levels, text, &decltype(levels)::value_type::first);
     if (found == levels.end()) {

@@ -42,6 +42,8 @@ std::string to_url(std::string_view text);
 /// "10.0.0.0/8", "fd00::/8"
 std::string to_network(std::string_view text);
 multicast_options to_multicast(std::string_view text);
+/// The names of interfaces for multicast, with commas between, or `auto`.
+std::string to_interfaces(std::string_view text);
 
 log_level to_log_level(std::string_view text);
 log_format to_log_format(std::string_view text);

@@ -66,8 +66,8 @@ std::variant<options, std::string> parse_options(int argc, const char* const* ar
     const auto* seeds_option =
         several(app.add_option("-s,--seed", seeds, "Who is asked for the other nodes, may be repeated"));
     const auto* multicast_option =
-        app.add_option("-m,--multicast", multicast, "By which interface the others are found")
-            ->type_name("IFACE[,GROUP[:PORT]]|off");
+        app.add_option("-m,--multicast", multicast, "By which interfaces the others are found")
+            ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto|off");
     const auto* log_option =
         app.add_option("--log", log, "How much is logged, and how: debug, info, warning, error; text, json")
             ->type_name("LEVEL[,FORMAT]");

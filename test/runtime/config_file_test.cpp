@@ -57,7 +57,14 @@ const mistake mistakes[] = {
     {"networks: [10.0.0.0]\n", "clesd.yaml:1: networks[0]: ", "is no network"},
     {"pool: a b\n", "clesd.yaml:1: pool: ", "'a b' is not a pool's name"},
     {"multicast: lo,1.2.3.4\n", "clesd.yaml:1: multicast: ", "multicast group"},
-    {"multicast: [lo]\n", "clesd.yaml:1: multicast: ", "has to have keys of its own"},
+    {"multicast: [[lo]]\n", "clesd.yaml:1: multicast[0]: ", "has to be a single value"},
+    {"multicast: []\n", "clesd.yaml:1: multicast: ", "is no interface"},
+    {"multicast: [lo,\n  '']\n", "clesd.yaml:2: multicast[1]: ", "is no interface"},
+    {"multicast: [lo, off]\n", "clesd.yaml:1: multicast[1]: ", "is no interface"},
+    {"multicast: lo,\n", "clesd.yaml:1: multicast: ", "has an empty name of an interface"},
+    {"multicast:\n  interface: [lo, eth0, lo]\n", "clesd.yaml:2: multicast.interface: ", "names 'lo' twice"},
+    {"multicast: {interface: \"lo,auto\"}\n", "clesd.yaml:1: multicast.interface: ", "'auto' beside others"},
+    {"multicast: [a, b, c, d, e, f, g, h, i]\n", "clesd.yaml:1: multicast: ", "at most 8"},
     {"multicast: {group: 10.1.1.1}\n", "clesd.yaml:1: multicast.group: ", "multicast group"},
     {"multicast:\n  port: 70000\n", "clesd.yaml:2: multicast.port: ", "'70000' is not a number from 1 to 65535"},
     {"multicast: {interface: off}\n", "clesd.yaml:1: multicast.interface: ", "is no interface"},
@@ -188,6 +195,10 @@ BOOST_AUTO_TEST_CASE(multicast_is_turned_off_or_named_in_a_word) {
     BOOST_TEST(read("multicast: \"off\"\n").multicast.is_on() == false);
     BOOST_TEST(read("multicast: eth0\n").multicast.interface == "eth0");
     BOOST_TEST(read("multicast: {port: 4000}\n").multicast.interface == "lo");
+    BOOST_TEST(read("multicast: lo,eth0\n").multicast.interface == "lo,eth0");
+    BOOST_TEST(read("multicast: [lo, eth0]\n").multicast.interface == "lo,eth0");
+    BOOST_TEST(read("multicast: {interface: [lo, eth0], port: 4000}\n").multicast.interface == "lo,eth0");
+    BOOST_TEST(read("multicast: {interface: auto}\n").multicast.interface == "auto");
 }
 
 BOOST_AUTO_TEST_CASE(a_limit_is_rounded_up_since_0_turns_some_off) {

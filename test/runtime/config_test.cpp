@@ -54,6 +54,10 @@ BOOST_AUTO_TEST_CASE(multicast_beyond_this_host_has_to_be_meant) {
     c.multicast.interface = "eth0";
     c.origins["multicast"] = "CLES_MULTICAST";
     BOOST_TEST(refusal(c).starts_with("CLES_MULTICAST: multicast: on 'eth0' other hosts take part"));
+    for (const auto* several : {"lo,eth0", "auto"}) {
+        c.multicast.interface = several;
+        BOOST_TEST(refusal(c).find("other hosts take part") != std::string::npos);
+    }
     c.insecure = true;
     BOOST_TEST(refusal(c) == "accepted");
 }

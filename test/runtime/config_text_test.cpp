@@ -55,6 +55,14 @@ BOOST_AUTO_TEST_CASE(what_is_printed_reads_as_the_same) {
     }
 }
 
+BOOST_AUTO_TEST_CASE(several_interfaces_stay_several) {
+    auto c = default_config("host", 1);
+    c.multicast.interface = "lo,eth0";
+    auto after = default_config("host", 1);
+    read_config(to_yaml(c), "printed", after);
+    BOOST_TEST((after.multicast == c.multicast));
+}
+
 BOOST_AUTO_TEST_CASE(multicast_that_is_off_stays_off) {
     auto c = default_config("host", 4);
     c.multicast.interface.clear();

@@ -22,9 +22,10 @@ std::string_view name_of(core::presence::change what) noexcept {
 } // namespace
 
 group_seat::group_seat(node_run& host, std::shared_ptr<group_port> port, group_watch& judge, std::uint32_t seed)
-    : node_(host), port_(std::move(port)), judge_(judge), session_(host.node(), port_->source(), *this, seed),
+    : node_(host), port_(std::move(port)), judge_(judge), intake_(*host.node(), *this, ~seed),
+      session_(host.node(), intake_, port_->source(), *this, seed),
       announcer_(*this, host.node()->deadlines, seed * 3 + 1), round_(*this, host.node()->deadlines) {
-    session_.attend(this);
+    intake_.attend(this);
     host.node()->others.watch(this);
 }
 
@@ -47,8 +48,8 @@ void group_seat::leave() {
     if (seq_ != 0) {
         say(core::announcer::shortest, true);
     }
-    session_.attend(nullptr);
-    static_cast<void>(session_.feeds().remove_all());
+    intake_.attend(nullptr);
+    static_cast<void>(intake_.feeds().remove_all());
     session_.unbind_all();
     port_->close();
 }

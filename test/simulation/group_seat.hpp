@@ -46,7 +46,7 @@ class group_seat final : public core::group_output,
     [[nodiscard]] bool has_room() const override;
     [[nodiscard]] std::size_t unsent() const noexcept { return port_->unsent(); }
     [[nodiscard]] core::group_source source() const noexcept { return port_->source(); }
-    [[nodiscard]] core::group_feeds& feeds() noexcept { return session_.feeds(); }
+    [[nodiscard]] core::group_feeds& feeds() noexcept { return intake_.feeds(); }
     /// Its first round of asking is over.
     [[nodiscard]] bool settled() const noexcept { return round_.over(); }
 
@@ -66,6 +66,7 @@ class group_seat final : public core::group_output,
     node_run& node_;
     std::shared_ptr<group_port> port_;
     group_watch& judge_;
+    core::group_intake intake_;
     core::group_session session_;
     core::announcer announcer_;
     core::first_round round_;

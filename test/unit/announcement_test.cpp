@@ -55,6 +55,31 @@ BOOST_AUTO_TEST_CASE(it_is_written_as_the_protocol_says) {
                "\"tasks\":\"cbf29ce484222325\"}\n");
 }
 
+BOOST_AUTO_TEST_CASE(one_that_takes_part_by_several_interfaces_says_from_where) {
+    const statement said{
+        .node = "car1", .endpoints = {"tcp://0.0.0.0:1"}, .sources = {{0x7F000001, 7}, {0x0A000007, 8}}};
+    const auto line = written(said);
+    BOOST_TEST(line.find("[\"tcp://0.0.0.0:1\"],\"sources\":[\"127.0.0.1:7\",\"10.0.0.7:8\"],\"load\"") !=
+               std::string::npos);
+    const auto r = read(std::string_view{line}.substr(0, line.size() - 1));
+    BOOST_REQUIRE_MESSAGE(r.good, r.why);
+    BOOST_TEST((r.said.sources == said.sources));
+}
+
+BOOST_AUTO_TEST_CASE(sources_that_cannot_be_read_are_passed_over_and_so_are_too_many) {
+    const auto r = read_body(R"({"sources":["x","10.0.0.7","10.0.0.7:0","[::1]:5","10.0.0.8:2"]})");
+    BOOST_REQUIRE_MESSAGE(r.good, r.why);
+    BOOST_REQUIRE(r.said.sources.size() == 1U);
+    BOOST_TEST(to_text(r.said.sources[0]) == "10.0.0.8:2");
+    std::string many;
+    for (int i = 1; i < 20; ++i) {
+        many += (many.empty() ? "\"10.0.0.1:" : ",\"10.0.0.1:") + std::to_string(i) + "\"";
+    }
+    BOOST_TEST(read_body("{\"sources\":[" + many + "]}").said.sources.size() == 8U);
+    BOOST_TEST(!read_body(R"({"sources":"10.0.0.8:2"})").good);
+    BOOST_TEST(!read_body(R"({"sources":[7]})").good);
+}
+
 BOOST_AUTO_TEST_CASE(a_leave_says_so) {
     const statement said{.node = "car1", .leaving = true};
     BOOST_TEST(written(said).ends_with(",\"tasks\":\"\",\"leaving\":true}\n"));

@@ -35,7 +35,7 @@ class recording_presence final : public cles::core::group_presence {
 };
 
 struct fixture {
-    fixture() { session.attend(&presence); }
+    fixture() { intake.attend(&presence); }
     void hear(std::string_view datagram, const group_source& from = other) {
         cles::test::hear(session, from, datagram, node.clock.now());
     }
@@ -49,7 +49,8 @@ struct fixture {
     cles::test::test_node node;
     recording_presence presence;
     cles::test::group_recorder out;
-    cles::core::group_session session{node.host, self, out, 1};
+    cles::core::group_intake intake{*node.host, out, 1};
+    cles::core::group_session session{node.host, intake, self, out, 1};
 };
 
 } // namespace
@@ -164,9 +165,10 @@ BOOST_AUTO_TEST_CASE(the_access_rules_are_asked_as_for_links) {
                                                      std::string{to_string(a.verb)} + " " + std::string{a.path});
                                      return a.task == "open";
                                  }};
-    cles::core::group_session guarded{strict.host, self, out, 1};
+    cles::core::group_intake intake_there{*strict.host, out, 1};
+    cles::core::group_session guarded{strict.host, intake_there, self, out, 1};
     recording_presence told;
-    guarded.attend(&told);
+    intake_there.attend(&told);
     for (const auto* line : {"BIND all:open", "BIND all:secret/x", "BIND all:cles"}) {
         cles::test::hear(guarded, other, line, strict.clock.now());
     }
@@ -196,19 +198,19 @@ BOOST_AUTO_TEST_CASE(an_update_that_nobody_wants_is_counted) {
 
 BOOST_AUTO_TEST_CASE(an_update_that_begins_like_a_failure_is_dropped) {
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    session.feeds().add(feed, node.clock.now());
+    intake.feeds().add(feed, node.clock.now());
     hear(R"(UPDATE car2:speed seq=1 epoch=5f3a09c1 {"error":"failed"})");
     BOOST_TEST(node.counts().updates_dropped == 1U);
     hear("UPDATE car2:speed seq=2 epoch=5f3a09c1 {}");
     BOOST_TEST(node.counts().updates_received == 1U);
-    session.feeds().remove(feed);
+    intake.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_CASE(a_forged_update_does_not_silence_a_feed) {
     using namespace std::chrono_literals;
     constexpr group_source forger{.address = 0x7f000001, .port = 4666};
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    session.feeds().add(feed, node.clock.now());
+    intake.feeds().add(feed, node.clock.now());
     node.host->others.hear({.node = "car2", .endpoints = {"tcp://127.0.0.1:1"}}, 0x5f3a09c1, 1, other,
                            node.clock.now());
     const auto received = [&](std::string_view update, const group_source& from) {
@@ -229,19 +231,19 @@ BOOST_AUTO_TEST_CASE(a_forged_update_does_not_silence_a_feed) {
     BOOST_TEST(!received("UPDATE car3:speed seq=3 epoch=5f3a09c1 {}", other));
     node.pass(3500ms);
     BOOST_TEST(received("UPDATE car3:speed seq=4 epoch=5f3a09c1 {}", other));
-    session.feeds().remove(feed);
+    intake.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_CASE(another_pool_is_not_heard) {
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    session.feeds().add(feed, node.clock.now());
+    intake.feeds().add(feed, node.clock.now());
     out.take();
-    session.pass_over(other, node.clock.now() + std::chrono::seconds{15});
+    intake.pass_over(other, node.clock.now() + std::chrono::seconds{15});
     hear("UPDATE car2:speed seq=1 epoch=5f3a09c1 {}");
     BOOST_TEST(node.counts().updates_received == 0U);
     BOOST_TEST(drops("BIND all:speed"));
     BOOST_TEST(node.counts().group_leases == 0U);
-    session.feeds().remove(feed);
+    intake.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

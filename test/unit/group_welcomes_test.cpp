@@ -30,7 +30,8 @@ struct fixture {
 
     cles::test::test_node node;
     cles::test::group_recorder out;
-    cles::core::group_session session{node.host, self, out, 1};
+    cles::core::group_intake intake{*node.host, out, 1};
+    cles::core::group_session session{node.host, intake, self, out, 1};
 };
 
 } // namespace

@@ -5,6 +5,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <string>
+#include <vector>
 
 BOOST_AUTO_TEST_SUITE(multicast)
 
@@ -52,6 +53,36 @@ BOOST_AUTO_TEST_CASE(what_is_wrong_is_named) {
     BOOST_TEST(refusal("lo,239.1.2.3:").find("''") == 0U);
     BOOST_TEST(refusal("").find("'' names no interface") == 0U);
     BOOST_TEST(refusal(",239.1.2.3").find("',239.1.2.3' names no interface") == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(interfaces_may_be_several) {
+    using list = std::vector<std::string>;
+    const auto of = [](const std::string& text) { return cles::interfaces_of(cles::parse_multicast(text)); };
+    BOOST_TEST(of("lo,eth0") == (list{"lo", "eth0"}), boost::test_tools::per_element());
+    BOOST_TEST(of("lo") == list{"lo"}, boost::test_tools::per_element());
+    BOOST_TEST(of("off").empty());
+    const auto where = cles::parse_multicast("lo,eth0.7,wlan0,239.1.2.3:4000");
+    BOOST_TEST(where.interface == "lo,eth0.7,wlan0");
+    BOOST_TEST(where.group == "239.1.2.3");
+    BOOST_TEST(where.port == 4000);
+    BOOST_TEST(of("1,2,3,4,5,6,7,8,239.1.2.3").size() == 8U);
+}
+
+BOOST_AUTO_TEST_CASE(automatic_ones_are_those_of_this_host) {
+    const auto where = cles::parse_multicast("auto,239.1.2.3");
+    BOOST_TEST(where.interface == "auto");
+    BOOST_TEST(where.group == "239.1.2.3");
+    BOOST_TEST(cles::interfaces_of(where).size() <= cles::multicast_options::most_interfaces);
+}
+
+BOOST_AUTO_TEST_CASE(lists_of_interfaces_that_make_no_sense_are_refused) {
+    BOOST_TEST(refusal("lo,") == "'lo,' has an empty name of an interface");
+    BOOST_TEST(refusal("lo,,eth0,239.1.2.3") == "'lo,,eth0' has an empty name of an interface");
+    BOOST_TEST(refusal("lo,eth0,lo") == "'lo,eth0,lo' names 'lo' twice");
+    BOOST_TEST(refusal("lo,auto") == "'lo,auto' has 'auto' beside others, which is said alone");
+    BOOST_TEST(refusal("off,lo").find("'off' beside others") != std::string::npos);
+    BOOST_TEST(refusal("a,b,c,d,e,f,g,h,i") == "'a,b,c,d,e,f,g,h,i' names 9 interfaces: at most 8 take part");
+    BOOST_CHECK_THROW(cles::check({.interface = "lo,lo"}), cles::error);
 }
 
 BOOST_AUTO_TEST_CASE(options_that_were_set_by_hand_are_checked_too) {

@@ -71,6 +71,16 @@ BOOST_AUTO_TEST_CASE(one_that_announces_nothing_is_tied_to_the_first_source_unti
     BOOST_TEST(!admits("car1", here));
 }
 
+BOOST_AUTO_TEST_CASE(a_node_of_several_interfaces_is_heard_from_all_the_sources_that_it_announces) {
+    table.hear({.node = "car1", .endpoints = {"tcp://0.0.0.0:1"}, .sources = {here, there}}, 1, 1, here, clock.now());
+    BOOST_TEST(admits("car1", here));
+    BOOST_TEST((last == sources_verdict::one_of_several));
+    BOOST_TEST(admits("car1", there));
+    BOOST_TEST(!admits("car1", elsewhere));
+    announce("car2", 2, 1, elsewhere);
+    BOOST_TEST(!admits("car2", there));
+}
+
 BOOST_AUTO_TEST_CASE(a_suspect_keeps_its_source_until_it_is_gone) {
     announce("car1", 1, 1, here);
     pass(4s);

@@ -30,6 +30,24 @@ bool read_endpoints(json_reader& r, std::vector<std::string>& out) {
     return r.ok();
 }
 
+// One that cannot be read is passed over: it may be one that a later version has.
+bool read_sources(json_reader& r, std::vector<group_source>& out) {
+    out.clear();
+    if (!r.begin_array()) {
+        return false;
+    }
+    while (r.next_element()) {
+        std::string_view text;
+        if (!r.read(text)) {
+            return false;
+        }
+        if (const auto source = parse_group_source(text); source && out.size() < most_sources) {
+            out.push_back(*source);
+        }
+    }
+    return r.ok();
+}
+
 bool read_count(json_reader& r, std::uint32_t& out) {
     std::uint64_t wide = 0;
     if (!r.read(wide)) {
@@ -91,6 +109,9 @@ bool read_announcement_member(json_reader& r, std::string_view key, announcement
     if (key == "pool") {
         return r.read(out.pool);
     }
+    if (key == "sources") {
+        return read_sources(r, out.sources);
+    }
     return r.skip();
 }
 
@@ -123,6 +144,14 @@ void append_body(std::string& out, const announcement& said, std::size_t endpoin
         w.value(std::string_view{said.endpoints[i]});
     }
     w.end_array();
+    if (!said.sources.empty()) {
+        w.plain_key("sources");
+        w.begin_array();
+        for (const auto& source : said.sources) {
+            w.value(std::string_view{to_text(source)});
+        }
+        w.end_array();
+    }
     w.plain_key("load");
     write_load(w, said.load);
     w.plain_key("interval_ms");

@@ -5,6 +5,7 @@
 #include <cles/json_writer.hpp>
 #include <cles/peer.hpp>
 
+#include "core/group_source.hpp"
 #include "protocol/request_line.hpp"
 
 #include <chrono>
@@ -23,6 +24,7 @@ inline constexpr std::chrono::milliseconds longest_interval{60'000};
 inline constexpr std::size_t most_endpoints = 16;
 inline constexpr std::size_t longest_endpoint = 128;
 inline constexpr std::size_t longest_digest = 64;
+inline constexpr std::size_t most_sources = 8;
 
 struct announcement {
     std::string node;
@@ -32,6 +34,8 @@ struct announcement {
     std::string tasks{};                       ///< a digest of its tasks
     bool leaving = false;
     std::string pool{}; ///< empty: the one without a name
+    /// All from which the node sends to the group, where they are several: it takes part by as many interfaces.
+    std::vector<group_source> sources{};
 };
 
 /// Reads an update of the noun `<node>:cles`. On failure false, and `why` says what is wrong.

@@ -39,6 +39,7 @@ struct counters {
     std::uint64_t datagrams_withheld = 0; ///< to strangers who would have got too much
     std::uint64_t group_received = 0;     ///< datagrams of the multicast group, other than its own
     std::uint64_t group_dropped = 0;      ///< of these: neither BIND nor update, or malformed, or past a limit
+    std::uint64_t group_repeated = 0;     ///< what had come before, of nodes that send by several interfaces
     std::uint64_t group_sent = 0;
     std::uint64_t group_unsent = 0; ///< too large, or too much waited already
     std::uint64_t links_accepted = 0;

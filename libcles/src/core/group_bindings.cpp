@@ -19,20 +19,18 @@ constexpr binding::terms group_terms{.every = std::chrono::milliseconds{0}, .kee
 
 group_bindings::group_bindings(node& host, group_output& out, std::uint32_t seed)
     : node_(host), out_(out), jitter_(seed), bound_(host.published, *this) {
-    node_.published.on_opened([this](topic& t) {
-        if (nouns_.contains(t.path())) {
-            attach(t);
-        }
-    });
+    node_.published.watch(*this);
 }
 
 group_bindings::~group_bindings() { clear(); }
 
 void group_bindings::clear() {
-    node_.published.on_opened({});
+    node_.published.unwatch(*this);
     nouns_.clear();
+    for (const auto& [source, leases] : of_source_) {
+        node_.counts.group_leases -= leases;
+    }
     of_source_.clear();
-    node_.counts.group_leases = 0;
     bound_.clear();
 }
 
@@ -91,6 +89,12 @@ void group_bindings::end(noun& n, const group_source& from) {
         // Out of the list first: publishers that waited for this binder go on, and may do anything.
         const auto gone = nouns_.extract(n.path);
         bound_.unbind(gone.key());
+    }
+}
+
+void group_bindings::on_opened(topic& made) {
+    if (nouns_.contains(made.path())) {
+        attach(made);
     }
 }
 

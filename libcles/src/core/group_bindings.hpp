@@ -22,11 +22,12 @@
 
 namespace cles::core {
 
-/// What the nodes of the group are bound to here. To a noun's topic the group is one binder, for as long as at least
-/// one source has a lease of it: so each update goes out once, however many hear it.
+/// What the nodes of the group are bound to here, by one interface. To a noun's topic it is one binder, for as long as
+/// at least one source has a lease of it: so each update goes out once by each interface by which somebody is bound,
+/// however many hear it there.
 ///
 /// A lease of what nobody has published yet is kept too: the first publication finds its binders.
-class group_bindings final : private binder {
+class group_bindings final : private binder, private publications::observer {
   public:
     /// The least time between two repeats of a noun's last update, and the most by which one is put off at random.
     static constexpr std::chrono::milliseconds repeat_apart{250};
@@ -72,6 +73,8 @@ class group_bindings final : private binder {
     // binder
     [[nodiscard]] bool takes_updates() const override { return out_.has_room(); }
     void put_updates(std::string_view lines) override;
+    // publications::observer
+    void on_opened(topic& made) override;
 
     node& node_;
     group_output& out_;

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "core/group_session.hpp"
 
-#include <cles/json_reader.hpp>
-
 #include "core/bind_requests.hpp"
 #include "core/request_checks.hpp"
-
-#include <string>
 
 namespace cles::core {
 
@@ -14,7 +10,7 @@ namespace {
 
 identity identity_of(const group_source& from) {
     return {.transport = "multicast",
-            .address = "udp://" + host_text(from) + ":" + std::to_string(from.port),
+            .address = "udp://" + to_text(from),
             .name = {},
             .uid = {},
             .local = from.is_loopback()};
@@ -23,7 +19,7 @@ identity identity_of(const group_source& from) {
 } // namespace
 
 void group_session::on_message(const group_source& from, const protocol::request_line* said, time_point now) {
-    if (from == self_) { // looped back for others on this host
+    if (intake_.is_own(from)) {
         return;
     }
     ++node_.counts.group_received;
@@ -35,7 +31,7 @@ void group_session::on_message(const group_source& from, const protocol::request
 bool group_session::serve(const group_source& from, const protocol::request_line& request, time_point now) {
     const auto target = request.noun.target;
     if (request.is_update()) {
-        return !protocol::is_reserved_target(target) && on_update(from, request, now);
+        return !protocol::is_reserved_target(target) && intake_.take(from, request, now);
     }
     return request.verb == verb::bind && (target == "all" || !protocol::is_reserved_target(target)) &&
            on_bind(from, request, now);
@@ -52,14 +48,12 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
         return true;
     }
     if (!solicits) {
-        return !sources_.is_foreign(from, now) && bind_noun(from, bind, now);
+        return !intake_.is_passed_over(from, now) && bind_noun(from, bind, now);
     }
     if (!allows(node_, identity_of(from), bind)) {
         return false;
     }
-    if (presence_ != nullptr) {
-        presence_->on_solicitation(by_name, now);
-    }
+    intake_.solicited(by_name, now);
     return true;
 }
 
@@ -81,36 +75,6 @@ bool group_session::bind_noun(const group_source& from, const protocol::request_
         }
     }
     return bindings_.bind(from, bind, now);
-}
-
-bool group_session::is_from_publisher(const group_source& from, const protocol::request_line& update, time_point now) {
-    using verdict = publisher_sources::verdict;
-    const auto node = update.noun.target;
-    const auto found = sources_.is_foreign(from, now) ? verdict::refused : sources_.look(node, from, now);
-    if (found == verdict::another) {
-        feeds_.forget(node);
-    }
-    return found != verdict::refused;
-}
-
-bool group_session::on_update(const group_source& from, const protocol::request_line& update, time_point now) {
-    const auto& noun = update.noun;
-    if (noun.task == "cles") {
-        if (!noun.parameters.empty() || !is_valid_json(update.body, node_.bounds.depth)) {
-            return false;
-        }
-        if (presence_ != nullptr) {
-            presence_->on_announcement(from, update, now);
-        }
-        return true;
-    }
-    if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || !is_from_publisher(from, update, now) ||
-        !feeds_.take(update)) {
-        ++node_.counts.updates_dropped;
-    } else {
-        ++node_.counts.updates_received;
-    }
-    return true;
 }
 
 } // namespace cles::core

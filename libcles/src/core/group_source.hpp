@@ -6,7 +6,9 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 
 namespace cles::core {
 
@@ -34,5 +36,10 @@ inline std::string host_text(const group_source& s) {
     }
     return text;
 }
+
+/// "10.0.0.2:4000"
+inline std::string to_text(const group_source& s) { return host_text(s) + ":" + std::to_string(s.port); }
+/// Reads that; nothing where it is something else.
+std::optional<group_source> parse_group_source(std::string_view text) noexcept;
 
 } // namespace cles::core

@@ -19,8 +19,14 @@ known_run known_run::first(const word& w, std::uint64_t& numbers) {
 
 // What is told comes by many ways, on each of which something may have been left out: of the same run only more is
 // better, or news of it would go round for ever.
+//
+// A run that is heard by several interfaces goes on being asked by the one that it was heard by first, or each
+// announcement would move it.
 bool known_run::place(const word& w) {
-    if (w.told() ? from != group_source{} : said.endpoints == w.said.endpoints && from == w.from) {
+    const bool in_group = from != group_source{};
+    const bool by_another = !w.told() && in_group && from != w.from;
+    if ((w.told() && in_group) || (by_another && !is_asked_better_by(w)) ||
+        (!w.told() && from == w.from && said.endpoints == w.said.endpoints)) {
         return false;
     }
     auto usable = reachable_endpoints(w.said.endpoints, w.by);
@@ -28,10 +34,36 @@ bool known_run::place(const word& w) {
     if (w.told() && usable.size() <= endpoints.size() && for_others.size() <= passed_on.size()) {
         return false;
     }
+    if (by_another && usable.empty()) {
+        return false;
+    }
+    if (!w.told()) {
+        from = w.from;
+    }
     endpoints = std::move(usable);
     passed_on = std::move(for_others);
     said.endpoints = w.said.endpoints;
     return true;
+}
+
+// By loopback it is on this host, where Unix sockets and what listens on loopback alone can be asked too.
+bool known_run::is_asked_better_by(const word& w) const noexcept {
+    return endpoints.empty() || (w.from.is_loopback() && !from.is_loopback()) ||
+           w.spoken - heard_there >= said.interval * 7 / 2;
+}
+
+bool known_run::hear_again(const word& w) {
+    if (w.told()) {
+        return endpoints.empty() && place(w); // another way leads to it
+    }
+    if (w.seq != seq) { // overtaken
+        return false;
+    }
+    const bool moved = w.from != from && place(w);
+    if (w.from == from) {
+        heard_there = std::max(heard_there, w.spoken);
+    }
+    return moved;
 }
 
 // Of the time that work takes, only what makes a node another choice is worth telling anew.
@@ -56,7 +88,10 @@ void known_run::take(const word& w, std::uint64_t& numbers) {
         said.tasks = w.said.tasks;
     }
     if (!w.told()) {
-        from = w.from;
+        said.sources = w.said.sources;
+    }
+    if (w.from == from) {
+        heard_there = w.spoken;
     }
     seq = std::max(seq, w.seq);
     heard = std::max(heard, w.spoken);

@@ -203,6 +203,7 @@ void write_metrics(json_writer& w, const node& n) {
     number("datagrams_withheld", c.datagrams_withheld);
     number("group_received", c.group_received);
     number("group_dropped", c.group_dropped);
+    number("group_repeated", c.group_repeated);
     number("group_sent", c.group_sent);
     number("group_unsent", c.group_unsent);
     number("group_leases", c.group_leases);

@@ -159,12 +159,13 @@ presence::verdict presence::take_word(const word& w, time_point now) {
 presence::verdict presence::take_owners_word(entries::iterator at, const word& w, time_point now) {
     auto& r = at->second.owner;
     if (!r.is_older_than(w.seq, w.spoken)) {
-        if (w.told() && r.endpoints.empty() && r.place(w)) { // another way leads to it
+        const auto result = r.is_repeated_by(w) ? verdict::again : verdict::old;
+        if (r.hear_again(w)) {
             r.described = r.news = ++news_;
             freshen(*at);
             tell(at->first, change::moved, r.where());
         }
-        return verdict::old;
+        return result;
     }
     if (w.said.leaving) {
         r.seq = w.seq;
@@ -210,7 +211,9 @@ presence::verdict presence::take_namesakes_word(const word& w, time_point now) {
 presence::verdict presence::take_rivals_word(std::unique_ptr<rival>& second, const word& w, time_point now) {
     if (second && second->of.is(w.epoch, w.from)) {
         if (!second->of.is_older_than(w.seq, w.spoken)) {
-            return verdict::old;
+            const auto result = second->of.is_repeated_by(w) ? verdict::again : verdict::old;
+            second->of.hear_again(w);
+            return result;
         }
         if (w.said.leaving) {
             second->of.seq = w.seq;

@@ -95,6 +95,7 @@ class presence final : private deadline {
         taken,
         own,     ///< this node's own word, back from the group
         old,     ///< overtaken, repeated, or from a run that has left
+        again,   ///< taken already, of a run that says the same by several interfaces
         refused, ///< as many are known as may be
         unknown, ///< of a run that has not been described
         foreign, ///< of another pool
@@ -152,6 +153,8 @@ class presence final : private deadline {
 
     /// From where in the group that name is announced; nothing where it was not heard there.
     [[nodiscard]] std::optional<group_source> source_of(std::string_view node) const noexcept;
+    /// The run whose name it is; null where it was not heard in the group. Valid until the next change.
+    [[nodiscard]] const known_run* announced(std::string_view node) const noexcept;
     /// What is known of it; nothing where it is not known.
     [[nodiscard]] std::optional<known> look(std::string_view node) const;
     /// The node whose name follows, behind the last the first; nothing where nobody is known.

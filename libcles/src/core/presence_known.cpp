@@ -19,9 +19,13 @@ std::optional<std::string_view> presence::find(std::string_view node) const noex
 }
 
 std::optional<group_source> presence::source_of(std::string_view node) const noexcept {
+    const auto* const run = announced(node);
+    return run != nullptr ? std::optional{run->from} : std::nullopt;
+}
+
+const known_run* presence::announced(std::string_view node) const noexcept {
     const auto found = peers_.find(node);
-    const bool heard = found != peers_.end() && found->second.owner.from != group_source{};
-    return heard ? std::optional{found->second.owner.from} : std::nullopt;
+    return found != peers_.end() && found->second.owner.from != group_source{} ? &found->second.owner : nullptr;
 }
 
 std::optional<presence::known> presence::look(std::string_view node) const {

@@ -66,8 +66,8 @@ topic& publications::open(std::string_view path, bool to_publish) {
     auto made = std::make_unique<topic>(shared_, std::string{path}, highest_retired_, nouns.get());
     auto& result = *made;
     topics_.emplace(std::string{path}, std::move(made));
-    if (opened_) {
-        opened_(result);
+    for (auto* const each : observers_) { // none of them changes who they are
+        each->on_opened(result);
     }
     return result;
 }

@@ -51,8 +51,21 @@ class publications final : public topic_source {
     /// nothing of that number waits.
     bool cancel(std::uint64_t ticket);
 
-    /// Who is told of each topic that is made from now on, before anything is published there; empty: nobody.
-    void on_opened(std::function<void(topic&)> told) { opened_ = std::move(told); }
+    /// Who is told of each topic that is made, before anything is published there.
+    class observer {
+      public:
+        observer() = default;
+        observer(const observer&) = delete;
+        observer& operator=(const observer&) = delete;
+        virtual void on_opened(topic& made) = 0;
+
+      protected:
+        ~observer() = default;
+    };
+    /// From now on; until it is removed it has to stay.
+    void watch(observer& who) { observers_.push_back(&who); }
+    /// Does nothing where it is not there.
+    void unwatch(observer& who) { std::erase(observers_, &who); }
 
     /// The topic, or null.
     [[nodiscard]] topic* find(std::string_view path) noexcept override;
@@ -107,7 +120,7 @@ class publications final : public topic_source {
     std::string publisher_;
     std::string epoch_;
     std::function<void()> wake_;
-    std::function<void(topic&)> opened_;
+    std::vector<observer*> observers_;
     text_map<std::unique_ptr<task_nouns>> nouns_; // per task
     text_map<std::unique_ptr<topic>> topics_;
     std::uint64_t highest_retired_ = 0; // the highest `seq` that is not remembered any more

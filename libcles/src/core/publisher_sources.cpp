@@ -9,8 +9,10 @@
 namespace cles::core {
 
 publisher_sources::verdict publisher_sources::look(std::string_view node, const group_source& from, time_point now) {
-    if (const auto owner = others_.source_of(node)) {
-        return *owner == from ? verdict::taken : verdict::refused;
+    if (const auto* const run = others_.announced(node)) {
+        return !run->sends_from(from)      ? verdict::refused
+               : run->said.sources.empty() ? verdict::taken
+                                           : verdict::one_of_several;
     }
     if (const auto found = ties_.find(node); found != ties_.end()) {
         const bool same = found->second.to == from;

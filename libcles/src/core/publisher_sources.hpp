@@ -18,9 +18,10 @@ namespace cles::core {
 
 class presence;
 
-/// From which source a publisher's updates by the multicast group are taken: that of the run whose name it is. One
-/// that announces nothing is tied to the source that it was first heard from, until that falls silent. Another that
-/// sends updates under the name cannot silence it. Sources of other pools are not heard at all.
+/// From which sources a publisher's updates by the multicast group are taken: those of the run whose name it is (one
+/// for each of its interfaces; that the others are its own too, each of its announcements says). One that announces
+/// nothing is tied to the source that it was first heard from, until that falls silent. Another that sends updates
+/// under the name cannot silence it. Sources of other pools are not heard at all.
 class publisher_sources {
   public:
     static constexpr std::chrono::milliseconds silent_after{3'500};
@@ -30,7 +31,8 @@ class publisher_sources {
     enum class verdict : std::uint8_t {
         refused,
         taken,
-        another, ///< taken, from another source than before: what was known of the order says nothing of it
+        one_of_several, ///< taken, and the same may come from another of its sources
+        another,        ///< taken, from another source than before: what was known of the order says nothing of it
     };
     /// Whether an update of that node counts that has come from there; then it keeps the tie alive.
     verdict look(std::string_view node, const group_source& from, time_point now);

@@ -128,7 +128,7 @@ void engine::join_group() {
     try {
         group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
         group_->start();
-        neighbours_->join(*group_, multicast_.interface);
+        neighbours_->join(*group_);
     } catch (const error& e) {
         if (multicast_.required) {
             throw;

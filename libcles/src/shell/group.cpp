@@ -1,101 +1,140 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/group.hpp"
 
-#include "protocol/datagram.hpp"
 #include "shell/engine.hpp"
 
+#include <boost/asio/error.hpp>
+
 #include <algorithm>
-#include <cstdint>
 #include <random>
-#include <string>
 #include <utility>
+#include <vector>
 
 namespace cles::shell {
 namespace {
 
-core::group_source source_of(const boost::asio::ip::udp::endpoint& end) {
-    return {.address = end.address().to_v4().to_uint(), .port = end.port()};
+std::string cannot(const multicast_options& where, const std::string& interface) {
+    return "cannot join " + where.group + ":" + std::to_string(where.port) + " on '" + interface + "': ";
 }
 
-std::string text_of(const boost::asio::ip::udp::endpoint& end) {
-    return end.address().to_string() + ":" + std::to_string(end.port());
+error cannot_join(const multicast_options& where, const std::string& interface, const boost::system::error_code& why) {
+    const auto reason = why == boost::system::errc::address_not_available ? "it has no IPv4 address"
+                        : why == boost::asio::error::network_down         ? "it is down"
+                                                                          : why.message();
+    return {why, cannot(where, interface) + reason};
 }
 
-std::shared_ptr<transport::group_port> join(detail::engine& host, const multicast_options& where, bool insecure) {
-    check(where);
-    const auto cannot =
-        "cannot join " + where.group + ":" + std::to_string(where.port) + " on '" + where.interface + "': ";
+std::vector<transport::ip_interface> interfaces_here(const multicast_options& where) {
     try {
-        const auto by = transport::find_interface(where.interface);
-        if (!by.loopback && !insecure) {
-            throw error(errc::insecure_listen, "multicast on '" + where.interface +
-                                                   "' can be reached from other hosts, and nobody proves who they "
-                                                   "are; say 'insecure' if that is meant");
-        }
-        auto made = std::make_shared<transport::group_port>(host.executor(), by, where);
-        host.say(log_level::info, host.node().name + " takes part in " + text_of(made->group()) + " on " +
-                                      where.interface + ", sending from " + text_of(made->source()));
-        return made;
-    } catch (const error&) {
-        throw;
+        return transport::interfaces_of_host();
     } catch (const boost::system::system_error& e) {
-        throw error(e.code(), cannot + e.code().message());
+        throw cannot_join(where, where.interface, e.code());
     }
 }
 
 } // namespace
 
 group::group(detail::engine& host, const multicast_options& where, bool insecure)
-    : engine_(host), port_(join(host, where, insecure)), source_(source_of(port_->source())),
-      session_(host.shared_node(), source_, *this, std::random_device{}()) {}
+    : engine_(host), intake_(host.node(), *this, std::random_device{}()) {
+    check(where);
+    if (where.interface == "auto") {
+        join_automatic(where, insecure);
+    } else {
+        join_all(where, insecure);
+    }
+}
 
-group::~group() { port_->close(); }
+void group::join(const transport::ip_interface& by, const multicast_options& where, bool insecure) {
+    if (!by.loopback && !insecure) {
+        throw error(errc::insecure_listen, "multicast on '" + by.name +
+                                               "' can be reached from other hosts, and nobody proves who they "
+                                               "are; say 'insecure' if that is meant");
+    }
+    const auto& place = places_.emplace_back(engine_, intake_, by, where);
+    interfaces_ += (interfaces_.empty() ? "" : ", ") + by.name;
+    const auto& to = place.port().group();
+    engine_.say(log_level::info, engine_.node().name + " takes part in " + to.address().to_string() + ":" +
+                                     std::to_string(to.port()) + " on " + by.name + ", sending from " +
+                                     to_text(place.source()));
+}
 
-void group::start() { port_->start(*this); }
+// Where not all are required, one is enough.
+void group::join_all(const multicast_options& where, bool insecure) {
+    std::vector<error> failures;
+    for (const auto& name : interfaces_of(where)) {
+        try {
+            join(transport::find_interface(name), where, insecure);
+        } catch (const error&) {
+            throw;
+        } catch (const boost::system::system_error& e) {
+            failures.push_back(cannot_join(where, name, e.code()));
+        }
+        if (!failures.empty() && where.required) {
+            throw failures.front();
+        }
+    }
+    if (places_.empty()) {
+        throw failures.front();
+    }
+    for (const auto& e : failures) {
+        engine_.say(log_level::warning, e.message());
+    }
+}
+
+// What cannot be joined was not asked for by name.
+void group::join_automatic(const multicast_options& where, bool insecure) {
+    std::string left_out;
+    boost::system::error_code failure = boost::asio::error::network_down;
+    for (const auto& by : transport::automatic(interfaces_here(where))) {
+        if (places_.size() == multicast_options::most_interfaces) {
+            left_out += (left_out.empty() ? "" : ", ") + by.name;
+            continue;
+        }
+        try {
+            join(by, where, insecure);
+        } catch (const error&) {
+            throw;
+        } catch (const boost::system::system_error& e) {
+            failure = e.code();
+            engine_.say(log_level::warning, cannot_join(where, by.name, failure).message());
+        }
+    }
+    if (places_.empty()) {
+        throw error(failure, cannot(where, where.interface) + "no interface of this host can be used");
+    }
+    if (!left_out.empty()) {
+        engine_.say(log_level::warning, "multicast on 'auto' takes " + interfaces_ + ", and leaves out " + left_out);
+    }
+}
+
+void group::start() {
+    for (auto& each : places_) {
+        each.start();
+    }
+}
 
 void group::stop() {
-    for (auto* feed : session_.feeds().remove_all()) {
+    for (auto* feed : intake_.feeds().remove_all()) {
         if (auto waiting = feed->mail().close()) {
             engine_.completions().put(core::completion{
                 core::completion::event_failure{std::move(waiting), errc::stopped, "the service has been stopped"}});
         }
     }
-    session_.unbind_all();
-    port_->close();
+    for (auto& each : places_) {
+        each.stop();
+    }
 }
 
 bool group::send(std::string_view line) {
-    if (line.size() > protocol::datagram_bytes) {
-        ++engine_.node().counts.group_unsent;
-        return false;
+    bool sent = false;
+    for (auto& each : places_) {
+        sent = each.send(line) || sent;
     }
-    return put(line);
+    return sent;
 }
 
-void group::send_all(std::string_view lines) { put(lines); }
-
-// True where all of it has been sent, or waits for room.
-bool group::put(std::string_view lines) {
-    auto& counts = engine_.node().counts;
-    const auto taken = port_->send(lines);
-    counts.group_sent += taken.lines;
-    const auto left = lines.substr(taken.bytes);
-    counts.group_unsent += static_cast<std::uint64_t>(std::ranges::count(left, '\n'));
-    return left.empty();
-}
-
-void group::on_datagram(const transport::group_datagram& datagram) {
-    const auto keep = engine_.shared_from_this();
-    session_.on_message(source_of(datagram.from), datagram.said, engine_.now());
-    keep->completions().rethrow();
-}
-
-void group::on_batch() { engine_.settle(); }
-
-void group::on_room() {
-    const auto keep = engine_.shared_from_this();
-    session_.bindings().drain(engine_.now());
-    engine_.settle();
+bool group::has_room() const {
+    return std::all_of(places_.begin(), places_.end(), [](const auto& each) { return each.has_room(); });
 }
 
 } // namespace cles::shell

@@ -3,12 +3,13 @@
 
 #include <cles/multicast.hpp>
 
+#include "core/group_intake.hpp"
 #include "core/group_output.hpp"
-#include "core/group_session.hpp"
-#include "core/group_source.hpp"
-#include "transport/group_port.hpp"
+#include "shell/group_place.hpp"
+#include "transport/ip_interface.hpp"
 
-#include <memory>
+#include <deque>
+#include <string>
 #include <string_view>
 
 namespace cles::detail {
@@ -17,35 +18,33 @@ class engine;
 
 namespace cles::shell {
 
-/// A service's place in its multicast group.
-class group final : public core::group_output, private transport::group_events {
+/// A service's part in its multicast group: a place by each of its interfaces, and what it takes in by all of them.
+class group final : public core::group_output {
   public:
     /// Joins. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's code
     group(detail::engine& host, const multicast_options& where, bool insecure);
-    ~group();
 
     /// Begins to listen; to be called once.
     void start();
     /// Says goodbye, leaves, and ends the feeds; repeating it does nothing.
     void stop();
-    /// To all nodes of the group. What is not sent is counted.
+    /// To all nodes of the group, by each interface. False where it was sent by none.
     bool send(std::string_view line) override;
-    void send_all(std::string_view lines) override;
-    [[nodiscard]] bool has_room() const override { return port_->unsent() == 0; }
-    [[nodiscard]] core::group_session& session() noexcept { return session_; }
-    /// Where what this node sends comes from.
-    [[nodiscard]] const core::group_source& source() const noexcept { return source_; }
+    [[nodiscard]] bool has_room() const override;
+    [[nodiscard]] core::group_intake& intake() noexcept { return intake_; }
+    [[nodiscard]] std::deque<group_place>& places() noexcept { return places_; }
+    /// The names of the interfaces: "lo, eth0".
+    [[nodiscard]] const std::string& interfaces() const noexcept { return interfaces_; }
 
   private:
-    bool put(std::string_view lines);
-    void on_datagram(const transport::group_datagram& datagram) override;
-    void on_batch() override;
-    void on_room() override;
+    void join(const transport::ip_interface& by, const multicast_options& where, bool insecure);
+    void join_all(const multicast_options& where, bool insecure);
+    void join_automatic(const multicast_options& where, bool insecure);
 
     detail::engine& engine_;
-    std::shared_ptr<transport::group_port> port_;
-    core::group_source source_;
-    core::group_session session_;
+    core::group_intake intake_;
+    std::deque<group_place> places_; // which do not move
+    std::string interfaces_;
 };
 
 } // namespace cles::shell

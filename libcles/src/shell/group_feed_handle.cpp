@@ -18,7 +18,7 @@ group_feed_handle::~group_feed_handle() { leave(); }
 
 void group_feed_handle::leave() {
     if (auto* group = std::exchange(left_, true) ? nullptr : host_->group()) {
-        group->session().feeds().remove(feed_);
+        group->intake().feeds().remove(feed_);
         host_->settle();
     }
 }
@@ -29,7 +29,7 @@ void group_feed_handle::start(detail::pending_ptr bound) {
         host_->fail_later(std::move(bound), errc::stopped, "the service has been stopped");
         return;
     }
-    host_->group()->session().feeds().add(feed_, host_->now());
+    host_->group()->intake().feeds().add(feed_, host_->now());
     host_->settle();
     starting_ = true;
     asio::post(host_->executor(), [bound = std::move(bound), self = shared_from_this()]() mutable {

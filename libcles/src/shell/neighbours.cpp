@@ -25,10 +25,9 @@ neighbours::~neighbours() {
     engine_.node().others.probe_by(nullptr);
 }
 
-void neighbours::join(group& through, std::string interface) {
+void neighbours::join(group& through) {
     group_ = &through;
-    interface_ = std::move(interface);
-    group_->session().attend(this);
+    group_->intake().attend(this);
 }
 
 void neighbours::gossip(const gossip_options& how) {
@@ -105,7 +104,7 @@ void neighbours::stop() {
         gossiper_->stop();
     }
     if (group_ != nullptr) {
-        group_->session().attend(nullptr);
+        group_->intake().attend(nullptr);
         group_ = nullptr;
     }
 }
@@ -135,13 +134,24 @@ void neighbours::announce(std::chrono::milliseconds interval, bool leaving) {
         node.others.speak(said, seq_, engine_.now());
     }
     if (group_ != nullptr) {
-        said.endpoints = endpoints_for_group();
+        announce_to_group(said);
+    }
+}
+
+// By each interface with the endpoints that are of use there, and with the same number: it is one word.
+void neighbours::announce_to_group(core::announcement& said) {
+    auto& node = engine_.node();
+    if (const auto& own = group_->intake().own(); own.size() > 1) {
+        said.sources = own;
+    }
+    bool sent = false;
+    for (auto& place : group_->places()) {
+        said.endpoints = endpoints_for_group(place.source().is_loopback());
         std::string line;
         append_announcement(line, said, seq_, node.epoch);
-        if (group_->send(line)) {
-            ++node.counts.announcements_sent;
-        }
+        sent = place.send(line) || sent;
     }
+    node.counts.announcements_sent += sent ? 1 : 0;
 }
 
 // Those who hear of them from others pass over what they cannot use.
@@ -155,10 +165,10 @@ std::vector<std::string> neighbours::endpoints_for_gossip() const {
     return result;
 }
 
-// What others in the group can use: on loopback all but what stays in this process, elsewhere what other hosts reach.
-std::vector<std::string> neighbours::endpoints_for_group() const {
+// What others in the group can use by that interface: on loopback all but what stays in this process, elsewhere what
+// other hosts reach.
+std::vector<std::string> neighbours::endpoints_for_group(bool loopback) const {
     std::vector<std::string> result;
-    const bool loopback = group_->source().is_loopback();
     for (const auto& endpoint : engine_.node().endpoints) {
         auto where = parse_url(endpoint);
         if (where.scheme == "inproc") {
@@ -199,13 +209,17 @@ void neighbours::on_announcement(const core::group_source& from, const protocol:
         engine_.say_soon(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
         return;
     }
+    if (!group_->intake().is_of_this_host(from)) { // what is loopback there is another's here
+        std::erase_if(said.sources, [](const core::group_source& each) { return each.is_loopback(); });
+    }
     switch (engine_.node().others.hear(said, *update.epoch, *update.seq, from, now)) {
     case core::presence::verdict::taken: ++counts.announcements_received; break;
+    case core::presence::verdict::again: ++counts.group_repeated; break;
     case core::presence::verdict::old: ++counts.announcements_dropped; break;
     case core::presence::verdict::refused: ++counts.peers_refused; break;
     case core::presence::verdict::foreign:
         ++counts.announcements_foreign;
-        group_->session().pass_over(from, now + said.interval * 15);
+        group_->intake().pass_over(from, now + said.interval * 15);
         break;
     case core::presence::verdict::own:
     case core::presence::verdict::unknown: break;
@@ -258,7 +272,7 @@ void neighbours::follow_run(const std::string& name) {
     if (is_new || another) {
         engine_.feeds().on_new_run(name, another);
         if (group_ != nullptr) {
-            group_->session().feeds().on_new_run(name, engine_.now());
+            group_->intake().feeds().on_new_run(name, engine_.now());
         }
     }
 }
@@ -298,12 +312,17 @@ std::optional<std::string_view> neighbours::second_of(std::string_view node) con
     return engine_.node().others.second_of(node);
 }
 
+bool neighbours::expects_more_of(std::string_view node) const noexcept {
+    const auto* const run = round_.over() ? nullptr : engine_.node().others.announced(node);
+    return run != nullptr && run->endpoints.empty() && run->said.sources.size() > 1;
+}
+
 std::string neighbours::why_unknown() const {
     if (group_ == nullptr) {
         return gossiper_ ? "no node that it asks knows of it; " : "";
     }
     const bool others = engine_.node().counts.announcements_foreign != 0;
-    return "nobody of that name has announced itself on " + interface_ +
+    return "nobody of that name has announced itself on " + group_->interfaces() +
            (others ? ", where there are nodes of other pools too; " : "; ");
 }
 

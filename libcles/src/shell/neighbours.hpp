@@ -5,7 +5,7 @@
 
 #include "core/announcer.hpp"
 #include "core/first_round.hpp"
-#include "core/group_session.hpp"
+#include "core/group_intake.hpp"
 #include "core/presence.hpp"
 #include "shell/gossip_part.hpp"
 
@@ -42,7 +42,7 @@ class neighbours final : private core::group_presence,
     ~neighbours();
 
     /// The group is there.
-    void join(group& through, std::string interface);
+    void join(group& through);
     /// Takes part in gossip from now on, with these seeds. \throws cles::error where one of them is no URL
     void gossip(const gossip_options& how);
     /// What is said follows when the executor runs.
@@ -60,6 +60,9 @@ class neighbours final : private core::group_presence,
     void ask_for(std::string_view node);
     /// Whether a name that is not known may be heard any moment.
     [[nodiscard]] bool expects_more() const noexcept { return !round_.over(); }
+    /// Whether a node that is known, at no address that can be used, may be heard any moment by another of its
+    /// interfaces.
+    [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
     /// Why a name is not known, as the first part of a sentence; empty without a group.
     [[nodiscard]] std::string why_unknown() const;
 
@@ -75,7 +78,8 @@ class neighbours final : private core::group_presence,
     void probe(std::uint64_t ticket, std::string_view url) override;
     void follow_run(const std::string& name);
     void on_name_taken(const std::string& where);
-    [[nodiscard]] std::vector<std::string> endpoints_for_group() const;
+    void announce_to_group(core::announcement& said);
+    [[nodiscard]] std::vector<std::string> endpoints_for_group(bool loopback) const;
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
     detail::engine& engine_;
@@ -84,7 +88,6 @@ class neighbours final : private core::group_presence,
     std::unique_ptr<detail::gossip_host> gossiper_; // null: it takes no part
     std::uint32_t seed_;
     group* group_ = nullptr;
-    std::string interface_;
     std::map<std::string, std::uint32_t, std::less<>> runs_; // of each name: its epoch
     std::uint64_t seq_ = 0;
     bool begun_ = false;

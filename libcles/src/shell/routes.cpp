@@ -66,7 +66,7 @@ std::string routes::address_of(std::string_view target) const {
     }
     const auto unknown = own_name + " cannot find '" + std::string{target} + "': ";
     const auto& neighbours = engine_.neighbours();
-    if (const auto heard = neighbours.find(target)) {
+    if (const auto heard = neighbours.find(target); heard && !neighbours.expects_more_of(target)) {
         if (const auto second = neighbours.second_of(target)) {
             throw error(errc::no_target, "there are two nodes that call themselves '" + std::string{target} + "', at " +
                                              std::string{*heard} + " and at " + std::string{*second} +
@@ -118,7 +118,7 @@ route* routes::find(std::string_view target, std::string_view at, bool urgent, b
 void routes::on_whereabouts(std::string_view node) {
     recent_ = nullptr;
     const auto waiting = routes_.find(std::string{unheard}.append(node));
-    if (waiting == routes_.end()) {
+    if (waiting == routes_.end() || engine_.neighbours().expects_more_of(node)) {
         return;
     }
     const auto held = waiting->second;

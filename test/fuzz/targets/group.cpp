@@ -83,7 +83,7 @@ class listener final : public core::group_presence {
 class watched_group {
   public:
     watched_group() {
-        session_.attend(&presence_);
+        intake_.attend(&presence_);
         for (const auto& [target, path] :
              {std::pair{"all", "speed"}, std::pair{"car2", "speed"}, std::pair{"all", "a/b"}}) {
             feeds_.push_back(std::make_unique<core::group_feed>(node_.bounds, node_.completions, target, path));
@@ -92,7 +92,7 @@ class watched_group {
     }
     ~watched_group() {
         for (const auto& feed : feeds_) {
-            session_.feeds().remove(*feed);
+            intake_.feeds().remove(*feed);
         }
         session_.bindings().clear();
         require(node_.deadlines.size() == 0, "nothing is left behind");
@@ -161,9 +161,9 @@ class watched_group {
     }
     void toggle(std::size_t which) {
         if (open_[which]) {
-            session_.feeds().remove(*feeds_[which]);
+            intake_.feeds().remove(*feeds_[which]);
         } else {
-            session_.feeds().add(*feeds_[which], clock_.now());
+            intake_.feeds().add(*feeds_[which], clock_.now());
         }
         open_[which] = !open_[which];
     }
@@ -183,7 +183,8 @@ class watched_group {
     core::node& node_ = *shared_node_;
     output out_;
     listener presence_;
-    core::group_session session_{shared_node_, {.address = 0x7f000001, .port = 0}, out_, 1};
+    core::group_intake intake_{node_, out_, 1};
+    core::group_session session_{shared_node_, intake_, {.address = 0x7f000001, .port = 0}, out_, 1};
     std::vector<std::unique_ptr<core::group_feed>> feeds_;
     std::array<bool, 3> open_{};
     std::size_t published_ = 0;
