@@ -21,7 +21,7 @@
 #include <vector>
 
 /// A publisher in a process of its own, and its binders in this one. To be made before anything else of this process
-/// that its children would inherit. By multicast each exchange has a port of its own, so that neither receives the other.
+/// that its children would inherit. By multicast each exchange has a port of its own, so that they do not mix.
 namespace tool {
 
 /// The passes of one round: one that is paced, one as fast as possible.

@@ -149,8 +149,8 @@ void add_serve(CLI::App& app, context& shared) {
         ->type_name("NETWORK")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    wanted->multicast.add_to(*command,
-                             "By which interface it is found by its name, and publishes to those that bind by multicast");
+    wanted->multicast.add_to(
+        *command, "By which interface it is found by its name, and publishes to those that bind by multicast");
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
                     "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop it.\n\n"
                     "Examples:\n"
