@@ -213,11 +213,11 @@ void outbound::lose(errc why, std::string_view message) {
     }
 }
 
-std::vector<detail::pending_ptr> outbound::take_all() {
-    std::vector<detail::pending_ptr> taken;
+std::vector<completion::failure> outbound::take_all() {
+    std::vector<completion::failure> taken;
     for (auto& [id, e] : std::exchange(waiting_, {})) {
         node_.deadlines.disarm(*e);
-        taken.push_back(std::move(e->operation));
+        taken.push_back({std::move(e->operation), {}, {}, std::move(e->progress)});
     }
     return taken;
 }

@@ -51,8 +51,8 @@ class outbound {
     void refuse(const std::string& answer);
     /// Fails all that wait.
     void lose(errc why, std::string_view message);
-    /// Takes out all that wait, without a word.
-    [[nodiscard]] std::vector<detail::pending_ptr> take_all();
+    /// Takes out all that wait, without a word: to be put into the completion queue, with a reason.
+    [[nodiscard]] std::vector<completion::failure> take_all();
     [[nodiscard]] std::size_t in_flight() const noexcept { return waiting_.size(); }
 
   private:

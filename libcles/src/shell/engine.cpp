@@ -388,9 +388,12 @@ void engine::stop() {
     }
     turns_.stop();
     // Whoever waits hears of it on the executor, never from inside this call.
-    const auto tell = [this](std::vector<pending_ptr> waiting) {
-        for (auto& operation : waiting) {
-            fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+    constexpr auto why = "the service has been stopped";
+    const auto tell = [this](std::vector<core::completion::failure> waiting) {
+        for (auto& each : waiting) {
+            each.code = errc::stopped;
+            each.why = why;
+            node_->completions.put(core::completion{std::move(each)});
         }
     };
     feeds_.stop();
@@ -400,7 +403,9 @@ void engine::stop() {
     while (auto result = node_->published.next_result()) {
         asio::post(executor_, [result = std::move(*result)]() mutable { result.tell(); });
     }
-    tell(node_->published.take_waiters());
+    for (auto& operation : node_->published.take_waiters()) {
+        fail_later(std::move(operation), errc::stopped, why);
+    }
     neighbours_->stop();
     if (group_) {
         group_->stop();
@@ -408,13 +413,13 @@ void engine::stop() {
     tell(routes_.stop());
     if (departure_) {
         if (auto operation = departure_->give_up()) {
-            fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+            fail_later(std::move(operation), errc::stopped, why);
         }
     }
     for (const auto& c : connections_.all()) {
         tell(c->session().asking().take_all());
         c->flush();
-        c->abandon("the service has been stopped");
+        c->abandon(why);
     }
     connections_.stop();
 }

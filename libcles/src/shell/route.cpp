@@ -53,8 +53,9 @@ void route::send(const request& r, detail::pending_ptr operation, core::outbound
     if (r.noun.find(":cles") != std::string_view::npos) { // what keeps a network together
         held.resize(bytes);
     } else if (!held.try_resize(bytes)) {
-        engine_->fail_later(std::move(operation), errc::busy,
-                            "too much waits for a link to " + address_ + " or others (limits.memory)");
+        engine_->completions().put(core::completion{core::completion::failure{
+            std::move(operation), errc::busy, "too much waits for a link to " + address_ + " or others (limits.memory)",
+            std::move(progress)}});
         return;
     }
     auto w = std::make_unique<waiting>(*this);
@@ -79,8 +80,10 @@ bool route::cancel(std::uint64_t id) {
         return false;
     }
     auto operation = std::move((*found)->operation);
+    auto progress = std::move((*found)->progress);
     requests_.erase(found);
-    engine_->completions().fail(std::move(operation), errc::cancelled, "the request was withdrawn");
+    engine_->completions().fail(std::move(operation), errc::cancelled, "the request was withdrawn",
+                                std::move(progress));
     return true;
 }
 
@@ -197,15 +200,15 @@ void route::fail(boost::system::error_code code, std::string_view message) {
     }
 }
 
-std::vector<detail::pending_ptr> route::stop() {
+std::vector<core::completion::failure> route::stop() {
     if (const auto give_up = std::exchange(give_up_, nullptr)) {
         give_up();
     }
     binders_.clear();
     links_.clear();
-    std::vector<detail::pending_ptr> taken;
+    std::vector<core::completion::failure> taken;
     for (auto& w : std::exchange(requests_, {})) {
-        taken.push_back(std::move(w->operation));
+        taken.push_back({std::move(w->operation), {}, {}, std::move(w->progress)});
     }
     return taken;
 }

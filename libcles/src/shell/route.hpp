@@ -59,7 +59,7 @@ class route : public std::enable_shared_from_this<route> {
     /// Closes the links over which nothing goes on.
     void release();
     /// Gives up, and takes out the requests that wait.
-    [[nodiscard]] std::vector<detail::pending_ptr> stop();
+    [[nodiscard]] std::vector<core::completion::failure> stop();
 
     [[nodiscard]] const std::string& address() const noexcept { return address_; }
     /// Nothing is lost with it.

@@ -172,9 +172,9 @@ void routes::release(std::string_view url) {
     }
 }
 
-std::vector<detail::pending_ptr> routes::stop() {
+std::vector<core::completion::failure> routes::stop() {
     recent_ = nullptr;
-    std::vector<detail::pending_ptr> taken;
+    std::vector<core::completion::failure> taken;
     for (auto ended = std::exchange(routes_, {}); const auto& [where, r] : ended) {
         auto waiting = r->stop();
         taken.insert(taken.end(), std::make_move_iterator(waiting.begin()), std::make_move_iterator(waiting.end()));

@@ -52,7 +52,7 @@ class routes {
     /// Nobody is asked at that URL for a while: a link over which nothing goes on is closed.
     void release(std::string_view url);
     /// Gives up, and takes out the requests that wait.
-    [[nodiscard]] std::vector<detail::pending_ptr> stop();
+    [[nodiscard]] std::vector<core::completion::failure> stop();
 
   private:
     [[nodiscard]] std::string address_of(std::string_view target) const;
