@@ -359,6 +359,23 @@ BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_
     check_that_three_are_called(w, does, calls);
 }
 
+// A function for progress goes with its request.
+BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
+                     does) {
+    if (does == deed::throws) { // no destructor does
+        return;
+    }
+    world w;
+    std::array<int, 3> calls{};
+    end_three(w, asking::delegate, where, handler{&w, &calls[1], deed::nothing}, calls,
+              [doing = std::make_shared<doer>(w, does)](double, std::string_view) {});
+    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
+    w.run_what_is_ready();
+    w.acted = 1;
+    w.check_that_it_lives(does);
+    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
+}
+
 // Those of one noun share a binding.
 BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_deed) * data::make({false, true}), does,
                      share) {

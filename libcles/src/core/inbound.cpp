@@ -159,7 +159,7 @@ void inbound::cut_short() {
             c->stop();
         }
     }
-    while (has_more()) {
+    while (has_more() && !serving_waiting_) {
         serve_waiting(node_->time.now());
     }
 }

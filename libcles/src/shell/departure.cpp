@@ -65,7 +65,9 @@ void departure::on_deadline(time_point) {
 
 void departure::end() {
     engine_.deadlines().disarm(*this);
-    engine_.node().completions.succeed(std::move(done_), "{}");
+    if (done_) { // else it has been given up meanwhile
+        engine_.node().completions.succeed(std::move(done_), "{}");
+    }
 }
 
 detail::pending_ptr departure::give_up() {

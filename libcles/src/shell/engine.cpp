@@ -386,12 +386,13 @@ void engine::stop() {
     }
     turns_.stop();
     // Callers that wait are told on the executor, never from inside this call.
+    constexpr auto why = "the service has been stopped";
     feeds_.stop();
     if (outside_updates_) {
         outside_updates_->close();
     }
     for (auto& operation : node_->published.take_waiters()) {
-        fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+        fail_later(std::move(operation), errc::stopped, why);
     }
     neighbours_->stop();
     if (group_) {
@@ -400,13 +401,13 @@ void engine::stop() {
     routes_.stop();
     if (departure_) {
         if (auto operation = departure_->give_up()) {
-            fail_later(std::move(operation), errc::stopped, "the service has been stopped");
+            fail_later(std::move(operation), errc::stopped, why);
         }
     }
     for (const auto& c : connections_.all()) {
         c->session().asking().stop();
         c->flush();
-        c->abandon("the service has been stopped");
+        c->abandon(why);
     }
     connections_.stop();
 }
