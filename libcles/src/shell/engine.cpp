@@ -6,6 +6,7 @@
 #include "core/call.hpp"
 #include "core/later.hpp"
 #include "protocol/message.hpp"
+#include "shell/completion_drain.hpp"
 #include "shell/departure.hpp"
 #include "shell/option_checks.hpp"
 #include "shell/service_call.hpp"
@@ -37,9 +38,9 @@ core::node_setup setup_of(service_options& options, const asio::any_io_executor&
             .log = std::move(options.log),
             .metrics = std::move(options.metrics),
             .load = std::move(options.load),
-            // Each as a function of its own: the executor calls the others whatever one of them throws, in a loop that
-            // one of them runs too; and what waits there owns nothing but itself, so that it goes with the context.
-            .complete = [executor](core::completion due) { asio::post(executor, std::move(due)); }};
+            .complete = [drain = std::make_shared<shell::completion_drain>(executor)](core::completion due) {
+                drain->put(std::move(due));
+            }};
 }
 
 void check_pool_name(const std::string& pool) {
