@@ -75,7 +75,7 @@ void an_open_service() {
 
 void a_service_in_a_group() {
     cles::service_options in_group{.name = "car3"};
-    in_group.multicast.interface = "lo"; // "eth0" needs `insecure`, as listening there does
+    in_group.multicast.interface = "lo"; // "eth0", "lo,eth0" and "auto" need `insecure`, as listening there does
     asio::io_context io;
     const cles::service car{io, in_group};
 }
