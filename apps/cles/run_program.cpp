@@ -111,9 +111,11 @@ program_end run_program(const std::vector<std::string>& arguments, std::chrono::
         ::kill(child, SIGKILL);
     }
     int status = 0;
-    while (::waitpid(child, &status, 0) == -1 && errno == EINTR) {
-    }
-    end.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+    pid_t ended = -1;
+    do {
+        ended = ::waitpid(child, &status, 0);
+    } while (ended == -1 && errno == EINTR);
+    end.code = ended == child && WIFEXITED(status) ? WEXITSTATUS(status) : -1;
     return end;
 }
 

@@ -31,7 +31,7 @@ std::string reason_of(const std::exception_ptr& failure) {
     }
 }
 
-// By each interface at its address there, so that whoever hears this one there can ask it.
+// By each interface at its address there, so that nodes on that network can reach this one.
 std::vector<std::string> listen_at(const cles::multicast_options& group) {
     std::vector<std::string> urls;
     for (const auto& interface : cles::interfaces_of(group)) {

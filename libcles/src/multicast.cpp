@@ -48,7 +48,7 @@ void check_interfaces(const std::string& list) {
             refuse("has an empty name of an interface");
         }
         if (names.size() > 1 && (*name == "auto" || *name == "off")) {
-            refuse("has '" + *name + "' beside others, which is said alone");
+            refuse("combines '" + *name + "' with other names");
         }
         if (std::find(names.begin(), name, *name) != name) {
             refuse("names '" + *name + "' twice");

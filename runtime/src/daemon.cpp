@@ -192,7 +192,6 @@ void daemon::close(const drain_report& how) {
     if (how.abandoned > 0) {
         log_.warning(counted(how.abandoned, "job") + " did not end in time");
     }
-    leaves_something_ = leaves_something_ || how.stuck > 0;
     // What it passes on to others, and what its plugins serve without workers, is to be answered too.
     service_.async_close(std::max<milliseconds>(time_left(), 100ms), [this](boost::system::error_code) { finish(); });
 }
@@ -220,11 +219,11 @@ void daemon::finish() {
     boost::asio::post(io_, [this] { io_.stop(); });
 }
 
-// Here, and not in the destructor, so that it is known whether anything is left. Where something is already, the
-// process does not wait for the rest either.
+// Here, and not in the destructor, so that it is known whether anything is left. Jobs that were told to stop at the end
+// of the drain get a moment to do so.
 void daemon::close_pool() {
-    if (!leaves_something_) {
-        leaves_something_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0;
+    if (!cut_short_) {
+        leaves_something_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || leaves_something_;
     }
 }
 

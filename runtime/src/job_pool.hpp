@@ -49,12 +49,12 @@ class job_pool {
     [[nodiscard]] pool_figures figures() const;
 
     /// Admits no more, and calls back when all jobs have ended. At the limit it answers what is left, tells what runs
-    /// to stop, and calls back; the destructor then waits for no job. To be called once.
+    /// to stop, and calls back; the destructor then waits for no job, `close` as long as it is told. To be called once.
     void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
 
-    /// What the destructor does, with another limit than `pool_options::patience`: answers what is left, and waits so
-    /// long for the workers and for `on_stop` callbacks, and a second at most for what is about to end. Returns how
-    /// many threads are left behind; 0 where the pool has been closed before.
+    /// What the destructor does, with another limit than `pool_options::patience`: answers what is left, and waits
+    /// that long in all for the workers and for `on_stop` callbacks, and a second at most for what is about to end.
+    /// Returns how many threads are left behind; 0 if the pool has been closed before.
     std::size_t close(std::chrono::milliseconds limit);
 
     /// For `pooled_registrar`, whose handlers may be called after the pool has gone.

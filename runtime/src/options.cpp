@@ -20,7 +20,7 @@ constexpr auto footer =
     "SIGTERM and Ctrl-C stop it when its jobs have ended, within the limit 'drain'; a second one at once. SIGHUP has "
     "it\n"
     "read 'seeds' and 'log' again.\n\n"
-    "Exit codes: 0 ok, 1 could not run, 2 usage or configuration.\n\n"
+    "Exit codes: 0 ok, 1 could not run, 2 usage or configuration, 3 another node has the name.\n\n"
     "Examples:\n"
     "  clesd                           # with the defaults: a node on loopback, without tasks\n"
     "  clesd --config clesd.yaml --check\n"

@@ -468,7 +468,7 @@ std::size_t pool_state::close(std::optional<std::chrono::milliseconds> limit) {
     if (closed_) {
         return 0;
     }
-    const auto patience = std::min(limit.value_or(patience_), patience_);
+    const auto end = clock::now() + limit.value_or(patience_);
     draining_ = true;
     drain_report unheard;
     abandon(unheard);
@@ -498,11 +498,14 @@ std::size_t pool_state::close(std::optional<std::chrono::milliseconds> limit) {
         const std::lock_guard lock{executor_mutex_};
         executor_ = {};
     }
-    const auto workers = workers_.join(patience);
+    const auto time_left = [end] {
+        return std::max(std::chrono::ceil<std::chrono::milliseconds>(end - clock::now()), 0ms);
+    };
+    const auto workers = workers_.join(time_left());
     if (workers != 0) {
         say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(workers));
     }
-    const auto callbacks = stop_notifier_.end(patience);
+    const auto callbacks = stop_notifier_.end(time_left());
     if (callbacks != 0) {
         say(log_level::error,
             "threads left behind in on_stop callbacks that do not return: " + std::to_string(callbacks));

@@ -167,7 +167,7 @@ class Interfaces(unittest.TestCase):
                 ("lo,y0", 1, "on 'y0': it is down"),
                 ("lo,", 2, "'lo,' has an empty name of an interface"),
                 ("lo,v0,lo", 2, "'lo,v0,lo' names 'lo' twice"),
-                ("lo,auto", 2, "'auto' beside others"),
+                ("lo,auto", 2, "combines 'auto' with other names"),
                 ("a,b,c,d,e,f,g,h,i", 2, "names 9 interfaces: at most 8"),
         ):
             ended, out, err = self.run_at(self.hosts.near, "off", "serve", "--listen", "tcp://0.0.0.0:0", "--insecure",

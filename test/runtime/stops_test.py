@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: BSL-1.0
 """Jobs that are stopped: each is told, soon, whatever the others do when they are told."""
 
+import socket
 import time
 import unittest
 
@@ -96,6 +97,23 @@ class Stops(unittest.TestCase):
         self.assertLess(took, 5)
         entry = self.daemon.wait_for_entry("threads left behind in on_stop callbacks that do not return: 1")
         self.assertEqual(entry["level"], "error")
+
+    def test_a_job_that_is_stopped_by_the_end_of_the_drain_may_end(self):
+        """Also where no link is there to wait for, as it was asked for by UDP."""
+        self.daemon.__exit__()
+        self.daemon = Daemon(f"plugins: [{STUBBORN}]\nstuck_after: 500ms\ndrain: 200ms\n",
+                             base=DEFAULTS.replace("tcp://127.0.0.1:0", "[tcp://127.0.0.1:0, udp://127.0.0.1:0]"))
+        self.addCleanup(self.daemon.__exit__)
+        self.file = self.daemon.file("marks")
+        with self.daemon.connect() as link:
+            endpoints = body(link.ask("PULL sat1:cles"))["endpoints"]
+        port = next(int(url.rpartition(":")[2]) for url in endpoints if url.startswith("udp:"))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker:
+            noun = f"ends_when_stopped/{self.file.replace('/', '%2F')}/ended"
+            asker.sendto(f"DELEGATE sat1:{noun} id=1 deadline=60000".encode(), ("127.0.0.1", port))
+            wait_until(lambda: self.count("begun") == 1, "the job has begun")
+            self.assertEqual(self.daemon.stop()[0], 0)
+        self.assertEqual(self.count("ended"), 1)
 
     def test_more_that_block_than_there_are_threads_are_reported(self):
         with self.daemon.connect() as link:

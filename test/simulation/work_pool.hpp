@@ -20,7 +20,7 @@
 namespace cles::simulation {
 
 /// The workers of a daemon, in virtual time. Who is admitted, whose turn it is and who is stuck is decided by the
-/// machines of runtime/src; this does for them what its crew and pool_state do. They are to be kept alike.
+/// machines of runtime/src; this does for them what its worker_pool and pool_state do. They are to be kept alike.
 class work_pool final : public std::enable_shared_from_this<work_pool> {
   public:
     static constexpr std::size_t workers = 2;

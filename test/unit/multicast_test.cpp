@@ -79,8 +79,8 @@ BOOST_AUTO_TEST_CASE(lists_of_interfaces_that_make_no_sense_are_refused) {
     BOOST_TEST(refusal("lo,") == "'lo,' has an empty name of an interface");
     BOOST_TEST(refusal("lo,,eth0,239.1.2.3") == "'lo,,eth0' has an empty name of an interface");
     BOOST_TEST(refusal("lo,eth0,lo") == "'lo,eth0,lo' names 'lo' twice");
-    BOOST_TEST(refusal("lo,auto") == "'lo,auto' has 'auto' beside others, which is said alone");
-    BOOST_TEST(refusal("off,lo").find("'off' beside others") != std::string::npos);
+    BOOST_TEST(refusal("lo,auto") == "'lo,auto' combines 'auto' with other names");
+    BOOST_TEST(refusal("off,lo").find("combines 'off' with other names") != std::string::npos);
     BOOST_TEST(refusal("a,b,c,d,e,f,g,h,i") == "'a,b,c,d,e,f,g,h,i' names 9 interfaces: at most 8 take part");
     BOOST_CHECK_THROW(cles::check({.interface = "lo,lo"}), cles::error);
 }

@@ -55,6 +55,15 @@ BOOST_AUTO_TEST_CASE(a_node_heard_by_two_interfaces_is_one_node_asked_by_the_fir
     BOOST_TEST(asked.empty()); // it is no clash
 }
 
+BOOST_AUTO_TEST_CASE(new_endpoints_count_though_they_come_by_the_other_interface_first) {
+    hear(1, first);
+    pass(1s);
+    const auto moved = saying("tcp://0.0.0.0:2");
+    BOOST_TEST((hear(2, second, moved) == verdict::taken));
+    BOOST_TEST((hear(2, first, moved) == verdict::again));
+    BOOST_TEST(where("car1") == "tcp://10.0.0.7:2");
+}
+
 BOOST_AUTO_TEST_CASE(what_it_says_by_the_other_interface_may_be_the_only_one_that_comes) {
     hear(1, first);
     pass(1s);

@@ -3,6 +3,7 @@
 
 #include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
+#include <cles/multicast.hpp>
 #include <cles/peer.hpp>
 
 #include "core/group_source.hpp"
@@ -24,7 +25,7 @@ inline constexpr std::chrono::milliseconds longest_interval{60'000};
 inline constexpr std::size_t most_endpoints = 16;
 inline constexpr std::size_t longest_endpoint = 128;
 inline constexpr std::size_t longest_digest = 64;
-inline constexpr std::size_t most_sources = 8;
+inline constexpr std::size_t most_sources = multicast_options::most_interfaces;
 
 struct announcement {
     std::string node;
@@ -34,7 +35,7 @@ struct announcement {
     std::string tasks{};                       ///< a digest of its tasks
     bool leaving = false;
     std::string pool{}; ///< empty: the one without a name
-    /// All from which the node sends to the group, where they are several: it takes part by as many interfaces.
+    /// Its sources in the group, one for each interface; empty if it takes part by one.
     std::vector<group_source> sources{};
 };
 

@@ -102,8 +102,8 @@ class completion {
 /// that no function of the library is unwound by it: who hands lines over throws it on, by `rethrow`.
 class completion_queue {
   public:
-    /// Calls a completion when what runs now has ended, in the order of the calls, each by itself: what one throws must
-    /// keep no other from being called.
+    /// Calls a completion when what runs now has ended, in the order of the calls. What one throws must keep no other
+    /// from being called.
     using runner = std::function<void(completion)>;
 
     /// Without a runner completions are called at once, for those who have no executor.

@@ -59,7 +59,7 @@ bool known_run::hear_again(const word& w) {
     if (w.seq != seq) { // overtaken
         return false;
     }
-    const bool moved = w.from != from && place(w);
+    const bool moved = place(w); // also where a copy by another interface was the first to bring new endpoints
     if (w.from == from) {
         heard_there = std::max(heard_there, w.spoken);
     }

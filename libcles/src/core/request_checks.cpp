@@ -85,14 +85,21 @@ std::optional<protocol::failure> objection(const node& n, const identity& peer, 
     }
     // What is told of the reserved task is for the link that it comes by: an id to withdraw, for one.
     const bool stays = n.way == nullptr || (r.noun.task == "cles" && r.verb != verb::pull);
-    if ((stays && !is_for(n, r)) || passes(r.via, n.name)) {
-        if (n.way == nullptr && protocol::is_reserved_target(r.noun.target) && !is_for(n, r)) {
-            return object(errc::no_target, n.name + " does not route, and so asks nobody for '" +
-                                               std::string{r.noun.target} +
-                                               "': give it cles::routing() as service_options::routing, or ask a node "
-                                               "that routes, as clesd does");
+    if (stays && !is_for(n, r)) {
+        const auto target = protocol::quoted(r.noun.target);
+        if (n.way != nullptr) {
+            return object(errc::no_target, n.name + " forwards PULL of 'cles' only, and this is for " + target);
         }
-        return object(errc::no_target, n.name + " cannot find '" + std::string{r.noun.target} + "'");
+        return object(errc::no_target,
+                      n.name + " does not route, and so asks nobody for " + target +
+                          (protocol::is_reserved_target(r.noun.target)
+                               ? ": give it cles::routing() as service_options::routing, or ask a node that routes, "
+                                 "as clesd does"
+                               : ": ask that node itself, or a node that routes, as clesd does"));
+    }
+    if (passes(r.via, n.name)) {
+        return object(errc::no_target, n.name + " has forwarded this request for " + protocol::quoted(r.noun.target) +
+                                           " before: the nodes in 'via' pass it round");
     }
     std::string why;
     if (!r.body.empty() && !is_valid_json(r.body, n.bounds.depth, &why)) {

@@ -130,6 +130,9 @@ void routing::begin_ready(time_point now) {
     for (auto left = ready_.size(); left != 0 && !ready_.empty(); --left) {
         auto next = std::move(ready_.front());
         ready_.pop_front();
+        if (!ready_.empty()) {
+            wake_(); // before user code is called, which may throw
+        }
         if (!next->over()) {
             begin(std::move(next), now);
         }

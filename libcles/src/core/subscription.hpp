@@ -45,8 +45,8 @@ class subscription {
     /// Its BIND has been answered: what comes is for it. (For one alone nothing comes before.)
     [[nodiscard]] virtual bool is_bound() const noexcept { return true; }
 
-    /// Hands an update on: first a gap that it shows, then itself. False where it is old or repeated, or its body is no
-    /// JSON.
+    /// Hands an update on: first a gap that it shows, then itself. False where it is old or repeated, or its body is
+    /// not JSON.
     bool take(const protocol::request_line& update, feed_mailbox::hand_over when = feed_mailbox::hand_over::now);
     /// Updates up to this one are old.
     void skip_to(const update_mark& mark) noexcept { order_.take(mark.epoch, mark.seq); }

@@ -3,6 +3,7 @@
 
 #include <boost/asio/post.hpp>
 
+#include <algorithm>
 #include <utility>
 
 namespace cles::shell {
@@ -42,7 +43,8 @@ void completion_drain::post() {
 
 void completion_drain::run() {
     is_posted_ = false;
-    for (int called = 0; called < most_at_once && !due_.empty(); ++called) {
+    // No fewer than there are, or a function that puts more of them each time would never be caught up with.
+    for (auto left = std::max(most_at_once, due_.size()); left != 0 && !due_.empty(); --left) {
         auto next = std::move(due_.front());
         due_.pop_front();
         if (!due_.empty()) {

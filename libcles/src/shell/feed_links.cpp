@@ -255,7 +255,8 @@ void feed_links::bind(core::feed_machine& feed) {
 void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feeds_.at(&feed);
     // Of a binding that is there, updates may be queued at the publisher that are older than the value it answers with.
-    const bool joins = !feed.was_bound() && c->session().bound().has_bound_for(feed);
+    // (The answer of `all` is of several publishers, and says in its body how old each value is.)
+    const bool joins = !feed.was_bound() && feed.target() != "all" && c->session().bound().has_bound_for(feed);
     auto marks = e.terms.marked ? marking::as_update : joins ? marking::up_to_it : marking::none;
     if (marks != marking::none && !c->marks()) {
         ask_for_features(feed, c);
@@ -272,14 +273,18 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     if (marks != marking::none) {
         request.adverbs = adverbs;
     }
-    c->bind(feed, request, core::later(now, time_limit(e.terms.deadline, verb::bind)),
+    const auto whole = core::later(now, time_limit(e.terms.deadline, verb::bind));
+    const auto due = std::exchange(e.due, {}).value_or(whole);
+    c->bind(feed, request, due > now ? std::min(due, whole) : whole,
             detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked, marks)});
 }
 
 void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
-    const auto& e = feeds_.at(&feed);
+    auto& e = feeds_.at(&feed);
     const auto now = engine_.now();
-    const auto limit = std::min(time_limit({}, verb::pull), time_limit(e.terms.deadline, verb::bind));
+    const auto whole = time_limit(e.terms.deadline, verb::bind);
+    const auto limit = std::min(time_limit({}, verb::pull), whole);
+    e.due = core::later(now, whole);
     c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = engine_.draw_id()},
                                core::later(now, limit), now,
                                detail::pending_ptr{new features_reply(engine_.weak_from_this(), e.handle, feed, c)});

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 namespace cles::detail {
@@ -51,8 +52,9 @@ class feed_links final : public core::feed_host {
         std::weak_ptr<detail::feed_control> handle;
         feed_terms terms;
         std::weak_ptr<connection> on;
-        std::string at{};         // the URL where it was asked for last
-        std::uint64_t asking = 0; // the id of its last BIND by datagram
+        std::string at{};                // the URL where it was asked for last
+        std::uint64_t asking = 0;        // the id of its last BIND by datagram
+        std::optional<time_point> due{}; // until when a BIND is to be answered that waits for the node's features
     };
 
     class features_reply;

@@ -64,8 +64,8 @@ void group::join_all(const multicast_options& where, bool insecure) {
     for (const auto& name : interfaces_of(where)) {
         try {
             join(transport::find_interface(name), where, insecure);
-        } catch (const error&) {
-            throw;
+        } catch (const error& refused) {
+            failures.push_back(refused);
         } catch (const boost::system::system_error& e) {
             failures.push_back(cannot_join(where, name, e.code()));
         }
@@ -92,8 +92,12 @@ void group::join_automatic(const multicast_options& where, bool insecure) {
         }
         try {
             join(by, where, insecure);
-        } catch (const error&) {
-            throw;
+        } catch (const error& refused) {
+            if (where.required) {
+                throw;
+            }
+            failure = refused.code();
+            engine_.say(log_level::warning, refused.message());
         } catch (const boost::system::system_error& e) {
             failure = e.code();
             engine_.say(log_level::warning, cannot_join(where, by.name, failure).message());

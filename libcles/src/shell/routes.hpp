@@ -51,7 +51,7 @@ class routes {
     void drop(const connection& c);
     /// Nobody is asked at that URL for a while: a link over which nothing goes on is closed.
     void release(std::string_view url);
-    /// Gives up, and takes out the requests that wait.
+    /// Gives up, and fails the requests that wait.
     void stop();
 
   private:

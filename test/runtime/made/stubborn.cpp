@@ -68,6 +68,17 @@ void register_stops(cles::registrar& to) {
         });
         mark(file, "begun");
     });
+    // What it controls takes a moment to stop.
+    to.on_delegate("ends_when_stopped", [](const cles::request& asked, cles::responder answer) {
+        const std::string file{asked.parameter(0)};
+        mark(file, "begun");
+        while (!answer.stopped()) {
+            std::this_thread::sleep_for(2ms);
+        }
+        std::this_thread::sleep_for(20ms);
+        mark(file, std::string{asked.parameter(1)});
+        answer.fail(cles::errc::cancelled, "stopped");
+    });
     to.on_delegate("blocks_when_stopped", [](const cles::request& asked, const cles::responder& answer) {
         answer.on_stop([answer] {
             ++blocked_callbacks;
