@@ -38,7 +38,10 @@ struct told_link final : cles::link {
     [[nodiscard]] std::uint64_t received() const noexcept override { return 12; }
     void pause(bool stop) override { asked.emplace_back(stop ? "pause" : "go on"); }
     void finish() override { asked.emplace_back("finish"); }
-    void close() override { asked.emplace_back("close"); }
+    void close() override {
+        asked.emplace_back("close");
+        events.reset();
+    }
     [[nodiscard]] std::size_t buffered() const noexcept override { return 50'000; }
     void shrink() override { asked.emplace_back("shrink"); }
     [[nodiscard]] const cles::identity& peer() const noexcept override { return who; }
