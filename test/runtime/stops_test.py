@@ -100,7 +100,6 @@ class Stops(unittest.TestCase):
 
     def test_a_job_that_is_stopped_by_the_end_of_the_drain_may_end(self):
         """Also where no link is there to wait for, as it was asked for by UDP."""
-        self.daemon.__exit__()
         self.daemon = Daemon(f"plugins: [{STUBBORN}]\nstuck_after: 500ms\ndrain: 200ms\n",
                              base=DEFAULTS.replace("tcp://127.0.0.1:0", "[tcp://127.0.0.1:0, udp://127.0.0.1:0]"))
         self.addCleanup(self.daemon.__exit__)

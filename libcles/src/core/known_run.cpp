@@ -59,7 +59,8 @@ bool known_run::hear_again(const word& w) {
     if (w.seq != seq) { // overtaken
         return false;
     }
-    const bool moved = place(w); // also where a copy by another interface was the first to bring new endpoints
+    // From where it is asked, what it says counts if a copy from elsewhere was taken before it; else it is a repeat.
+    const bool moved = (w.from != from || heard_there < heard) && place(w);
     if (w.from == from) {
         heard_there = std::max(heard_there, w.spoken);
     }
