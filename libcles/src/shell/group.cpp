@@ -70,11 +70,11 @@ void group::join_all(const multicast_options& where, bool insecure) {
             failures.push_back(cannot_join(where, name, e.code()));
         }
         if (!failures.empty() && where.required) {
-            throw failures.front();
+            throw error{failures.front()};
         }
     }
     if (places_.empty()) {
-        throw failures.front();
+        throw error{failures.front()};
     }
     for (const auto& e : failures) {
         engine_.say(log_level::warning, e.message());
