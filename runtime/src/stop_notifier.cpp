@@ -102,8 +102,9 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
         lock.lock();
         --calls;
         if (mine->blocks) {
-            --blocked;
-            exhausted = false;
+            if (--blocked == 0) {
+                exhausted = false;
+            }
         } else {
             current = nullptr;
         }
@@ -142,7 +143,7 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
     std::size_t working = 0;       // threads in `work`
     std::size_t calls = 0;         // under way, those that block too
     std::size_t blocked = 0;
-    bool exhausted = false; // which has been reported
+    bool exhausted = false; // which has been reported, and is not again before all of them have returned
     bool ending = false;
     bool ended = false;
 };
