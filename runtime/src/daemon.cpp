@@ -150,7 +150,7 @@ void daemon::stop(int signal) {
     const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
     if (std::exchange(signalled_, true)) {
         log_.warning("stopping at once, on a second signal");
-        cut_short_ = leaves_something_ = true; // nobody has looked
+        cut_short_ = true;
         finish();
         return;
     }
@@ -210,7 +210,7 @@ void daemon::finish() {
     if (stopped.callbacks > 0) {
         log_.warning(counted(stopped.callbacks, "on_stop callback") + " of plugins did not return");
     }
-    leaves_something_ = leaves_something_ || !stopped.late.empty() || stopped.callbacks > 0;
+    leaves_something_ = !stopped.late.empty() || stopped.callbacks > 0;
     service_.stop();
     close_pool();
     signals_.close();

@@ -39,7 +39,7 @@ class daemon {
     [[nodiscard]] bool gave_way() const noexcept { return gave_way_; }
     /// Whether something is left that does not end, a job, an `on_stop` callback or a plugin: the process then has to
     /// go without waiting for it, by `std::_Exit`.
-    [[nodiscard]] bool leaves_something() const noexcept { return leaves_something_; }
+    [[nodiscard]] bool leaves_something() const noexcept { return cut_short_ || leaves_something_; }
 
   private:
     void load_plugins();
@@ -66,7 +66,7 @@ class daemon {
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;
     bool signalled_ = false;
-    bool cut_short_ = false; // by a second signal
+    bool cut_short_ = false; // by a second signal: it is not known what is left
     bool finished_ = false;
     bool leaves_something_ = false;
     bool gave_way_ = false;

@@ -464,11 +464,11 @@ void pool_state::abandon(drain_report& report) {
     }
 }
 
-std::size_t pool_state::close(std::optional<std::chrono::milliseconds> limit) {
+std::size_t pool_state::close(std::chrono::milliseconds limit) {
     if (closed_) {
         return 0;
     }
-    const auto end = clock::now() + limit.value_or(patience_);
+    const auto end = clock::now() + limit;
     draining_ = true;
     drain_report unheard;
     abandon(unheard);

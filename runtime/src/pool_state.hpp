@@ -50,7 +50,8 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
     [[nodiscard]] pool_figures figures() const;
     void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
     /// Returns how many threads are left behind.
-    std::size_t close(std::optional<std::chrono::milliseconds> limit = {});
+    std::size_t close(std::chrono::milliseconds limit);
+    std::size_t close() { return close(patience_); }
     /// A handler ran on this executor for so long.
     void note_inline(std::string_view task, std::chrono::nanoseconds took);
 

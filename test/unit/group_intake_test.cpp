@@ -27,10 +27,9 @@ constexpr std::array<group_source, 2> car2{
 constexpr group_source forger{.address = 0x0A000009, .port = 4666};
 
 /// Sends by both.
-struct both final : cles::core::group_output {
+struct both final : cles::core::group_sender {
     both(cles::test::group_recorder& a, cles::test::group_recorder& b) : one(a), two(b) {}
     bool send(std::string_view line) override { return one.send(line) && two.send(line); }
-    [[nodiscard]] bool has_room() const override { return true; }
     cles::test::group_recorder& one;
     cles::test::group_recorder& two;
 };

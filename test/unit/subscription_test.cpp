@@ -218,7 +218,7 @@ BOOST_AUTO_TEST_CASE(what_comes_for_others_before_its_own_answer_is_not_for_one_
     BOOST_TEST(!hear(all, 3));
 }
 
-// Whoever leaves leaves the binding to the others, of which each may turn out to be the last.
+// One that leaves, leaves the binding to the others, each of which may be the last.
 BOOST_AUTO_TEST_CASE(who_has_shared_a_binding_knows_it_until_it_is_on_a_link_anew) {
     cles::core::subscriptions all;
     recorder one{"car1", "speed", false, 16};

@@ -13,26 +13,9 @@ namespace {
 
 constexpr std::size_t depth = 8; // of what later versions may add
 
-bool read_endpoints(json_reader& r, std::vector<std::string>& out) {
-    out.clear();
-    if (!r.begin_array()) {
-        return false;
-    }
-    while (r.next_element()) {
-        std::string_view url;
-        if (!r.read(url)) {
-            return false;
-        }
-        if (out.size() < most_endpoints && !url.empty() && url.size() <= longest_endpoint) {
-            out.emplace_back(url);
-        }
-    }
-    return r.ok();
-}
-
-// One that cannot be read is passed over: it may be one that a later version has.
-bool read_sources(json_reader& r, std::vector<group_source>& out) {
-    out.clear();
+/// Reads an array of strings, each of which is given to `take` for the call.
+template <class F>
+bool read_texts(json_reader& r, F take) {
     if (!r.begin_array()) {
         return false;
     }
@@ -41,11 +24,28 @@ bool read_sources(json_reader& r, std::vector<group_source>& out) {
         if (!r.read(text)) {
             return false;
         }
+        take(text);
+    }
+    return r.ok();
+}
+
+bool read_endpoints(json_reader& r, std::vector<std::string>& out) {
+    out.clear();
+    return read_texts(r, [&out](std::string_view url) {
+        if (out.size() < most_endpoints && !url.empty() && url.size() <= longest_endpoint) {
+            out.emplace_back(url);
+        }
+    });
+}
+
+// One that cannot be read is passed over: it may be one that a later version has.
+bool read_sources(json_reader& r, std::vector<group_source>& out) {
+    out.clear();
+    return read_texts(r, [&out](std::string_view text) {
         if (const auto source = parse_group_source(text); source && out.size() < most_sources) {
             out.push_back(*source);
         }
-    }
-    return r.ok();
+    });
 }
 
 bool read_count(json_reader& r, std::uint32_t& out) {

@@ -15,7 +15,7 @@ std::string noun_of(const group_feed& feed) { return feed.target() + ":" + feed.
 
 } // namespace
 
-group_feeds::group_feeds(node& host, group_output& out, std::uint32_t seed) noexcept
+group_feeds::group_feeds(node& host, group_sender& out, std::uint32_t seed) noexcept
     : node_(host), out_(out), jitter_(seed) {}
 
 void group_feeds::add(group_feed& feed, time_point now) {

@@ -22,7 +22,7 @@ namespace cles::core {
 /// a third of the lease, and lease=0 when the last has gone; hands each update to all feeds that want it.
 class group_feeds {
   public:
-    group_feeds(node& host, group_output& out, std::uint32_t seed) noexcept;
+    group_feeds(node& host, group_sender& out, std::uint32_t seed) noexcept;
 
     /// The feed stays until it is removed.
     void add(group_feed& feed, time_point now);
@@ -59,7 +59,7 @@ class group_feeds {
     void release(const group_feed& feed);
 
     node& node_;
-    group_output& out_;
+    group_sender& out_;
     jitter jitter_;
     std::map<std::string, std::unique_ptr<bound>, std::less<>> bound_;
     std::map<std::string, std::vector<group_feed*>, std::less<>> by_path_; // null: removed while updates are handed out

@@ -34,13 +34,13 @@ class group_presence {
 class group_intake {
   public:
     /// `out` sends by all interfaces.
-    group_intake(node& host, group_output& out, std::uint32_t seed)
+    group_intake(node& host, group_sender& out, std::uint32_t seed)
         : node_(host), feeds_(host, out, seed), sources_(host.others, host.bounds.publishers) {}
 
     /// From where this node sends by one of its interfaces.
     void add_own(const group_source& self) { own_.push_back(self); }
     /// Whether that is what this node has sent itself: the system brings it back, for others on this host, and an
-    /// interface that is in the same network as another hears the other's.
+    /// interface that is in the same network as another receives the other's.
     [[nodiscard]] bool is_own(const group_source& from) const noexcept {
         return std::find(own_.begin(), own_.end(), from) != own_.end();
     }
@@ -52,7 +52,7 @@ class group_intake {
     }
     [[nodiscard]] const std::vector<group_source>& own() const noexcept { return own_; }
 
-    /// Who hears of the reserved task from now on; null: nobody. It must outlive this.
+    /// Gets what concerns the reserved task from now on; null: nobody. It must outlive this.
     void attend(group_presence* presence) noexcept { presence_ = presence; }
     /// What comes from there is of another pool, and not heard until then.
     void pass_over(const group_source& from, time_point until) { sources_.note_foreign(from, until); }

@@ -5,14 +5,22 @@
 
 namespace cles::core {
 
-/// What a node sends to its multicast group.
-class group_output {
+/// Sends what a node says to its multicast group.
+class group_sender {
   public:
-    group_output() = default;
-    group_output(const group_output&) = delete;
-    group_output& operator=(const group_output&) = delete;
+    group_sender() = default;
+    group_sender(const group_sender&) = delete;
+    group_sender& operator=(const group_sender&) = delete;
     /// Sends a line, its LF included, as one datagram. False where it was not sent: it is too large, or too much waits.
     virtual bool send(std::string_view line) = 0;
+
+  protected:
+    ~group_sender() = default;
+};
+
+/// The same by one interface, where it is known how much waits.
+class group_output : public group_sender {
+  public:
     /// Sends lines, none of them too large, each as one datagram, as far as there is room.
     virtual void send_all(std::string_view lines) {
         while (!lines.empty()) {

@@ -15,8 +15,8 @@
 
 namespace cles::core {
 
-/// What a node makes of what it hears in its multicast group by one interface (docs/protocol.md, "Multicast"): BIND of
-/// `all:` or of a node's name, which it serves by that interface, and updates, which are taken in by all of them
+/// What a node makes of what it receives in its multicast group by one interface (docs/protocol.md, "Multicast"): BIND
+/// of `all:` or of a node's name, which it serves by that interface, and updates, which are taken in by all of them
 /// together. All else is dropped and counted, and nothing is ever answered there.
 class group_session {
   public:

@@ -143,7 +143,7 @@ void inbound::drop_all() {
     }
 }
 
-// Whoever waits has no other turn before the link ends, and is not begun any more.
+// What waits has no other turn before the link ends, and is not begun any more.
 void inbound::cut_short() {
     begins_nothing_ = true;
     auto running = std::vector<std::shared_ptr<call>>{};

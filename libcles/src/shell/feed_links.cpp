@@ -275,7 +275,7 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     }
     const auto whole = core::later(now, time_limit(e.terms.deadline, verb::bind));
     const auto due = std::exchange(e.due, {}).value_or(whole);
-    c->bind(feed, request, due > now ? std::min(due, whole) : whole,
+    c->bind(feed, request, due > now ? due : whole,
             detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked, marks)});
 }
 

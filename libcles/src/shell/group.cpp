@@ -5,7 +5,6 @@
 
 #include <boost/asio/error.hpp>
 
-#include <algorithm>
 #include <random>
 #include <utility>
 #include <vector>
@@ -135,10 +134,6 @@ bool group::send(std::string_view line) {
         sent = each.send(line) || sent;
     }
     return sent;
-}
-
-bool group::has_room() const {
-    return std::all_of(places_.begin(), places_.end(), [](const auto& each) { return each.has_room(); });
 }
 
 } // namespace cles::shell

@@ -19,7 +19,7 @@ class engine;
 namespace cles::shell {
 
 /// A service's part in its multicast group: a place by each of its interfaces, and what it takes in by all of them.
-class group final : public core::group_output {
+class group final : public core::group_sender {
   public:
     /// Joins. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's code
     group(detail::engine& host, const multicast_options& where, bool insecure);
@@ -30,7 +30,6 @@ class group final : public core::group_output {
     void stop();
     /// To all nodes of the group, by each interface. False where it was sent by none.
     bool send(std::string_view line) override;
-    [[nodiscard]] bool has_room() const override;
     [[nodiscard]] core::group_intake& intake() noexcept { return intake_; }
     [[nodiscard]] std::deque<group_place>& places() noexcept { return places_; }
     /// The names of the interfaces: "lo, eth0".
