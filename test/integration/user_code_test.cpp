@@ -720,4 +720,42 @@ BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(ev
     }
 }
 
+// Links that are closed at one time, each with an entry of the log.
+BOOST_DATA_TEST_CASE(the_log_of_a_deadline_may_do_anything, data::make(every_deed), does) {
+    for (const bool stalled : {false, true}) {
+        BOOST_TEST_CONTEXT((stalled ? "stalled" : "silent")) {
+            world* within = nullptr;
+            int entries = 0;
+            cles::service_options options;
+            (stalled ? options.limits.stall : options.limits.first_line) = 50ms;
+            options.log = [&](cles::log_level, const cles::log_entry& e) {
+                if (e.text.starts_with("closed a link ") && ++entries == 1) {
+                    within->act(does);
+                }
+            };
+            world w{std::move(options)};
+            within = &w;
+            w.tower->on_pull("much", [] { return std::string(500'000, 'x'); });
+            std::vector<std::unique_ptr<scripted_peer>> peers;
+            for (int i = 0; i < 3; ++i) {
+                peers.push_back(std::make_unique<scripted_peer>(w.io, w.tower->endpoints().front(), buffers::small));
+                for (int n = 0; stalled && n < 20; ++n) {
+                    peers.back()->send("PULL self:much\n");
+                }
+            }
+            w.until([&] { return w.acted == 1; });
+            w.run_what_is_ready();
+            BOOST_TEST(w.thrown == 0);
+            if (does != deed::stops_service && does != deed::destroys_service) {
+                w.until([&] { return entries == 3; });
+            }
+            for (const auto& each : peers) {
+                w.until([&] { return each->ended(); });
+            }
+            w.acted = does == deed::throws ? 0 : 1;
+            w.check_that_it_lives(does);
+        }
+    }
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -268,8 +268,8 @@ void connection::on_stall(time_point now) {
         engine_->deadlines().arm(stall_, core::later(now, engine_->bounds().stall));
         return;
     }
-    engine_->say(log_level::warning,
-                 {"closed a link whose peer takes nothing: " + link_->peer().address, link_->peer().address});
+    engine_->say_soon(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address,
+                      link_->peer().address);
     abandon("the peer took nothing for too long");
 }
 
@@ -278,8 +278,8 @@ void connection::on_quiet() { abandon("nothing came for a while"); }
 
 void connection::on_silence() {
     const auto keep = shared_from_this();
-    engine_->say(log_level::debug,
-                 {"closed a link that brought no line: " + link_->peer().address, link_->peer().address});
+    engine_->say_soon(log_level::debug, "closed a link that brought no line: " + link_->peer().address,
+                      link_->peer().address);
     part("no line came in time");
 }
 
