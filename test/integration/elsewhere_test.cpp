@@ -201,9 +201,15 @@ BOOST_AUTO_TEST_CASE(of_a_pool_operations_are_begun_on_any_thread) {
     }
     done = true;
     publisher.join();
-    auto refused = asio::post(pool, asio::use_future([&] { tower.update("own", 1); }));
-    BOOST_CHECK_EXCEPTION(refused.get(), cles::error,
-                          [](const cles::error& e) { return e.code() == errc::would_deadlock; });
+    auto refused = asio::post(pool, asio::use_future([&] { // as a value: the exception is seen by one thread only
+                                  try {
+                                      tower.update("own", 1);
+                                  } catch (const cles::error& e) {
+                                      return e.code();
+                                  }
+                                  return boost::system::error_code{};
+                              }));
+    BOOST_TEST(refused.get() == errc::would_deadlock);
     for (auto* each : {&tower, &car}) {
         asio::post(each->get_executor(), asio::use_future([each] { each->stop(); })).get();
     }

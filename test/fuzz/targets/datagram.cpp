@@ -101,12 +101,18 @@ class source final : public test::recording_outlet, public core::binder, private
         }
     }
     std::string take_limited() {
+        turn();
         output_.limit(output(), node_.clock.now());
         return take();
     }
     [[nodiscard]] core::session& session() { return session_; }
     [[nodiscard]] bool gone() const { return gone_; }
 
+    void turn() override {
+        if (session_.serving().has_more()) {
+            session_.serving().serve_more(node_.clock.now());
+        }
+    }
     [[nodiscard]] bool takes_updates() const override { return true; }
     void put_updates(std::string_view lines) override { output_.append_updates(output(), lines); }
 
