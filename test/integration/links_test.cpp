@@ -62,6 +62,19 @@ bool is_busy(const std::string& line) { return line.starts_with(R"({"error":"bus
 
 // -- peers that vanish ---------------------------------------------------------------------------------------------
 
+// The system hands such a connection over all the same, and cannot say any more whose it was.
+BOOST_DATA_TEST_CASE(a_peer_that_is_gone_before_it_is_accepted_harms_nobody, tcp_and_unix, kind) {
+    node n{kind};
+    n.own = n.metric("links_open");
+    for (int i = 0; i < 20; ++i) {
+        auto gone = n.peer();
+        gone.send("PULL self:sp");
+        gone.reset();
+    }
+    BOOST_TEST(n.peer().ask("PULL self:speed") == R"({"value":42})");
+    run_until(n.io, [&] { return n.open() == 0; });
+}
+
 BOOST_DATA_TEST_CASE(binders_that_close_make_room_for_others_and_take_their_bindings_along, tcp_and_unix, kind) {
     node n{kind, {.nouns = 50, .probe = 20ms}};
     n.own = n.metric("links_open");

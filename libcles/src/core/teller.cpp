@@ -29,4 +29,12 @@ teller teller::at(std::string_view url) {
     }
 }
 
+std::string host_of(const identity& peer) {
+    try {
+        return parse_url(peer.address).host;
+    } catch (const error&) {
+        return peer.address;
+    }
+}
+
 } // namespace cles::core

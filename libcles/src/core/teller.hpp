@@ -22,4 +22,8 @@ struct teller {
     static teller at(std::string_view url);
 };
 
+/// The host of a peer's address. Of an address that is not a URL it is the whole text, which is empty where the peer
+/// was gone before the system could say whose connection it was.
+std::string host_of(const identity& peer);
+
 } // namespace cles::core

@@ -2,6 +2,7 @@
 #include "shell/connections.hpp"
 
 #include "core/request_checks.hpp"
+#include "core/teller.hpp"
 #include "protocol/message.hpp"
 #include "shell/engine.hpp"
 
@@ -21,7 +22,7 @@ std::string address_of(const identity& peer) {
     if (peer.uid) {
         return "user " + std::to_string(*peer.uid);
     }
-    const auto host = parse_url(peer.address).host;
+    const auto host = core::host_of(peer);
     boost::system::error_code not_v6;
     const auto address = boost::asio::ip::make_address_v6(host, not_v6);
     if (not_v6 || address.is_loopback() || address.is_link_local() || address.is_v4_mapped()) {

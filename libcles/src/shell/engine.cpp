@@ -5,6 +5,7 @@
 
 #include "core/call.hpp"
 #include "core/later.hpp"
+#include "core/teller.hpp"
 #include "protocol/message.hpp"
 #include "shell/completion_drain.hpp"
 #include "shell/departure.hpp"
@@ -172,7 +173,7 @@ void engine::forget(shell::connection& c, std::uint64_t received, std::uint64_t 
 }
 
 std::string engine::stranger(const identity& peer) const {
-    const auto host = parse_url(peer.address).host;
+    const auto host = core::host_of(peer);
     return peer.local || !peer.name.empty() || networks_.contain(host) ? std::string{} : host;
 }
 
