@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
+#include "api/engine.hpp"
+#include "api/feed_handle.hpp"
+#include "api/group_feed_handle.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/message.hpp"
 #include "shell/command.hpp"
-#include "shell/engine.hpp"
-#include "shell/feed_handle.hpp"
-#include "shell/group_feed_handle.hpp"
 #include "shell/option_checks.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -155,7 +155,7 @@ std::uint64_t service::close(detail::engine& inside, std::chrono::milliseconds l
 
 std::uint64_t service::send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
                             detail::pending_ptr operation) {
-    return inside.send(request, options, std::move(operation));
+    return inside.send(request.verb, request.noun, request.body, options, std::move(operation));
 }
 
 std::uint64_t service::send_command(detail::engine& inside, std::string_view command, const call_options& options,
@@ -170,22 +170,21 @@ std::shared_ptr<detail::feed_control> service::make_feed(const std::shared_ptr<d
     protocol::noun_view parts;
     std::string why;
     if (!protocol::parse_noun(noun, parts, why)) {
-        return shell::make_refused_feed(inside, errc::bad_request, why);
+        return api::make_refused_feed(inside, errc::bad_request, why);
     }
     if (auto wrong = shell::objection_to(options); !wrong.empty()) {
-        return shell::make_refused_feed(inside, errc::invalid_option, std::move(wrong));
+        return api::make_refused_feed(inside, errc::invalid_option, std::move(wrong));
     }
     if (inside->stopped()) {
-        return shell::make_refused_feed(inside, errc::stopped, "the service has been stopped");
+        return api::make_refused_feed(inside, errc::stopped, "the service has been stopped");
     }
     std::string scratch;
     const std::string path{protocol::canonical_path(parts, scratch)};
     const bool routes = inside->node().way != nullptr; // then `all` is bound by links, through this service itself
     if (options.multicast_ || (parts.target == "all" && options.at_.empty() && !routes)) {
-        return shell::make_group_feed(inside, parts, path, options);
+        return api::make_group_feed(inside, parts, path, options);
     }
-    auto made =
-        std::make_shared<shell::feed_handle>(inside, std::string{parts.target}, path, options.every_.count() > 0);
+    auto made = std::make_shared<api::feed_handle>(inside, std::string{parts.target}, path, options.every_.count() > 0);
     inside->feeds().enter(made->machine(), made,
                           {.noun = std::string{noun},
                            .at = options.at_,

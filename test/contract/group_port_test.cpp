@@ -3,6 +3,7 @@
 #include "support/group_address.hpp"
 #include "support/run_until.hpp"
 #include "transport/group_port.hpp"
+#include "transport/ip_interface.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/multicast.hpp>
@@ -32,7 +33,7 @@ using asio::ip::udp;
 
 namespace {
 
-struct member final : cles::transport::group_events {
+struct member final : cles::core::group_listener {
     member(asio::io_context& io, const cles::multicast_options& where)
         : port(std::make_shared<cles::transport::group_port>(io.get_executor(),
                                                              cles::transport::find_interface(where.interface), where)) {
@@ -40,10 +41,10 @@ struct member final : cles::transport::group_events {
     }
     ~member() { port->close(); }
 
-    void on_datagram(const cles::transport::group_datagram& datagram) override {
+    void on_datagram(const cles::core::group_datagram& datagram) override {
         heard.emplace_back(datagram.text);
         sources.push_back(datagram.from);
-        said.push_back(datagram.said != nullptr);
+        said.push_back(datagram.request != nullptr);
         if (during) {
             during();
         }
@@ -60,7 +61,7 @@ struct member final : cles::transport::group_events {
 
     std::shared_ptr<cles::transport::group_port> port;
     std::vector<std::string> heard;
-    std::vector<udp::endpoint> sources;
+    std::vector<cles::core::group_source> sources;
     std::deque<bool> said;
     std::function<void()> during{};
     int batches = 0;

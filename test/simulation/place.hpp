@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/clock.hpp"
+#include "port/clock.hpp"
 #include "simulation/agenda.hpp"
 
 #include <deque>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
 
 #include "core/datagram_output.hpp"
 #include "core/link_admission.hpp"
@@ -22,11 +22,9 @@ namespace cles::core {
 class feed_machine;
 } // namespace cles::core
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// A link with the session that lives on it.
 class connection final : public link_events,
@@ -41,7 +39,7 @@ class connection final : public link_events,
     /// `refused`: it came in past the limit, and is told so.
     enum class origin : std::uint8_t { accepted, local, dialled, refused };
 
-    connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from);
+    connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from);
     ~connection() override;
 
     void start();
@@ -131,7 +129,7 @@ class connection final : public link_events,
     void end(std::string_view why);
     void lose_feeds(std::string_view why);
 
-    std::shared_ptr<detail::engine> engine_;
+    std::shared_ptr<local_node> host_;
     link_ptr link_;
     origin from_;
     std::shared_ptr<core::memory_account> memory_;

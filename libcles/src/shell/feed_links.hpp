@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/feed.hpp>
-
 #include "core/feed_machine.hpp"
 #include "shell/connection.hpp"
 
@@ -13,11 +11,9 @@
 #include <optional>
 #include <string>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// What a feed is bound to.
 struct feed_terms {
@@ -33,9 +29,9 @@ struct feed_terms {
 /// The feeds of a service and the links that they are on: finds each a link, sends its BIND, and unbinds it.
 class feed_links final : public core::feed_host {
   public:
-    explicit feed_links(detail::engine& host) noexcept : engine_(host) {}
+    explicit feed_links(local_node& host) noexcept : host_(host) {}
 
-    void enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms);
+    void enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms);
     void leave(core::feed_machine& feed);
     void bind(core::feed_machine& feed) override;
     void unbind(core::feed_machine& feed) override;
@@ -49,7 +45,7 @@ class feed_links final : public core::feed_host {
 
   private:
     struct entry {
-        std::weak_ptr<detail::feed_control> handle;
+        std::weak_ptr<void> handle;
         feed_terms terms;
         std::weak_ptr<connection> on;
         std::string at{};                // the URL where it was asked for last
@@ -64,7 +60,7 @@ class feed_links final : public core::feed_host {
     [[nodiscard]] protocol::request_text bind_text(entry& e, const connection& c);
     void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
 
-    detail::engine& engine_;
+    local_node& host_;
     std::map<core::feed_machine*, entry> feeds_;
 };
 

@@ -8,7 +8,7 @@
 
 #include <utility>
 
-namespace cles::shell {
+namespace cles::asio_port {
 
 /// A timer by the clock of all deadlines, which goes on while the machine is suspended: what was due meanwhile is due
 /// as soon as the machine wakes. (Asio's own timers wait by a clock that stands still then, and would be as late as the
@@ -33,4 +33,4 @@ class boottime_timer {
     boost::asio::posix::stream_descriptor timer_;
 };
 
-} // namespace cles::shell
+} // namespace cles::asio_port

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/feed_handle.hpp"
+#include "api/feed_handle.hpp"
 
-#include "shell/fetching.hpp"
+#include "api/fetching.hpp"
 
 #include <boost/asio/post.hpp>
 
 #include <random>
 #include <utility>
 
-namespace cles::shell {
+namespace cles::api {
 namespace asio = boost::asio;
 
 namespace {
@@ -77,4 +77,4 @@ std::shared_ptr<detail::feed_control> make_refused_feed(std::shared_ptr<detail::
     return std::make_shared<refused_feed>(std::move(host), code, std::move(message));
 }
 
-} // namespace cles::shell
+} // namespace cles::api

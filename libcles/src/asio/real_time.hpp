@@ -3,7 +3,7 @@
 
 #include <sched.h>
 
-namespace cles::shell {
+namespace cles::asio_port {
 
 /// Puts the calling thread under SCHED_FIFO for as long as this lives. To be ended in the thread that made it.
 class fifo_scheduling {
@@ -23,4 +23,4 @@ class fifo_scheduling {
 /// \throws std::system_error where the system refuses
 void lock_memory();
 
-} // namespace cles::shell
+} // namespace cles::asio_port

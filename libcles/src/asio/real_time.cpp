@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/real_time.hpp"
+#include "asio/real_time.hpp"
 
 #include <cerrno>
 #include <string>
@@ -8,7 +8,7 @@
 #include <pthread.h>
 #include <sys/mman.h>
 
-namespace cles::shell {
+namespace cles::asio_port {
 
 fifo_scheduling::fifo_scheduling(int priority) {
     const auto self = ::pthread_self();
@@ -30,4 +30,4 @@ void lock_memory() {
     }
 }
 
-} // namespace cles::shell
+} // namespace cles::asio_port

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace cles::shell {
+namespace cles::asio_port {
 
 /// Updates that come from any thread, on their way to the service's executor: what a `publisher` speaks to. They wait
 /// in a list of bounded length, whose oldest go first.
@@ -52,4 +52,4 @@ class outside_updates final : public detail::update_sink, public std::enable_sha
     bool closed_ = false;
 };
 
-} // namespace cles::shell
+} // namespace cles::asio_port

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/outside_updates.hpp"
+#include "asio/outside_updates.hpp"
 
 #include <boost/asio/post.hpp>
 
-namespace cles::shell {
+namespace cles::asio_port {
 
 void outside_updates::publish(std::string_view noun, std::string_view json) {
     const std::scoped_lock lock{mutex_};
@@ -58,4 +58,4 @@ void outside_updates::drain() {
     }
 }
 
-} // namespace cles::shell
+} // namespace cles::asio_port

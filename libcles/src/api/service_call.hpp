@@ -18,7 +18,7 @@ namespace cles::detail {
 class engine;
 }
 
-namespace cles::shell {
+namespace cles::api {
 
 /// What a responder holds: the call, and the service that it came to. When the last copy goes, the call has been
 /// answered one way or another.
@@ -62,4 +62,4 @@ class service_call final : public detail::call_control, public std::enable_share
     std::unique_ptr<asked> asked_; ///< from its first request on
 };
 
-} // namespace cles::shell
+} // namespace cles::api

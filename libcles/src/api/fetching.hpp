@@ -12,7 +12,7 @@
 #include <memory>
 #include <utility>
 
-namespace cles::shell {
+namespace cles::api {
 
 /// One call of `async_next`: it ends with the next event, or fails where there can be none; never from inside this
 /// call. `owner` keeps the mailbox.
@@ -31,4 +31,4 @@ inline void fetch_next(core::feed_mailbox& from, const boost::asio::any_io_execu
     }
 }
 
-} // namespace cles::shell
+} // namespace cles::api

@@ -3,13 +3,13 @@
 
 #include <cles/feed.hpp>
 
+#include "api/engine.hpp"
 #include "core/group_feed.hpp"
-#include "shell/engine.hpp"
 
 #include <memory>
 #include <string>
 
-namespace cles::shell {
+namespace cles::api {
 
 /// A feed that is bound by the multicast group, as its user holds it.
 class group_feed_handle final : public detail::feed_control, public std::enable_shared_from_this<group_feed_handle> {
@@ -40,4 +40,4 @@ std::shared_ptr<detail::feed_control> make_group_feed(const std::shared_ptr<deta
                                                       const protocol::noun_view& noun, std::string path,
                                                       const bind_options& options);
 
-} // namespace cles::shell
+} // namespace cles::api

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/service_call.hpp"
+#include "api/service_call.hpp"
 
 #include <cles/reply_operation.hpp>
 
+#include "api/engine.hpp"
 #include "shell/command.hpp"
-#include "shell/engine.hpp"
 
 #include <boost/asio/post.hpp>
 
 #include <algorithm>
 
-namespace cles::shell {
+namespace cles::api {
 
 service_call::~service_call() {
     if (asked_) {
@@ -104,7 +104,7 @@ void service_call::send(detail::engine& by, std::string_view command, const call
     auto chosen = options;
     chosen.diagnostics(*why);
     using operation = detail::reply_operation<json_text, false, decltype(completed)>;
-    const auto ticket = send_command(
+    const auto ticket = shell::send_command(
         by, command, chosen,
         detail::pending_ptr{detail::make_operation<operation>(std::move(completed), executor_, why.get())}, left);
     if (const auto found = asked_->tickets.find(key); found != asked_->tickets.end()) {
@@ -142,4 +142,4 @@ void service_call::withdraw_asked() {
     withdraw();
 }
 
-} // namespace cles::shell
+} // namespace cles::api

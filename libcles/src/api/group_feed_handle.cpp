@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/group_feed_handle.hpp"
+#include "api/group_feed_handle.hpp"
 
-#include "shell/feed_handle.hpp"
-#include "shell/fetching.hpp"
+#include "api/feed_handle.hpp"
+#include "api/fetching.hpp"
 
 #include <boost/asio/post.hpp>
 
 #include <utility>
 
-namespace cles::shell {
+namespace cles::api {
 namespace asio = boost::asio;
 
 group_feed_handle::group_feed_handle(std::shared_ptr<detail::engine> host, std::string target, std::string path)
@@ -103,4 +103,4 @@ std::shared_ptr<detail::feed_control> make_group_feed(const std::shared_ptr<deta
     return std::make_shared<group_feed_handle>(host, std::string{noun.target}, std::move(path));
 }
 
-} // namespace cles::shell
+} // namespace cles::api

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/boottime_timer.hpp"
+#include "asio/boottime_timer.hpp"
 
 #include <cles/error.hpp>
 
@@ -11,7 +11,7 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
-namespace cles::shell {
+namespace cles::asio_port {
 namespace {
 
 int make_timer() {
@@ -44,4 +44,4 @@ void boottime_timer::cancel() {
     timer_.cancel(ignored);
 }
 
-} // namespace cles::shell
+} // namespace cles::asio_port

@@ -3,13 +3,13 @@
 
 #include <cles/feed.hpp>
 
+#include "api/engine.hpp"
 #include "core/feed_machine.hpp"
-#include "shell/engine.hpp"
 
 #include <memory>
 #include <string>
 
-namespace cles::shell {
+namespace cles::api {
 
 /// A feed as its user holds it.
 class feed_handle final : public detail::feed_control, public std::enable_shared_from_this<feed_handle> {
@@ -36,4 +36,4 @@ class feed_handle final : public detail::feed_control, public std::enable_shared
 std::shared_ptr<detail::feed_control> make_refused_feed(std::shared_ptr<detail::engine> host,
                                                         boost::system::error_code code, std::string message);
 
-} // namespace cles::shell
+} // namespace cles::api

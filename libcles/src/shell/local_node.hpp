@@ -2,31 +2,30 @@
 #pragma once
 
 #include <cles/call_options.hpp>
-#include <cles/link.hpp>
-#include <cles/service.hpp>
+#include <cles/gossip.hpp>
+#include <cles/line_link.hpp>
+#include <cles/multicast.hpp>
 
+#include "core/deadline_schedule.hpp"
 #include "core/feed_machine.hpp"
+#include "core/ip_network.hpp"
 #include "core/node.hpp"
 #include "core/turns.hpp"
+#include "port/environment.hpp"
 #include "protocol/grammar.hpp"
 #include "shell/connection.hpp"
 #include "shell/connections.hpp"
-#include "shell/deadline_timer.hpp"
 #include "shell/feed_links.hpp"
 #include "shell/group.hpp"
 #include "shell/listeners.hpp"
 #include "shell/neighbours.hpp"
-#include "shell/networks.hpp"
-#include "shell/outside_updates.hpp"
 #include "shell/routes.hpp"
 #include "shell/routing_part.hpp"
-#include "shell/steady_clock.hpp"
-
-#include <boost/asio/any_io_executor.hpp>
 
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -34,23 +33,35 @@
 #include <vector>
 
 namespace cles::shell {
+
 class departure;
-} // namespace cles::shell
 
-namespace cles::detail {
+/// How a node is set up: what service_options says, checked by the constructor of local_node.
+struct local_node_options {
+    core::node_setup node;
+    std::map<std::string, std::string> peers{};
+    bool insecure = false;
+    std::vector<std::string> networks{};
+    multicast_options multicast{};
+    gossip_options gossip{};
+    std::function<void(std::string_view where)> on_name_taken{};
+    const detail::routing_part* routing = nullptr;
+};
 
-/// The inside of a service: the node, its links and routes, and what drives them.
-class engine final : public std::enable_shared_from_this<engine>, private core::turn_host {
+/// The node of this process: its state, its links and the ways to others, and what drives them. Decides, and meets the
+/// world through its environment alone.
+class local_node : public std::enable_shared_from_this<local_node>, private core::turn_host, private core::task {
   public:
-    engine(boost::asio::any_io_executor executor, service_options options);
-    ~engine();
+    /// Draws the epoch and what else is random, and has completions called by the environment. \throws cles::error
+    local_node(std::shared_ptr<core::environment> by, local_node_options options);
+    ~local_node() override;
 
-    /// Begins; to be called once, when the engine is owned.
+    /// Begins; to be called once, when this is owned.
     void start(const std::vector<std::string>& listen_at);
     std::string listen(std::string_view where);
-    void stop();
+    virtual void stop();
     /// Ends in order what is to be ended; the operation ends when the links have. `stop` is to follow.
-    std::uint64_t close(std::chrono::milliseconds limit, pending_ptr operation);
+    std::uint64_t close(std::chrono::milliseconds limit, detail::pending_ptr operation);
     /// Nothing is begun any more for others.
     [[nodiscard]] bool closing() const noexcept { return departure_ != nullptr; }
 
@@ -61,8 +72,8 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     [[nodiscard]] core::deadline_queue& deadlines() noexcept { return node_->deadlines; }
     /// By which the user's code is called.
     [[nodiscard]] core::completion_queue& completions() noexcept { return node_->completions; }
-    [[nodiscard]] time_point now() const { return clock_.now(); }
-    [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
+    [[nodiscard]] core::environment& environment() noexcept { return *environment_; }
+    [[nodiscard]] time_point now() const { return environment_->now(); }
     /// The address of a peer that might be another than it says, for which there is a limit on what is sent there;
     /// empty for others.
     [[nodiscard]] std::string stranger(const identity& peer) const;
@@ -85,7 +96,7 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     void forget(shell::connection& c, std::uint64_t received, std::uint64_t sent);
     [[nodiscard]] core::turns& turns() noexcept { return turns_; }
     /// What routing has to do; null where it is off.
-    [[nodiscard]] routing_host* routing() noexcept { return routing_.get(); }
+    [[nodiscard]] detail::routing_host* routing() noexcept { return routing_.get(); }
 
     // turn_host
     void post_turn() override;
@@ -96,16 +107,14 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     void settle() override;
 
     // For the façade.
-    void add(registration task);
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
-    /// Where updates go that come from other threads.
-    std::shared_ptr<detail::update_sink> outside_updates();
     /// Returns a ticket by which it can be withdrawn while it waits; 0 where it does not.
-    std::uint64_t publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation);
-    std::uint64_t send(const outgoing& request, const call_options& options, pending_ptr operation);
+    std::uint64_t publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
+    std::uint64_t send(verb how, std::string_view noun, std::string_view body, const call_options& options,
+                       detail::pending_ptr operation);
     void cancel(std::uint64_t ticket);
     /// Completes an operation that failed while it began; not from inside the call.
-    void fail_later(pending_ptr operation, boost::system::error_code code, std::string message,
+    void fail_later(detail::pending_ptr operation, boost::system::error_code code, std::string message,
                     core::completion::progress_function progress = {});
 
     // For the feeds.
@@ -113,16 +122,16 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     [[nodiscard]] std::uint64_t draw_id() noexcept { return node_->next_id++; }
 
   private:
+    void run() override; // a turn
     void join_group();
-    void expire(bool was_away);
+    void on_timer();
     void check_path(std::string_view noun) const;
 
-    boost::asio::any_io_executor executor_;
-    shell::steady_clock clock_;
+    std::shared_ptr<core::environment> environment_;
     std::shared_ptr<core::node> node_;
-    std::shared_ptr<shell::deadline_timer> timer_;
+    core::deadline_schedule schedule_;
     bool insecure_;
-    shell::networks networks_;
+    core::ip_networks networks_;
     multicast_options multicast_;
     gossip_options gossip_;
     shell::routes routes_{*this};
@@ -131,13 +140,12 @@ class engine final : public std::enable_shared_from_this<engine>, private core::
     shell::feed_links feeds_{*this};
     std::unique_ptr<shell::group> group_;
     std::unique_ptr<shell::neighbours> neighbours_;
-    std::shared_ptr<shell::outside_updates> outside_updates_; ///< once somebody wants to publish from elsewhere
     std::function<void(std::string_view)> on_name_taken_;
-    const routing_part* routing_wanted_;
-    std::unique_ptr<routing_host> routing_; // null: off
-    core::turns turns_{*this, clock_};
+    const detail::routing_part* routing_wanted_;
+    std::unique_ptr<detail::routing_host> routing_; // null: off
+    core::turns turns_{*this, *environment_};
     std::unique_ptr<shell::departure> departure_; // once it is to end in order
     bool stopped_ = false;
 };
 
-} // namespace cles::detail
+} // namespace cles::shell

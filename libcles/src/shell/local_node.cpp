@@ -1,47 +1,33 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <cles/limit_ranges.hpp>
 
 #include "core/call.hpp"
+#include "core/completion_drain.hpp"
 #include "core/later.hpp"
 #include "core/teller.hpp"
 #include "protocol/message.hpp"
-#include "shell/completion_drain.hpp"
 #include "shell/departure.hpp"
 #include "shell/option_checks.hpp"
-#include "shell/service_call.hpp"
-
-#include <boost/asio/post.hpp>
 
 #include <algorithm>
 #include <cstdint>
 #include <optional>
-#include <random>
 #include <utility>
 
-namespace cles::detail {
-namespace asio = boost::asio;
-
+namespace cles::shell {
 namespace {
 
-core::node_setup setup_of(service_options& options, const asio::any_io_executor& executor) {
-    std::random_device source;
+core::node_setup complete(core::node_setup setup, const std::shared_ptr<core::environment>& by) {
     // Room for as many ids as a run may draw, and short enough for clients that read numbers as doubles.
     constexpr std::uint64_t apart = 1U << 20U;
-    const auto epoch = source();
-    return {.name = std::move(options.name),
-            .pool = std::move(options.pool),
-            .epoch = epoch,
-            .first_datagram_id = (source() & 0xFFFFFFFFU) * apart,
-            .bounds = options.limits,
-            .authorise = std::move(options.authorise),
-            .log = std::move(options.log),
-            .metrics = std::move(options.metrics),
-            .load = std::move(options.load),
-            .complete = [drain = std::make_shared<shell::completion_drain>(executor)](core::completion due) {
-                drain->put(std::move(due));
-            }};
+    setup.epoch = by->random();
+    setup.first_datagram_id = std::uint64_t{by->random()} * apart;
+    setup.complete = [drain = std::make_shared<core::completion_drain>(by)](core::completion due) {
+        drain->put(std::move(due));
+    };
+    return setup;
 }
 
 void check_pool_name(const std::string& pool) {
@@ -63,27 +49,28 @@ void check_node_name(const std::string& name) {
 
 } // namespace
 
-engine::engine(asio::any_io_executor executor, service_options options)
-    : executor_(std::move(executor)), insecure_(options.insecure), networks_(options.networks),
-      multicast_(options.multicast), gossip_(options.gossip), on_name_taken_(std::move(options.on_name_taken)),
-      routing_wanted_(options.routing) {
-    check_node_name(options.name);
-    check(options.limits);
-    check_pool_name(options.pool);
+local_node::local_node(std::shared_ptr<core::environment> by, local_node_options options)
+    : environment_(std::move(by)), insecure_(options.insecure), networks_(options.networks),
+      multicast_(std::move(options.multicast)), gossip_(std::move(options.gossip)),
+      on_name_taken_(std::move(options.on_name_taken)), routing_wanted_(options.routing) {
+    check_node_name(options.node.name);
+    check(options.node.bounds);
+    check_pool_name(options.node.pool);
     for (const auto& [name, where] : options.peers) {
         routes_.set_peer(name, where);
     }
-    node_ = std::make_shared<core::node>(setup_of(options, executor_), clock_, [this] { turns_.ask(); });
+    node_ = std::make_shared<core::node>(complete(std::move(options.node), environment_), *environment_,
+                                         [this] { turns_.ask(); });
     connections_.start();
-    neighbours_ = std::make_unique<shell::neighbours>(*this, std::random_device{}());
+    neighbours_ = std::make_unique<shell::neighbours>(*this, environment_->random());
 }
 
-engine::~engine() = default;
+local_node::~local_node() = default;
 
-void engine::start(const std::vector<std::string>& listen_at) {
-    timer_ = std::make_shared<shell::deadline_timer>(executor_, clock_, [weak = weak_from_this()](bool was_away) {
+void local_node::start(const std::vector<std::string>& listen_at) {
+    environment_->start_timer([weak = weak_from_this()] {
         if (const auto self = weak.lock()) {
-            self->expire(was_away);
+            self->on_timer();
         }
     });
     if (routing_wanted_ != nullptr) {
@@ -106,27 +93,27 @@ void engine::start(const std::vector<std::string>& listen_at) {
     listeners_.open_local_doors();
 }
 
-void engine::expire(bool was_away) {
+void local_node::on_timer() {
     struct settling {
-        engine& by;
+        local_node& by;
         ~settling() { by.settle(); }
     };
     const settling afterwards{*this}; // whatever happens: without the timer no deadline would come any more
     const auto at = now();
-    if (was_away) {
+    if (schedule_.on_timer(at)) {
         node_->others.excuse(at);
     }
     node_->deadlines.expire(at);
 }
 
-void engine::settle() {
+void local_node::settle() {
     if (departure_ && !stopped_) {
         departure_->look();
     }
-    timer_->follow(node_->deadlines);
+    schedule_.follow(node_->deadlines, *environment_);
 }
 
-void engine::join_group() {
+void local_node::join_group() {
     try {
         group_ = std::make_unique<shell::group>(*this, multicast_, insecure_);
         group_->start();
@@ -139,7 +126,7 @@ void engine::join_group() {
     }
 }
 
-void engine::on_round_over() {
+void local_node::on_round_over() {
     const auto keep = shared_from_this();
     routes_.on_round_over();
     if (routing_) {
@@ -147,9 +134,9 @@ void engine::on_round_over() {
     }
 }
 
-void engine::on_name_taken(const std::string& where) {
+void local_node::on_name_taken(const std::string& where) {
     if (on_name_taken_) {
-        asio::post(executor_, [self = shared_from_this(), where] {
+        core::post(*environment_, [self = shared_from_this(), where] {
             if (!self->stopped_) {
                 self->on_name_taken_(where);
             }
@@ -159,31 +146,31 @@ void engine::on_name_taken(const std::string& where) {
 
 // -- links ---------------------------------------------------------------------------------------------------------
 
-std::string engine::listen(std::string_view where) {
+std::string local_node::listen(std::string_view where) {
     auto local = listeners_.listen(where, insecure_);
     node_->endpoints.push_back(local);
     say(log_level::debug, node_->name + " listens on " + local);
     return local;
 }
 
-void engine::forget(shell::connection& c, std::uint64_t received, std::uint64_t sent) {
+void local_node::forget(shell::connection& c, std::uint64_t received, std::uint64_t sent) {
     if (connections_.forget(c, received, sent)) {
         routes_.drop(c);
     }
 }
 
-std::string engine::stranger(const identity& peer) const {
+std::string local_node::stranger(const identity& peer) const {
     const auto host = core::host_of(peer);
     return peer.local || !peer.name.empty() || networks_.contain(host) ? std::string{} : host;
 }
 
 // -- turns ---------------------------------------------------------------------------------------------------------
 
-void engine::post_turn() {
-    asio::post(executor_, [self = shared_from_this()] { self->turns_.turn(); });
-}
+void local_node::post_turn() { environment_->post(std::shared_ptr<core::task>{shared_from_this(), this}); }
 
-void engine::route_on(time_point now) {
+void local_node::run() { turns_.turn(); }
+
+void local_node::route_on(time_point now) {
     if (routing_) {
         routing_->go_on(now);
     }
@@ -191,13 +178,14 @@ void engine::route_on(time_point now) {
 
 // -- asking --------------------------------------------------------------------------------------------------------
 
-void engine::fail_later(pending_ptr operation, boost::system::error_code code, std::string message,
-                        core::completion::progress_function progress) {
+void local_node::fail_later(detail::pending_ptr operation, boost::system::error_code code, std::string message,
+                            core::completion::progress_function progress) {
     node_->completions.put(core::completion{
         core::completion::failure{std::move(operation), code, std::move(message), std::move(progress)}});
 }
 
-std::uint64_t engine::send(const outgoing& request, const call_options& options, pending_ptr operation) {
+std::uint64_t local_node::send(verb how, std::string_view text, std::string_view body, const call_options& options,
+                               detail::pending_ptr operation) {
     if (stopped_) {
         fail_later(std::move(operation), errc::stopped, "the service has been stopped");
         return 0;
@@ -209,7 +197,7 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
     protocol::noun_view noun;
     std::string why;
     boost::system::error_code code = errc::bad_request;
-    if (!protocol::parse_noun(request.noun, noun, why)) {
+    if (!protocol::parse_noun(text, noun, why)) {
         fail_later(std::move(operation), code, std::move(why));
         return 0;
     }
@@ -221,20 +209,20 @@ std::uint64_t engine::send(const outgoing& request, const call_options& options,
     const auto id = draw_id();
     const auto begun = now();
     turns_.let([&] {
-        r->send({.verb = request.verb,
-                 .noun = request.noun,
-                 .body = request.body,
+        r->send({.verb = how,
+                 .noun = text,
+                 .body = body,
                  .id = id,
                  .urgent = options.urgent_,
                  .begun = begun,
-                 .deadline = core::later(begun, shell::time_limit(options.deadline_, request.verb))},
+                 .deadline = core::later(begun, shell::time_limit(options.deadline_, how))},
                 std::move(operation), options.on_progress_);
     });
     settle();
     return id;
 }
 
-void engine::cancel(std::uint64_t ticket) {
+void local_node::cancel(std::uint64_t ticket) {
     if (ticket == 0) { // what has ended or failed already
         return;
     }
@@ -248,31 +236,7 @@ void engine::cancel(std::uint64_t ticket) {
 
 // -- serving and publishing ----------------------------------------------------------------------------------------
 
-void engine::add(registration task) {
-    core::handler entry{.info = std::move(task.info)};
-    if (task.plain) {
-        entry.plain = [this, handler = std::move(task.plain)](const request& r, json_writer& w) {
-            const core::turns::serving during{turns_};
-            handler(r, w);
-        };
-    }
-    if (task.async) {
-        entry.start = [this, handler = std::move(task.async), executor = executor_,
-                       self = weak_from_this()](const request& r, const std::shared_ptr<core::call>& call) {
-            // Held here too, so that what a handler throws is the answer, and not that its responder went without one.
-            const auto control = std::make_shared<shell::service_call>(call, executor, self);
-            const core::turns::serving during{turns_};
-            try {
-                handler(r, responder{control});
-            } catch (...) {
-                fail_with(*control, std::current_exception());
-            }
-        };
-    }
-    node_->tasks.add(task.verb, task.task, std::move(entry));
-}
-
-void engine::check_path(std::string_view noun) const {
+void local_node::check_path(std::string_view noun) const {
     protocol::noun_view parts;
     std::string why;
     const auto whole = "self:" + std::string{noun};
@@ -288,7 +252,7 @@ void engine::check_path(std::string_view noun) const {
     }
 }
 
-void engine::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
+void local_node::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
     if (stopped_) {
         return;
     }
@@ -299,37 +263,8 @@ void engine::publish(std::string_view noun, const std::function<void(json_writer
     settle();
 }
 
-std::shared_ptr<update_sink> engine::outside_updates() {
-    if (!outside_updates_) {
-        // The service outlives what is taken: it closes this when it stops.
-        outside_updates_ = std::make_shared<shell::outside_updates>(
-            executor_,
-            [weak = weak_from_this()](std::string_view noun, std::string_view json) {
-                const auto self = weak.lock();
-                if (!self) { // what was refused before has been logged, by a program that then let go of the service
-                    return;
-                }
-                try {
-                    self->publish(noun, [json](json_writer& w) { write_text(w, json); });
-                } catch (const error& e) {
-                    self->say(log_level::warning,
-                              "an update of '" + std::string{noun} + "' was refused: " + e.message());
-                }
-            },
-            [weak = weak_from_this()](std::size_t count) {
-                if (const auto self = weak.lock()) {
-                    self->say(log_level::warning,
-                              std::to_string(count) + " updates were dropped: they come faster than they go");
-                }
-            });
-        if (stopped_) {
-            outside_updates_->close();
-        }
-    }
-    return outside_updates_;
-}
-
-std::uint64_t engine::publish_when_room(std::string_view noun, std::string_view json, pending_ptr operation) {
+std::uint64_t local_node::publish_when_room(std::string_view noun, std::string_view json,
+                                            detail::pending_ptr operation) {
     if (stopped_) {
         fail_later(std::move(operation), errc::stopped, "the service has been stopped");
         return 0;
@@ -353,7 +288,7 @@ std::uint64_t engine::publish_when_room(std::string_view noun, std::string_view 
 
 // -- the end -------------------------------------------------------------------------------------------------------
 
-std::uint64_t engine::close(std::chrono::milliseconds limit, pending_ptr operation) {
+std::uint64_t local_node::close(std::chrono::milliseconds limit, detail::pending_ptr operation) {
     if (stopped_ || departure_) {
         fail_later(std::move(operation), errc::stopped, "the service ends already");
         return 0;
@@ -372,7 +307,7 @@ std::uint64_t engine::close(std::chrono::milliseconds limit, pending_ptr operati
     return ticket;
 }
 
-void engine::stop() {
+void local_node::stop() {
     if (stopped_) {
         return;
     }
@@ -380,9 +315,7 @@ void engine::stop() {
     node_->published.drain(now()); // what has been published goes out
     stopped_ = true;
     listeners_.close();
-    if (timer_) { // not where making it has failed
-        timer_->stop();
-    }
+    environment_->stop_timer();
     if (routing_) {
         routing_->stop();
     }
@@ -390,9 +323,6 @@ void engine::stop() {
     // Callers that wait are told on the executor, never from inside this call.
     constexpr auto why = "the service has been stopped";
     feeds_.stop();
-    if (outside_updates_) {
-        outside_updates_->close();
-    }
     for (auto& operation : node_->published.take_waiters()) {
         fail_later(std::move(operation), errc::stopped, why);
     }
@@ -414,4 +344,4 @@ void engine::stop() {
     connections_.stop();
 }
 
-} // namespace cles::detail
+} // namespace cles::shell
