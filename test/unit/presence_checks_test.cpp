@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Which of two runs of one name is there (docs/protocol.md, "Whose name it is").
+// Which of two runs of one name is there (docs/protocol.md, "Name ownership").
 #include "core/presence.hpp"
 #include "support/watched_presence.hpp"
 

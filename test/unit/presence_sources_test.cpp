@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Nodes that take part in multicast by several interfaces (docs/protocol.md, "Presence").
+// Nodes that take part in multicast by several interfaces (docs/protocol.md, "Membership").
 #include "core/presence.hpp"
 #include "support/watched_presence.hpp"
 

@@ -29,7 +29,7 @@ enum class peer_state : std::uint8_t {
 /// "live", "suspect", "clash"
 std::string_view to_string(peer_state state) noexcept;
 
-/// Another node, as it announced itself to the multicast group, or as others tell of it (docs/protocol.md, "Presence"
+/// Another node, as it announced itself to the multicast group, or as others tell of it (docs/protocol.md, "Membership"
 /// and "Gossip").
 struct peer {
     std::string node;

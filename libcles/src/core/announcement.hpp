@@ -16,7 +16,7 @@
 #include <string_view>
 #include <vector>
 
-/// What a node says of itself to its multicast group, both directions (docs/protocol.md, "Presence").
+/// What a node says of itself to its multicast group, both directions (docs/protocol.md, "Membership").
 
 namespace cles::core {
 

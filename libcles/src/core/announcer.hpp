@@ -12,9 +12,9 @@
 
 namespace cles::core {
 
-/// When a node announces itself to its group (docs/protocol.md, "Presence"): in intervals, a little sooner each time so
-/// that many do not do it in step; soon where somebody asks, but with a pause between any two. What has changed waits
-/// for the next one, so that what a node receives stays level.
+/// When a node announces itself to its group (docs/protocol.md, "Membership"): in intervals, a little sooner each time
+/// so that many do not do it in step; soon where somebody asks, but with a pause between any two. What has changed
+/// waits for the next one, so that what a node receives stays level.
 class announcer final : private deadline {
   public:
     class voice {

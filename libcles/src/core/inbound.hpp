@@ -26,7 +26,7 @@ namespace cles::core {
 
 class execution;
 
-/// Serves the requests that one link brings (docs/protocol.md, "Order" and "Ends").
+/// Serves the requests that one link brings (docs/protocol.md, "Order" and "Closing a link").
 ///
 /// Requests with an id start at once. Those without wait for each other. Plain handlers are run in line and answered
 /// into the link's output; other handlers become calls. Handlers are begun by `on_request` and `serve_more` only.

@@ -14,7 +14,8 @@
 
 namespace cles::core {
 
-/// Which links that others opened a node keeps, when there are as many as there may be (docs/protocol.md, "Ends").
+/// Which links that others opened a node keeps, when there are as many as there may be (docs/protocol.md, "Closing a
+/// link").
 ///
 /// Peers that hold a link for nothing must not lock newcomers out. To make room for one, the node closes the first that
 /// there is of

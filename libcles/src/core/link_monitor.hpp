@@ -10,7 +10,7 @@
 namespace cles::core {
 
 /// Watches one stream for a peer that is of no use: one that never sends a line, and one that ended its stream and may
-/// have vanished since (docs/protocol.md, "Ends").
+/// have vanished since (docs/protocol.md, "Closing a link").
 ///
 /// A peer that has ended its stream may still read, so its link is kept while bindings live or an answer is owed.
 /// Nothing more arrives on it, hence only writing shows whether the peer still exists: an empty line, which every node

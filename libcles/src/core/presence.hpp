@@ -28,7 +28,7 @@
 
 namespace cles::core {
 
-/// Who else is there, from what they announce, and from what others tell of them (docs/protocol.md, "Presence" and
+/// Who else is there, from what they announce, and from what others tell of them (docs/protocol.md, "Membership" and
 /// "Gossip").
 ///
 /// A name belongs to the run of a node that was heard under it first, for as long as that run is live: only it, from
