@@ -9,7 +9,7 @@
 #include <cles/service.hpp>
 
 #include "child_process.hpp"
-#include "daemon.hpp"
+#include "daemon/daemon.hpp"
 #include "delegate_load.hpp"
 #include "icd_exchange.hpp"
 #include "latency_recorder.hpp"

@@ -2,7 +2,7 @@
 // Libraries that cannot be used: each is told by one clear line, and harms nobody.
 #include <cles/service.hpp>
 
-#include "plugin_host.hpp"
+#include "plugins/plugin_host.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/test/data/monomorphic.hpp>

@@ -2,7 +2,7 @@
 // What plugins may do, and what they must not and do all the same, by a service that calls them in line.
 #include <cles/service.hpp>
 
-#include "plugin_host.hpp"
+#include "plugins/plugin_host.hpp"
 #include "support/answer.hpp"
 #include "support/run_until.hpp"
 

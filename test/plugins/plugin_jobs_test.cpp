@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "plugin_jobs.hpp"
+#include "plugins/plugin_jobs.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/io_context.hpp>

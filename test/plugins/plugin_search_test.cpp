@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "plugin_error.hpp"
-#include "plugin_search.hpp"
+#include "plugins/plugin_error.hpp"
+#include "plugins/plugin_search.hpp"
 
 #include <boost/test/unit_test.hpp>
 

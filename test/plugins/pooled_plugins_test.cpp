@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Plugins on a pool of workers, as the daemon runs them.
-#include "plugin_host.hpp"
-#include "runtime/pooled_node.hpp"
+#include "plugins/plugin_host.hpp"
+#include "runtime/jobs/pooled_node.hpp"
 
 #include <boost/test/unit_test.hpp>
 

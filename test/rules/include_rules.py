@@ -89,8 +89,8 @@ NOT_SANS_IO_WORDS = [
 
 # (pattern of the header, where it may stand, what to say)
 RESERVED_HEADERS = [
-    (re.compile(r"yaml-cpp/"), re.compile(r"runtime/(src/)?config[^/]*(/.*)?$"), "yaml-cpp belongs to runtime/config alone"),
-    (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/(src/)?plugin_host[^/]*(/.*)?$"),
+    (re.compile(r"yaml-cpp/"), re.compile(r"runtime/src/config/"), "yaml-cpp belongs to runtime/config alone"),
+    (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/src/plugins/plugin_host[^/]*$"),
      "Boost.DLL belongs to runtime/plugin_host alone"),
     (re.compile(r"spdlog/"), re.compile(r"(?!libcles/)"), "the library logs through its sink; spdlog is for programs"),
 ]
@@ -320,8 +320,8 @@ GOOD = {
     "libcles/src/transport/tcp.hpp": "#pragma once\n",
     "libcles/src/service.cpp": '#include <cles/service.hpp>\n#include "shell/connection.hpp"\n',
     "libcles/src/shell/connection.hpp": "#pragma once\n",
-    "runtime/config.cpp": "#include <yaml-cpp/yaml.h>\n#include <cles/service.hpp>\n",
-    "runtime/plugin_host.cpp": "#include <boost/dll/shared_library.hpp>\n",
+    "runtime/src/config/config.cpp": "#include <yaml-cpp/yaml.h>\n#include <cles/service.hpp>\n",
+    "runtime/src/plugins/plugin_host.cpp": "#include <boost/dll/shared_library.hpp>\n",
     "apps/car/main.cpp": '#include <cles/service.hpp>\n#include <spdlog/spdlog.h>\n#include "car.hpp"\n#include <boost/asio.hpp>\n',
     "apps/car/car.hpp": "#pragma once\n",
     "test/unit/session_test.cpp": '#include "core/session.hpp"\n#include "support/clock.hpp"\n',

@@ -3,7 +3,7 @@
 
 #include <cles/error.hpp>
 
-#include "retry_delay.hpp"
+#include "jobs/retry_delay.hpp"
 
 #include <algorithm>
 #include <utility>

@@ -4,10 +4,10 @@
 #include <cles/peer.hpp>
 
 #include "core/call.hpp"
-#include "job_queue.hpp"
-#include "service_time.hpp"
+#include "jobs/job_queue.hpp"
+#include "jobs/service_time.hpp"
 #include "simulation/node_run.hpp"
-#include "worker_watch.hpp"
+#include "jobs/worker_watch.hpp"
 
 #include <chrono>
 #include <cstddef>

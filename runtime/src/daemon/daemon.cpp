@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "daemon/daemon.hpp"
+
+#include "config/config_error.hpp"
+#include "config/config_text.hpp"
+#include "config/config_values.hpp"
+#include "plugins/plugin_places.hpp"
+#include "plugins/plugin_setup.hpp"
+#include "plugins/plugin_start_guard.hpp"
+#include "jobs/pooled_registrar.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <csignal>
+#include <utility>
+
+namespace cles::runtime {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr int wrong_configuration = 2; // the exit code
+constexpr std::chrono::seconds start_limit{10};
+
+service_options options_of(const config& setup, const daemon_log& log) {
+    service_options options{.name = setup.node};
+    options.pool = setup.pool;
+    options.listen = setup.listen;
+    options.peers = setup.peers;
+    options.insecure = setup.insecure;
+    options.networks = setup.networks;
+    options.multicast = setup.multicast;
+    options.limits = setup.limits;
+    options.log = log.sink();
+    options.routing = cles::routing();
+    options.gossip = cles::gossip(setup.seeds); // without any it may be another's
+    return options;
+}
+
+pool_options pool_options_of(const config& setup, const daemon_log& log) {
+    pool_options options;
+    options.workers = setup.workers;
+    options.queue = setup.queue;
+    options.replacements = setup.replacements;
+    options.grace = std::chrono::ceil<milliseconds>(setup.stuck_after);
+    options.look_in = 250ms;
+    options.log = log.sink();
+    return options;
+}
+
+plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
+    plugin_host_options options{.node = setup.node};
+    options.folders = plugin_folders(setup);
+    options.trial = 0ms; // they were tried before there were threads
+    options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
+        log.write(level, std::string{plugin} + ": " + std::string{text});
+    };
+    return options;
+}
+
+std::string counted(std::size_t count, const char* what) {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+// What a reload does not change, as text to compare.
+std::string lasting_part(config setup) {
+    setup.seeds.clear();
+    setup.log = {};
+    setup.origins.clear();
+    return to_yaml(setup);
+}
+
+} // namespace
+
+daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log, const notifier& tell)
+    : io_(io), setup_(std::move(setup)), sources_(std::move(sources)), log_(log), tell_(tell),
+      service_(io,
+               [this] {
+                   auto options = options_of(setup_, log_);
+                   options.load = [this] { return has_pool_ ? pool_.load() : node_load{}; };
+                   if (!setup_.allow_clash) {
+                       options.on_name_taken = [this](std::string_view where) { give_way(where); };
+                   }
+                   options.metrics = [this](json_writer& w) { write_metrics(w); };
+                   return options;
+               }()),
+      pool_(service_, pool_options_of(setup_, log)), plugins_(host_options_of(setup_, log)),
+      signals_(
+          io.get_executor(), [this](int signal) { stop(signal); }, [this] { reload(); }) {
+    has_pool_ = true;
+    try {
+        load_plugins();
+    } catch (...) {
+        service_.stop(); // while there is all that it asks for
+        throw;
+    }
+}
+
+daemon::~daemon() { service_.stop(); }
+
+void daemon::load_plugins() {
+    pooled_registrar tasks{service_, pool_};
+    for (std::size_t i = 0; i < setup_.plugins.size(); ++i) {
+        const auto& wanted = setup_.plugins[i];
+        if (!wanted.unusable.empty()) {
+            log_.warning(wanted.unusable + " (goes on without it)");
+            continue;
+        }
+        try {
+            const auto path = plugin_file(setup_, wanted);
+            const plugin_start_guard guard{"clesd: " + setup_.place_of("plugins[" + std::to_string(i) + "].path") +
+                                               ": " + path,
+                                           wrong_configuration, start_limit};
+            plugins_.load(path, wanted.config, tasks);
+        } catch (const plugin_error& wrong) {
+            const auto complaint = complaint_about(setup_, i, wrong);
+            if (wanted.required) {
+                throw config_error(complaint);
+            }
+            log_.warning(complaint + " (goes on without it)");
+            continue;
+        }
+        const auto& loaded = plugins_.plugins().back();
+        log_.info("plugin " + loaded.name + " " + loaded.version + " with " + counted(loaded.tasks.size(), "task") +
+                  " from " + loaded.path);
+    }
+}
+
+void daemon::write_metrics(json_writer& w) const {
+    w.key("pool");
+    write_json(w, pool_.figures());
+    const auto figures = plugins_.figures();
+    w.key("plugins");
+    w.begin_object();
+    w.key("loaded");
+    w.value(std::uint64_t{plugins_.plugins().size()});
+    w.key("jobs");
+    w.value(std::uint64_t{figures.jobs});
+    w.key("answered_twice");
+    w.value(figures.answered_twice);
+    w.end_object();
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void daemon::stop(int signal) {
+    const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
+    if (std::exchange(signalled_, true)) {
+        log_.warning("stopping at once, on a second signal");
+        cut_short_ = true;
+        finish();
+        return;
+    }
+    if (std::exchange(stopping_, true)) {
+        log_.info(name + ": it is stopping already; a second signal ends it at once");
+        return;
+    }
+    stop_begun_ = steady_clock::now();
+    const auto load = pool_.load();
+    log_.info("stopping on " + name + "; " + counted(load.running, "job") + " running, " + std::to_string(load.queued) +
+              " waiting");
+    drain();
+}
+
+void daemon::give_way(std::string_view where) {
+    if (std::exchange(stopping_, true)) {
+        return;
+    }
+    gave_way_ = true;
+    stop_begun_ = steady_clock::now();
+    log_.error("stopping: the node at " + std::string{where} + " had the name '" + setup_.node +
+               "' first; give this one another (--node), or let it go on all the same (--allow-clash)");
+    drain();
+}
+
+void daemon::drain() {
+    if (!tell_.stopping()) {
+        log_.warning("the service manager could not be told");
+    }
+    service_.leave(); // nobody is to send jobs that would be refused
+    pool_.drain(std::chrono::ceil<milliseconds>(setup_.drain), [this](const drain_report& how) { close(how); });
+}
+
+milliseconds daemon::time_left() const {
+    return std::chrono::floor<milliseconds>(stop_begun_ + setup_.drain - steady_clock::now());
+}
+
+void daemon::close(const drain_report& how) {
+    if (how.abandoned > 0) {
+        log_.warning(counted(how.abandoned, "job") + " did not end in time");
+    }
+    // What it passes on to others, and what its plugins serve without workers, is to be answered too.
+    service_.async_close(std::max<milliseconds>(time_left(), 100ms), [this](boost::system::error_code) { finish(); });
+}
+
+void daemon::finish() {
+    if (std::exchange(finished_, true)) {
+        return;
+    }
+    // A plugin gets what is left of the time to let go of what it holds; and enough in any case, for it is over sooner
+    // unless a plugin blocks.
+    const auto stopped =
+        plugins_.stop(cut_short_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::least_stop, 2000ms));
+    for (const auto& name : stopped.late) {
+        log_.warning("plugin " + name + " did not stop in time");
+    }
+    if (stopped.callbacks > 0) {
+        log_.warning(counted(stopped.callbacks, "on_stop callback") + " of plugins did not return");
+    }
+    leaves_something_ = !stopped.late.empty() || stopped.callbacks > 0;
+    service_.stop();
+    close_pool();
+    signals_.close();
+    log_.info("stopped");
+    // A job that does not end is still watched, and keeps the context at work.
+    boost::asio::post(io_, [this] { io_.stop(); });
+}
+
+// Here, and not in the destructor, so that it is known whether anything is left. Jobs that were told to stop at the end
+// of the drain get a moment to do so.
+void daemon::close_pool() {
+    if (!cut_short_) {
+        leaves_something_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || leaves_something_;
+    }
+}
+
+// -- reading again -------------------------------------------------------------------------------------------------
+
+void daemon::reload() {
+    bool told = tell_.reloading(steady_clock::now());
+    try {
+        auto fresh = load(sources_);
+        log_.set(fresh.log);
+        log_.info("read the configuration again: " + counted(fresh.seeds.size(), "seed") + ", log " +
+                  std::string{to_string(fresh.log.level)});
+        if (lasting_part(fresh) != lasting_part(setup_)) {
+            log_.warning("what else has changed in the configuration takes effect at the next start");
+        }
+        service_.set_gossip(cles::gossip(fresh.seeds));
+        setup_.seeds = fresh.seeds;
+        setup_.log = fresh.log;
+    } catch (const config_error& wrong) {
+        log_.error(std::string{"all stays as it was, since the configuration cannot be used: "} + wrong.what());
+    }
+    told = tell_.ready() && told;
+    if (!told) {
+        log_.warning("the service manager could not be told");
+    }
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/log.hpp>
+
+#include "config/config.hpp"
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+namespace spdlog {
+class logger;
+} // namespace spdlog
+
+namespace cles::runtime {
+
+/// The daemon's log, on stderr: text, in colour on a terminal that wants it (NO_COLOR unset), or JSON, an object a
+/// line. May be used from any thread.
+class daemon_log {
+  public:
+    daemon_log(std::string node, log_config how);
+
+    /// Changes level and format.
+    void set(log_config how);
+    void write(log_level level, const log_entry& entry) const;
+
+    void info(std::string_view text) const { write(log_level::info, text); }
+    void warning(std::string_view text) const { write(log_level::warning, text); }
+    void error(std::string_view text) const { write(log_level::error, text); }
+
+    /// For functions that take a sink; the log has to outlive it.
+    [[nodiscard]] log_sink sink() const;
+
+  private:
+    const std::string node_;
+    const std::shared_ptr<spdlog::logger> logger_;
+    mutable std::mutex mutex_; // a line is made and written in one format
+    log_format format_;
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "config/config_json.hpp"
+#include "config/config_values.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+
+using cles::runtime::bad_value;
+using cles::runtime::json_of;
+
+namespace config_json {
+namespace {
+
+std::string json(const std::string& text) { return json_of(YAML::Load(text)); }
+
+} // namespace
+} // namespace config_json
+
+BOOST_AUTO_TEST_SUITE(config_json)
+
+BOOST_AUTO_TEST_CASE(what_reads_as_json_is_that_and_the_rest_is_text) {
+    BOOST_TEST(json("{limit: 100000, ratio: -1.5e3, on: true, off: false, none: null, tilde: ~, gap: }") ==
+               R"({"limit":100000,"ratio":-1.5e3,"on":true,"off":false,"none":null,"tilde":null,"gap":null})");
+    BOOST_TEST(json("[007, 1., .5, +1, 0x10, 1 000, yes, 2026-11-21, a b]") ==
+               R"(["007","1.",".5","+1","0x10","1 000","yes","2026-11-21","a b"])");
+}
+
+BOOST_AUTO_TEST_CASE(what_is_quoted_is_text) {
+    BOOST_TEST(json(R"({a: "1", b: 'true', c: "null"})") == R"({"a":"1","b":"true","c":"null"})");
+}
+
+BOOST_AUTO_TEST_CASE(texts_are_escaped) {
+    BOOST_TEST(json("{\"a\\\"b\": \"line\\nline\"}") == R"({"a\"b":"line\nline"})");
+}
+
+BOOST_AUTO_TEST_CASE(json_is_yaml_and_stays_as_it_is) {
+    for (const auto* text :
+         {R"({"limit":100000,"name":"x","list":[1,2.5,true,null,"7"],"inner":{"a":[]}})", "{}", "[]"}) {
+        BOOST_TEST(json(text) == text);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(nothing_is_an_empty_object) { BOOST_TEST(json("~") == "{}"); }
+
+BOOST_AUTO_TEST_CASE(a_single_value_is_refused) {
+    BOOST_CHECK_THROW(json("7"), bad_value);
+    BOOST_CHECK_THROW(json("'{}'"), bad_value);
+}
+
+BOOST_AUTO_TEST_CASE(depth_is_bounded) {
+    BOOST_TEST(json(std::string(32, '[') + std::string(32, ']')).size() == 64U);
+    BOOST_CHECK_THROW(json(std::string(33, '[') + std::string(33, ']')), bad_value);
+}
+
+BOOST_AUTO_TEST_CASE(anchors_may_not_multiply_without_bound) {
+    std::string text = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
+    for (int i = 1; i < 10; ++i) {
+        const auto last = "*a" + std::to_string(i - 1);
+        std::string items = last;
+        for (int k = 1; k < 10; ++k) {
+            items += ", " + last;
+        }
+        text += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [" + items + "]\n";
+    }
+    BOOST_CHECK_THROW(json(text), bad_value);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "jobs/draining.hpp"
+#include "jobs/job_pool.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstddef>
+
+BOOST_AUTO_TEST_SUITE(draining)
+
+using namespace std::chrono_literals;
+using cles::runtime::drain_report;
+
+struct fixture {
+    void begin(std::chrono::milliseconds limit) {
+        drain.begin(
+            limit,
+            [this] {
+                ++limits;
+                drain.end({.stuck = 1});
+            },
+            [this](const drain_report& how) {
+                ++ends;
+                stuck = how.stuck;
+            });
+    }
+
+    boost::asio::io_context io;
+    cles::runtime::draining drain{io.get_executor()};
+    int limits = 0;
+    int ends = 0;
+    std::size_t stuck = 0;
+};
+
+BOOST_FIXTURE_TEST_CASE(it_ends_with_the_last_job_and_then_has_no_limit, fixture) {
+    BOOST_TEST(!drain.under_way());
+    begin(1h);
+    BOOST_TEST(drain.under_way());
+    drain.end({});
+    BOOST_TEST(!drain.under_way());
+    io.run(); // returns: nothing waits for the hour
+    BOOST_TEST(ends == 1);
+    BOOST_TEST(limits == 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(it_ends_at_its_limit, fixture) {
+    begin(0ms);
+    io.run();
+    BOOST_TEST(limits == 1);
+    BOOST_TEST(ends == 1);
+    BOOST_TEST(stuck == 1U);
+    BOOST_TEST(!drain.under_way());
+}
+
+BOOST_FIXTURE_TEST_CASE(what_is_forgotten_tells_nobody, fixture) {
+    begin(1h);
+    drain.forget();
+    io.run();
+    BOOST_TEST(!drain.under_way());
+    BOOST_TEST(ends + limits == 0);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
