@@ -3,7 +3,7 @@
 
 #include <cles/error.hpp>
 
-#include "jobs/retry_delay.hpp"
+#include "jobs/service_time.hpp"
 
 #include <algorithm>
 #include <utility>

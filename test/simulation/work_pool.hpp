@@ -6,8 +6,8 @@
 #include "core/call.hpp"
 #include "jobs/job_queue.hpp"
 #include "jobs/service_time.hpp"
+#include "jobs/worker_watchdog.hpp"
 #include "simulation/node_run.hpp"
-#include "jobs/worker_watch.hpp"
 
 #include <chrono>
 #include <cstddef>

@@ -4,8 +4,6 @@
 #include <cles/link.hpp>
 #include <cles/url.hpp>
 
-#include "config/config_error.hpp"
-
 #include <algorithm>
 #include <set>
 

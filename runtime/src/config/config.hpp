@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -74,5 +75,13 @@ config default_config(const std::string& host, std::uint32_t cores);
 
 /// What no value shows by itself, only several together. \throws config_error
 void check(const config& whole);
+
+/// A configuration that cannot be used. Says where and why: "clesd.yaml:7: multicast.port: 70000 is not a number from
+/// 1 to 65535".
+class config_error : public std::runtime_error {
+  public:
+    explicit config_error(const std::string& words) : std::runtime_error(words) {}
+    config_error(const std::string& place, const std::string& why) : std::runtime_error(place + ": " + why) {}
+};
 
 } // namespace cles::runtime

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "config/config_file.hpp"
 
-#include "config/config_error.hpp"
-#include "config/config_limits.hpp"
-#include "config/config_node.hpp"
+#include <cles/json_writer.hpp>
+#include <cles/limit_ranges.hpp>
 
+#include "config/config.hpp"
+#include "config/config_values.hpp"
+#include "config/yaml_value.hpp"
+
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
+#include <cstddef>
 #include <fstream>
 #include <sstream>
 #include <string_view>
@@ -104,6 +110,42 @@ plugin_config plugin_of(const config_node& from) {
         from.refuse("has no 'path'");
     }
     return read;
+}
+
+constexpr std::size_t most_links = 20'000; // each is a file descriptor, of which a process has fewer
+
+std::size_t most_of(const count_range& range) {
+    return range.member == &limits::links || range.member == &limits::links_per_address ? most_links : range.most;
+}
+
+std::chrono::milliseconds to_milliseconds(const std::string& text, const time_range& range) {
+    // Rounded up: 0 turns some limits off, and what is not 0 must not.
+    const auto span = std::chrono::ceil<std::chrono::milliseconds>(to_duration(text));
+    const auto bound = [](std::chrono::milliseconds at) { return to_string(std::chrono::microseconds{at}); };
+    if (span < range.least) {
+        throw bad_value("'" + text + "' is too short: " + bound(range.least) + " at least");
+    }
+    if (span > range.most) {
+        throw bad_value("'" + text + "' is too long: " + bound(range.most) + " at most");
+    }
+    return span;
+}
+
+void read_limits(const config_node& from, limits& over) {
+    config_node::readers known;
+    for (const auto& range : count_ranges) {
+        known.emplace(range.name, [&over, &range](const config_node& v) {
+            over.*range.member = v.as([&](const std::string& text) {
+                return static_cast<std::size_t>(to_size(text, range.least, most_of(range)));
+            });
+        });
+    }
+    for (const auto& range : time_ranges) {
+        known.emplace(range.name, [&over, &range](const config_node& v) {
+            over.*range.member = v.as([&](const std::string& text) { return to_milliseconds(text, range); });
+        });
+    }
+    from.map(known);
 }
 
 void read_all(const config_node& from, config& over) {
@@ -218,6 +260,107 @@ void read_config_file(const std::string& path, config& over) {
     }
     read_config(text, path, over);
     over.file = path;
+}
+
+// -- writing -------------------------------------------------------------------------------------------------------
+
+namespace {
+
+// JSON's quotes are YAML's.
+std::string in_quotes(std::string_view text) {
+    std::string out;
+    json_writer w{out};
+    w.value(text);
+    return out;
+}
+
+class yaml_lines {
+  public:
+    explicit yaml_lines(const config& whole) : whole_(whole) {}
+
+    void line(const std::string& key, const std::string& value) {
+        const auto origin = whole_.origins.find(key);
+        text_ += key + ": " + value + (origin == whole_.origins.end() ? "" : "  # " + origin->second) + "\n";
+    }
+    void list(const std::string& key, const std::vector<std::string>& items) {
+        std::string all;
+        for (const auto& item : items) {
+            all += (all.empty() ? "" : ", ") + in_quotes(item);
+        }
+        line(key, "[" + all + "]");
+    }
+    void raw(const std::string& lines) { text_ += lines; }
+    [[nodiscard]] std::string take() { return std::move(text_); }
+
+  private:
+    const config& whole_;
+    std::string text_;
+};
+
+std::string text_of(const multicast_options& where) {
+    return where.is_on() ? "{interface: " + in_quotes(where.interface) + ", group: " + where.group +
+                               ", port: " + std::to_string(where.port) +
+                               ", required: " + (where.required ? "true" : "false") + "}"
+                         : "off";
+}
+
+std::string text_of(const std::map<std::string, std::string>& peers) {
+    std::string all;
+    for (const auto& [name, url] : peers) {
+        all += (all.empty() ? "" : ", ") + in_quotes(name) + ": " + in_quotes(url);
+    }
+    return "{" + all + "}";
+}
+
+std::string text_of(const std::vector<plugin_config>& plugins) {
+    std::string all;
+    for (const auto& p : plugins) {
+        all += "  - path: " + in_quotes(p.path) + "\n    config: " + p.config +
+               "\n    required: " + (p.required ? "true" : "false") + "\n";
+    }
+    return all.empty() ? "plugins: []\n" : "plugins:\n" + all;
+}
+
+std::string limits_text(const limits& bounds, const std::string& indent) {
+    std::string text;
+    for (const auto& range : count_ranges) {
+        text.append(indent).append(range.name) += ": " + std::to_string(bounds.*range.member) + "\n";
+    }
+    for (const auto& range : time_ranges) {
+        text.append(indent).append(range.name) +=
+            ": " + to_string(std::chrono::microseconds{bounds.*range.member}) + "\n";
+    }
+    return text;
+}
+
+} // namespace
+
+std::string to_yaml(const config& whole) {
+    yaml_lines out{whole};
+    out.raw(whole.file.empty() ? "# no configuration file\n" : "# " + whole.file + "\n");
+    out.line("node", in_quotes(whole.node));
+    out.line("pool", in_quotes(whole.pool));
+    out.line("allow_clash", whole.allow_clash ? "true" : "false");
+    out.list("listen", whole.listen);
+    out.line("insecure", whole.insecure ? "true" : "false");
+    out.list("networks", whole.networks);
+    out.line("multicast", text_of(whole.multicast));
+    out.list("seeds", whole.seeds);
+    out.line("peers", text_of(whole.peers));
+    out.line("workers", std::to_string(whole.workers));
+    out.line("queue", std::to_string(whole.queue));
+    out.line("stuck_after", to_string(whole.stuck_after));
+    out.line("replacements", std::to_string(whole.replacements));
+    out.line("drain", to_string(whole.drain));
+    out.list("plugin_path", whole.plugin_path);
+    out.raw(text_of(whole.plugins));
+    out.line("log", "{level: " + std::string{to_string(whole.log.level)} +
+                        ", format: " + std::string{to_string(whole.log.format)} + "}");
+    out.line("busy_poll", to_string(whole.busy_poll));
+    out.line("real_time", std::to_string(whole.real_time));
+    out.line("wake_within", wake_bound_text(whole.wake_within));
+    out.raw("limits:\n" + limits_text(whole.limits, "  "));
+    return out.take();
 }
 
 } // namespace cles::runtime

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "daemon/daemon.hpp"
 
-#include "config/config_error.hpp"
-#include "config/config_text.hpp"
+#include "config/config.hpp"
+#include "config/config_file.hpp"
 #include "config/config_values.hpp"
-#include "plugins/plugin_places.hpp"
-#include "plugins/plugin_setup.hpp"
-#include "plugins/plugin_start_guard.hpp"
 #include "jobs/pooled_registrar.hpp"
+#include "plugins/plugin_search.hpp"
+#include "plugins/plugin_start_guard.hpp"
+#include "plugins/plugin_trial.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -88,8 +88,8 @@ daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources
                    return options;
                }()),
       pool_(service_, pool_options_of(setup_, log)), plugins_(host_options_of(setup_, log)),
-      signals_(
-          io.get_executor(), [this](int signal) { stop(signal); }, [this] { reload(); }) {
+      signals_(io, SIGTERM, SIGINT, SIGHUP) {
+    wait_for_signal();
     has_pool_ = true;
     try {
         load_plugins();
@@ -145,6 +145,20 @@ void daemon::write_metrics(json_writer& w) const {
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------
+
+void daemon::wait_for_signal() {
+    signals_.async_wait([this](boost::system::error_code code, int signal) {
+        if (code) {
+            return;
+        }
+        wait_for_signal(); // first, because stopping and reloading may cancel it
+        if (signal == SIGHUP) {
+            reload();
+        } else {
+            stop(signal);
+        }
+    });
+}
 
 void daemon::stop(int signal) {
     const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
@@ -213,7 +227,7 @@ void daemon::finish() {
     leaves_something_ = !stopped.late.empty() || stopped.callbacks > 0;
     service_.stop();
     close_pool();
-    signals_.close();
+    signals_.cancel();
     log_.info("stopped");
     // A job that does not end is still watched, and keeps the context at work.
     boost::asio::post(io_, [this] { io_.stop(); });

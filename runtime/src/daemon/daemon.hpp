@@ -6,12 +6,12 @@
 #include "config/config.hpp"
 #include "config/config_sources.hpp"
 #include "daemon/daemon_log.hpp"
+#include "daemon/service_manager.hpp"
 #include "jobs/job_pool.hpp"
-#include "daemon/notify.hpp"
 #include "plugins/plugin_host.hpp"
-#include "daemon/signals.hpp"
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
 
 #include <chrono>
 #include <string>
@@ -44,6 +44,7 @@ class daemon {
   private:
     void load_plugins();
     void write_metrics(json_writer& w) const;
+    void wait_for_signal();
     void stop(int signal);
     void give_way(std::string_view where);
     void drain();
@@ -62,7 +63,7 @@ class daemon {
     service service_;
     job_pool pool_;
     plugin_host plugins_;
-    signals signals_;
+    boost::asio::signal_set signals_;
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;
     bool signalled_ = false;

@@ -1,13 +1,37 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_context.hpp"
 
-#include "jobs/job_control.hpp"
+#include "jobs/job_dispatcher.hpp"
 #include "jobs/job_record.hpp"
-#include "jobs/pool_state.hpp"
 
 #include <memory>
 
 namespace cles::runtime {
+namespace {
+
+/// A job as what a responder speaks to.
+class job_control final : public detail::call_control {
+  public:
+    explicit job_control(job_context job) noexcept : job_(std::move(job)) {}
+
+    void done(std::string_view json) override { job_.done(json); }
+    void fail(errc code, std::string_view message) override { job_.fail(code, message); }
+    void refuse(std::string_view message, std::chrono::milliseconds retry) override { job_.refuse(message, retry); }
+    bool progress(double fraction, std::string_view json) override { return job_.progress(fraction, json); }
+    void on_stop(std::function<void()> callback) override { job_.on_stop(std::move(callback)); }
+    [[nodiscard]] bool stopped() const noexcept override { return job_.stopped(); }
+    void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
+        job_.delegate(command, options, std::move(answered));
+    }
+    void log(log_level level, std::string_view text) override { job_.log(level, text); }
+    [[nodiscard]] boost::asio::any_io_executor executor() const override { return job_.executor(); }
+    [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
+
+  private:
+    job_context job_;
+};
+
+} // namespace
 
 job_context::job_context(const job_context& other) noexcept : record_(other.record_) { record_->add_reference(); }
 
@@ -29,7 +53,11 @@ void job_context::refuse(std::string_view message, std::chrono::milliseconds ret
     record_->refuse(message, retry);
 }
 
-void job_context::fail(const std::exception_ptr& thrown) const { record_->fail(thrown); }
+// The exception becomes text on this thread, because it belongs to the code that threw it.
+void job_context::fail(const std::exception_ptr& thrown) const {
+    job_control control{*this};
+    detail::fail_with(control, thrown);
+}
 
 bool job_context::progress(double fraction, std::string_view json) const { return record_->progress(fraction, json); }
 

@@ -98,4 +98,8 @@ class job_context {
     job_record* record_;
 };
 
+/// What the jobs of one task do. It runs on a worker, on several at once for several jobs, and answers through the
+/// context, then or later. What it throws becomes the answer.
+using job_work = std::function<void(const job_context&)>;
+
 } // namespace cles::runtime

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_pool.hpp"
 
-#include "jobs/pool_state.hpp"
+#include "jobs/job_dispatcher.hpp"
 
 #include <utility>
 

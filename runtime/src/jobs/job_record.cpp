@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_record.hpp"
 
-#include "jobs/job_control.hpp"
-#include "jobs/pool_state.hpp"
+#include "jobs/job_dispatcher.hpp"
 
 #include <cmath>
 #include <mutex>
@@ -147,10 +146,8 @@ void job_record::refuse(std::string_view message, std::chrono::milliseconds retr
 }
 
 void job_record::fail(const std::exception_ptr& thrown) {
-    // Turned into text on this thread: the exception itself belongs to the code that threw it.
     add_reference();
-    job_control words{job_context{*this}};
-    detail::fail_with(words, thrown);
+    job_context{*this}.fail(thrown);
 }
 
 bool job_record::progress(double fraction, std::string_view json) {
@@ -246,6 +243,35 @@ void job_record::run(const std::function<void()>& part) noexcept {
     } catch (...) {
         pool_->counts().threw.fetch_add(1, std::memory_order_relaxed);
         fail(std::current_exception());
+    }
+}
+
+namespace {
+
+constexpr std::size_t most_spare = 1024;
+
+} // namespace
+
+job_record& job_records::take(std::shared_ptr<pool_state> pool) {
+    if (spare_.empty()) {
+        spare_.push_back(std::make_unique<job_record>());
+    }
+    auto& r = *spare_.back().release();
+    spare_.pop_back();
+    r.open(std::move(pool));
+    r.index = in_use_.size();
+    in_use_.push_back(&r);
+    return r;
+}
+
+void job_records::recycle(job_record& r) {
+    std::unique_ptr<job_record> owned{&r};
+    in_use_.back()->index = r.index;
+    in_use_[r.index] = in_use_.back();
+    in_use_.pop_back();
+    r.clear(); // the pool lives: it runs
+    if (spare_.size() < most_spare) {
+        spare_.push_back(std::move(owned));
     }
 }
 

@@ -5,10 +5,10 @@
 #include <cles/limits.hpp>
 #include <cles/responder.hpp>
 
-#include "jobs/brief_mutex.hpp"
-#include "jobs/job.hpp"
+#include "jobs/adaptive_mutex.hpp"
+#include "jobs/job_context.hpp"
 #include "jobs/job_queue.hpp"
-#include "jobs/kept_request.hpp"
+#include "jobs/owned_request.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -44,7 +44,6 @@ class job_record final : public job_queue::item {
     void done(std::string_view json);
     void fail(errc code, std::string_view message);
     void refuse(std::string_view message, std::chrono::milliseconds retry);
-    void fail(const std::exception_ptr& thrown);
     bool progress(double fraction, std::string_view json);
     void on_stop(std::function<void()> callback);
     void delegate(std::string_view command, const call_options& options, answer_callback answered);
@@ -101,6 +100,7 @@ class job_record final : public job_queue::item {
         std::string json;
     };
 
+    void fail(const std::exception_ptr& thrown);
     [[nodiscard]] bool claim() noexcept;
     void forget_on_stop() noexcept;
     void publish() noexcept;
@@ -125,6 +125,31 @@ class job_record final : public job_queue::item {
     // -- the executor's --------------------------------------------------------------------------------------------
     std::optional<responder> answer_;
     bool awaited_ = false; // neither answered nor stopped
+};
+
+/// The records of a pool's jobs: those in use, and some that wait to be used again. On the service's executor.
+class job_records {
+  public:
+    job_records() = default;
+    job_records(const job_records&) = delete;
+    job_records& operator=(const job_records&) = delete;
+    ~job_records() = default;
+
+    /// One for a new job, with one reference.
+    job_record& take(std::shared_ptr<pool_state> pool);
+    /// Nobody holds it any more.
+    void recycle(job_record& r);
+    /// From now on each ends itself.
+    void disown() noexcept { in_use_.clear(); }
+    void drop_spare() noexcept { spare_.clear(); }
+
+    /// Those in use, in no order; what is recycled leaves its place to another.
+    [[nodiscard]] std::size_t size() const noexcept { return in_use_.size(); }
+    [[nodiscard]] job_record& operator[](std::size_t index) const noexcept { return *in_use_[index]; }
+
+  private:
+    std::vector<std::unique_ptr<job_record>> spare_;
+    std::vector<job_record*> in_use_; // owned; each knows its place here
 };
 
 } // namespace cles::runtime

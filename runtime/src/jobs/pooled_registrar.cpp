@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/pooled_registrar.hpp"
 
-#include "jobs/pool_state.hpp"
+#include "jobs/job_dispatcher.hpp"
 
 #include <chrono>
 #include <utility>

@@ -5,7 +5,6 @@
 #include <cles/task_info.hpp>
 #include <cles/verb.hpp>
 
-#include "jobs/job.hpp"
 #include "jobs/job_pool.hpp"
 
 #include <string>

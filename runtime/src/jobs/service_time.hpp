@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 
 namespace cles::runtime {
@@ -24,5 +26,19 @@ class service_time {
     std::int64_t smoothed_ = 0;
     bool known_ = false;
 };
+
+inline constexpr std::chrono::milliseconds shortest_retry{10};
+inline constexpr std::chrono::milliseconds longest_retry{10'000};
+
+/// When it is worth asking again (`retry_ms` of `busy`): once the workers have gone through half of what waits, so that
+/// those who were refused find room and do not all come back to an empty queue.
+inline std::chrono::milliseconds retry_delay(std::size_t queued, std::size_t workers,
+                                             std::chrono::nanoseconds service_time) noexcept {
+    using wide = std::chrono::duration<double, std::milli>;
+    const auto each = wide{service_time} / static_cast<double>(std::max<std::size_t>(workers, 1));
+    const auto half = each * (static_cast<double>(queued) / 2);
+    return std::chrono::ceil<std::chrono::milliseconds>(
+        std::clamp<wide>(half, wide{shortest_retry}, wide{longest_retry}));
+}
 
 } // namespace cles::runtime

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/worker_pool.hpp"
 
+#include "jobs/job_pool.hpp"
 #include "jobs/job_record.hpp"
 
 #include <boost/asio/post.hpp>

@@ -3,14 +3,12 @@
 
 #include <cles/limits.hpp>
 
-#include "jobs/brief_mutex.hpp"
+#include "jobs/adaptive_mutex.hpp"
+#include "jobs/completion_queue.hpp"
 #include "jobs/job_queue.hpp"
-#include "jobs/pool_options.hpp"
-#include "jobs/result_box.hpp"
 #include "jobs/service_time.hpp"
-#include "jobs/streak.hpp"
 #include "jobs/worker_threads.hpp"
-#include "jobs/worker_watch.hpp"
+#include "jobs/worker_watchdog.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -24,6 +22,7 @@
 namespace cles::runtime {
 
 class job_record;
+struct pool_options;
 
 /// The workers and what waits for them.
 ///

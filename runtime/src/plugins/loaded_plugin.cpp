@@ -3,7 +3,7 @@
 
 #include <cles/plugin_text.hpp>
 
-#include "plugins/plugin_question.hpp"
+#include "plugins/plugin_jobs.hpp"
 
 #include <algorithm>
 #include <array>

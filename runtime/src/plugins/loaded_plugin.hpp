@@ -6,8 +6,8 @@
 #include <cles/publisher.hpp>
 #include <cles/registrar.hpp>
 
-#include "plugins/plugin_jobs.hpp"
 #include "jobs/stop_notifier.hpp"
+#include "plugins/plugin_jobs.hpp"
 
 #include <atomic>
 #include <cstdint>

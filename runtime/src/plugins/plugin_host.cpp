@@ -5,7 +5,7 @@
 #include <cles/plugin_abi.h>
 #include <cles/plugin_text.hpp>
 
-#include "plugins/plugin_host_library.hpp"
+#include "plugins/plugin_library.hpp"
 #include "plugins/plugin_search.hpp"
 #include "plugins/plugin_trial.hpp"
 

@@ -3,9 +3,9 @@
 
 #include <cles/registrar.hpp>
 
-#include "plugins/loaded_plugin.hpp"
-#include "plugins/plugin_error.hpp"
 #include "jobs/stop_notifier.hpp"
+#include "plugins/loaded_plugin.hpp"
+#include "plugins/plugin_search.hpp"
 
 #include <chrono>
 #include <cstddef>

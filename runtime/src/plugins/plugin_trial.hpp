@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "config/config.hpp"
+#include "plugins/plugin_search.hpp"
+
 #include <chrono>
+#include <cstddef>
 #include <filesystem>
 #include <string>
 
@@ -20,5 +24,13 @@ namespace cles::runtime {
 /// ignores SIGCHLD and so never learns how its children end
 void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
                 const std::string& config, std::chrono::milliseconds limit);
+
+/// What is said of a plugin that cannot be used: the place in the configuration that is to blame, its `path` or one of
+/// its settings, and why.
+std::string complaint_about(const config& setup, std::size_t plugin, const plugin_error& why);
+
+/// Tries all plugins, each in a child process, and writes down which cannot be used. To be called before the process
+/// has other threads. \throws config_error where such a one is required
+void try_plugins(config& setup);
 
 } // namespace cles::runtime

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "config/config_json.hpp"
 #include "config/config_values.hpp"
+#include "config/yaml_value.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "config/config_error.hpp"
-#include "config/config_overrides.hpp"
+#include "config/config.hpp"
+#include "config/config_sources.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "config/config_error.hpp"
+#include "config/config.hpp"
 #include "config/config_sources.hpp"
 
 #include <boost/test/unit_test.hpp>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "config/config_file.hpp"
-#include "config/config_text.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "daemon/log_format.hpp"
+#include "daemon/daemon_log.hpp"
 
 #include <boost/test/unit_test.hpp>
 

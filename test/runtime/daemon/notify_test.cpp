@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "daemon/notify.hpp"
+#include "daemon/service_manager.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/local/datagram_protocol.hpp>

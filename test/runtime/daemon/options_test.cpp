@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/version.hpp>
 
-#include "daemon/options.hpp"
+#include "daemon/command_line.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 // Workers that find the executor late: they begin no job, and go on as soon as it is back.
 
+#include "jobs/completion_queue.hpp"
 #include "jobs/job_record.hpp"
-#include "jobs/job_records.hpp"
-#include "pooled_node.hpp"
-#include "jobs/result_box.hpp"
 #include "jobs/worker_pool.hpp"
+#include "pooled_node.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "pooled_node.hpp"
 #include "jobs/pooled_registrar.hpp"
+#include "pooled_node.hpp"
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/test/unit_test.hpp>

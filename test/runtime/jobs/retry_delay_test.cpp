@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/retry_delay.hpp"
+#include "jobs/service_time.hpp"
 
 #include <boost/test/unit_test.hpp>
 

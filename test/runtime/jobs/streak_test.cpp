@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/streak.hpp"
+#include "jobs/completion_queue.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "support/run_until.hpp"
 #include "jobs/worker_threads.hpp"
+#include "support/run_until.hpp"
 
 #include <boost/asio/post.hpp>
 #include <boost/test/unit_test.hpp>

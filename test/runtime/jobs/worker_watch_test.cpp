@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/worker_watch.hpp"
+#include "jobs/worker_watchdog.hpp"
 
 #include <boost/test/unit_test.hpp>
 

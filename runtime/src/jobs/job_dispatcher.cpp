@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/pool_state.hpp"
+#include "jobs/job_dispatcher.hpp"
 
-#include "jobs/retry_delay.hpp"
+#include "jobs/service_time.hpp"
 
 #include <boost/asio/execution/outstanding_work.hpp>
 #include <boost/asio/post.hpp>
@@ -12,6 +12,28 @@
 #include <utility>
 
 namespace cles::runtime {
+
+void draining::begin(std::chrono::milliseconds limit, std::function<void()> at_limit,
+                     std::function<void(const drain_report&)> done) {
+    done_ = std::move(done);
+    limit_->expires_after(limit);
+    limit_->async_wait([at_limit = std::move(at_limit)](boost::system::error_code code) {
+        if (!code) {
+            at_limit();
+        }
+    });
+}
+
+void draining::end(const drain_report& how) {
+    limit_->cancel();
+    const auto done = std::exchange(done_, nullptr);
+    done(how);
+}
+
+void draining::forget() {
+    done_ = nullptr;
+    limit_.reset();
+}
 
 namespace asio = boost::asio;
 using clock = time_point::clock;

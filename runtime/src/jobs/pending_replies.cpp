@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/open_answers.hpp"
+#include "jobs/pending_replies.hpp"
 
 #include <mutex>
 #include <string_view>

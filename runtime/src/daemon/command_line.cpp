@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "daemon/options.hpp"
+#include "daemon/command_line.hpp"
 
 #include <cles/version.hpp>
 

@@ -3,6 +3,8 @@
 
 #include <cles/plugin_abi.h>
 
+#include <boost/dll/shared_library.hpp>
+
 #include <filesystem>
 #include <string>
 
@@ -10,7 +12,6 @@
 #ifndef BOOST_DLL_USE_STD_FS
 #define BOOST_DLL_USE_STD_FS
 #endif
-#include <boost/dll/shared_library.hpp>
 
 namespace cles::runtime {
 

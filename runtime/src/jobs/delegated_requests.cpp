@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/onward_requests.hpp"
+#include "jobs/delegated_requests.hpp"
 
 #include "jobs/worker_pool.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "plugins/plugin_host_library.hpp"
+#include "plugins/plugin_library.hpp"
 
-#include "plugins/plugin_error.hpp"
+#include "plugins/plugin_search.hpp"
 
 #include <cstddef>
 #include <exception>

@@ -4,12 +4,25 @@
 #include <cles/identity.hpp>
 #include <cles/request.hpp>
 
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <cstddef>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace cles::runtime {
+
+/// Copies of the identities of those who ask, which all jobs of one share: a job may outlive the link that it came by.
+class kept_peers {
+  public:
+    [[nodiscard]] std::shared_ptr<const identity> copy_of(const identity& peer);
+
+  private:
+    static constexpr std::size_t most = 1024;
+    boost::unordered_flat_map<const identity*, std::shared_ptr<const identity>> all_;
+};
 
 /// A request's own copy in memory that is used again for the next one.
 class kept_request {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/result_box.hpp"
+#include "jobs/completion_queue.hpp"
 
 #include <mutex>
 #include <thread>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "config/config_overrides.hpp"
+#include "config/config_sources.hpp"
 
 #include <optional>
 #include <stdexcept>

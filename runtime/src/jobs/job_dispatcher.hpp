@@ -4,17 +4,12 @@
 #include <cles/limits.hpp>
 #include <cles/peer.hpp>
 
-#include "jobs/draining.hpp"
-#include "jobs/job.hpp"
+#include "jobs/completion_queue.hpp"
+#include "jobs/delegated_requests.hpp"
 #include "jobs/job_pool.hpp"
 #include "jobs/job_record.hpp"
-#include "jobs/job_records.hpp"
-#include "jobs/kept_peers.hpp"
-#include "jobs/onward_requests.hpp"
-#include "jobs/open_answers.hpp"
-#include "jobs/pool_figures.hpp"
-#include "jobs/pool_options.hpp"
-#include "jobs/result_box.hpp"
+#include "jobs/owned_request.hpp"
+#include "jobs/pending_replies.hpp"
 #include "jobs/stop_notifier.hpp"
 #include "jobs/worker_pool.hpp"
 
@@ -32,6 +27,24 @@
 #include <vector>
 
 namespace cles::runtime {
+
+/// The wait for the last jobs of a pool: it ends once, by the last job or by the limit.
+class draining {
+  public:
+    explicit draining(const boost::asio::any_io_executor& executor) : limit_(std::in_place, executor) {}
+
+    /// \param at_limit called unless `end` or `forget` was before
+    void begin(std::chrono::milliseconds limit, std::function<void()> at_limit,
+               std::function<void(const drain_report&)> done);
+    [[nodiscard]] bool under_way() const noexcept { return done_ != nullptr; }
+    void end(const drain_report& how);
+    /// Nobody waits any more; nothing of the executor is held from here on.
+    void forget();
+
+  private:
+    std::optional<boost::asio::steady_timer> limit_;
+    std::function<void(const drain_report&)> done_;
+};
 
 /// The inside of a pool: what happens on the service's executor, one step from a job's admission to its end after the
 /// other. What the steps need is kept by its parts. It lives as long as a job that somebody holds.
