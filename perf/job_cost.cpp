@@ -92,7 +92,7 @@ void run_daemon(const options& o, const std::vector<int>& cores, const perf::chi
     setup.plugins = {{.path = o.plugin}};
     setup.log.level = cles::log_level::warning;
     runtime::daemon_log log{setup.node, setup.log};
-    const runtime::notifier nobody{""};
+    const runtime::service_manager nobody{""};
     boost::asio::io_context io{1};
     runtime::daemon car{io, setup, {}, log, nobody};
     announce(car.endpoints().front());

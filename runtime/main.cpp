@@ -35,14 +35,14 @@ namespace {
 constexpr int success = 0;
 constexpr int cannot_run = 1;
 constexpr int wrong_usage = 2;
-constexpr int name_taken = 3;
+constexpr int name_conflict = 3;
 
 void print(std::FILE* to, const std::string& text) {
     std::fwrite(text.data(), 1, text.size(), to);
     std::fflush(to);
 }
 
-int complain(const std::string& text, int code) {
+int report(const std::string& text, int code) {
     print(stderr, "clesd: " + text + "\n");
     return code;
 }
@@ -52,7 +52,7 @@ std::string host_name() {
     return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-config_sources sources_of(const options& wanted) {
+config_sources sources_of(const command_line_options& wanted) {
     return {.file = wanted.config,
             .flags = wanted.flags,
             .variable = [](const char* name) -> const char* { return std::getenv(name); },
@@ -60,20 +60,20 @@ config_sources sources_of(const options& wanted) {
             .cores = std::thread::hardware_concurrency()};
 }
 
-// Plugins are tried, each in a process of its own, and not started: a daemon that runs may have their devices.
+// Plugins are tried, each in a process of its own, but not started: a running daemon may use their devices.
 int check_plugins(config setup) {
     try_plugins(setup);
     for (const auto& plugin : setup.plugins) {
-        if (!plugin.unusable.empty()) {
-            complain(plugin.unusable + " (it is not required)", success);
+        if (!plugin.trial_error.empty()) {
+            report(plugin.trial_error + " (it is not required)", success);
         }
     }
     print(stdout, (setup.file.empty() ? "without a file: " : setup.file + ": ") + "can be used\n");
     return success;
 }
 
-// Of a system error first what could not be done, then why; not the other way round, and not twice.
-std::string words_of(const error& e) {
+// For a system error: what could not be done, then why, without repetition.
+std::string message_of(const error& e) {
     const auto why = e.code().message();
     if (e.code().category() == error_category() || e.message().empty()) {
         return e.what();
@@ -81,19 +81,19 @@ std::string words_of(const error& e) {
     return e.message().find(why) != std::string::npos ? e.message() : e.message() + ": " + why;
 }
 
-// Children are not to tell the service manager anything.
+// Child processes must not notify the service manager.
 std::string take_notify_socket() {
     const char* socket = std::getenv("NOTIFY_SOCKET");
-    std::string taken = socket == nullptr ? "" : socket;
+    std::string value = socket == nullptr ? "" : socket;
     ::unsetenv("NOTIFY_SOCKET");
-    return taken;
+    return value;
 }
 
-std::unique_ptr<const wake_bound> bound_waking(const config& setup) {
+std::unique_ptr<const wake_bound> limit_wake_latency(const config& setup) {
     try {
         return setup.wake_within ? std::make_unique<const wake_bound>(*setup.wake_within) : nullptr;
-    } catch (const std::system_error& refused) {
-        throw config_error(setup.place_of("wake_within"), refused.what());
+    } catch (const std::system_error& e) {
+        throw config_error(setup.location_of("wake_within"), e.what());
     }
 }
 
@@ -105,43 +105,43 @@ int run(config setup, config_sources sources) {
                           .fifo_priority = static_cast<int>(setup.real_time),
                           .lock_memory = setup.real_time != 0};
     daemon_log log{node, setup.log};
-    const auto awake = bound_waking(setup); // before anybody is told that it runs
-    const notifier tell{std::move(notify_socket)};
+    const auto latency_limit = limit_wake_latency(setup); // before the service manager is notified
+    const service_manager manager{std::move(notify_socket)};
     boost::asio::io_context io{1};
-    daemon running{io, std::move(setup), std::move(sources), log, tell};
-    for (const auto& endpoint : running.endpoints()) {
+    daemon clesd{io, std::move(setup), std::move(sources), log, manager};
+    for (const auto& endpoint : clesd.endpoints()) {
         std::string line{node};
         line.append(" listening on ").append(endpoint).push_back('\n');
         print(stdout, line);
     }
-    if (!tell.ready()) {
-        log.warning("the service manager could not be told");
+    if (!manager.ready()) {
+        log.warning("the service manager could not be notified");
     }
     cles::run(io, how);
-    const int code = running.gave_way() ? name_taken : success;
-    if (running.leaves_something()) {
-        std::_Exit(code); // it cannot be waited for
+    const int code = clesd.lost_name() ? name_conflict : success;
+    if (clesd.has_unfinished_work()) {
+        std::_Exit(code); // without waiting for it
     }
     return code;
 }
 
-// What the parent blocks or ignores is inherited. Ignoring SIGCHLD would hide how a plugin's trial ended, and a blocked
+// The parent's signal settings are inherited. Ignoring SIGCHLD would hide how a plugin's trial ended, and a blocked
 // signal would neither stop the daemon nor end a plugin's start that hangs.
 void set_up_signals() {
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     std::signal(SIGCHLD, SIG_DFL);
-    std::signal(SIGPIPE, SIG_IGN); // a reader of its output that goes away
+    std::signal(SIGPIPE, SIG_IGN); // if a reader of its output ends
 }
 
 int start(int argc, const char* const* argv) {
-    const auto asked = parse_options(argc, argv);
-    if (const auto* text = std::get_if<std::string>(&asked)) {
+    const auto parsed = parse_command_line(argc, argv);
+    if (const auto* text = std::get_if<std::string>(&parsed)) {
         print(stdout, *text);
         return success;
     }
-    const auto& wanted = std::get<options>(asked);
+    const auto& wanted = std::get<command_line_options>(parsed);
     auto sources = sources_of(wanted);
     auto setup = load(sources);
     if (wanted.print_config) {
@@ -161,15 +161,15 @@ int main(int argc, char** argv) {
     set_up_signals();
     try {
         return start(argc, argv);
-    } catch (const usage_error& wrong) {
-        return complain(std::string{wrong.what()} + "\nclesd: clesd --help says what there is", wrong_usage);
-    } catch (const config_error& wrong) {
-        return complain(wrong.what(), wrong_usage);
+    } catch (const usage_error& e) {
+        return report(std::string{e.what()} + "\nclesd: run clesd --help for the options", wrong_usage);
+    } catch (const config_error& e) {
+        return report(e.what(), wrong_usage);
     } catch (const cles::error& failed) {
-        return complain(words_of(failed), cannot_run);
+        return report(message_of(failed), cannot_run);
     } catch (const boost::system::system_error& failed) {
-        return complain(failed.code().message(), cannot_run); // what() may hold the path of a header
+        return report(failed.code().message(), cannot_run); // what() may contain the path of a header
     } catch (const std::exception& failed) {
-        return complain(failed.what(), cannot_run);
+        return report(failed.what(), cannot_run);
     }
 }

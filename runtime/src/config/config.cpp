@@ -10,29 +10,29 @@
 namespace cles::runtime {
 namespace {
 
-// A host's name may hold what a node's may not.
-std::string node_name_of(const std::string& host) {
+// A host name may contain characters that a node name may not.
+std::string to_valid_node_name(const std::string& host) {
     std::string name = host.substr(0, host.find('.')).substr(0, 64);
     for (char& c : name) {
-        const bool fits =
+        const bool valid =
             (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' || c == '_';
-        c = fits ? c : '-';
+        c = valid ? c : '-';
     }
     return name.empty() || name == "self" || name == "any" || name == "all" ? "node" : name;
 }
 
-void check_exposure(const config& whole, const std::string& key, const std::string& text) {
+void check_exposure(const config& setup, const std::string& key, const std::string& text) {
     const auto where = parse_url(text);
     const auto* carrier = find_transport(where.scheme);
-    if (!whole.insecure && carrier != nullptr && carrier->is_exposed(where)) {
-        throw config_error(whole.place_of(key),
-                           "'" + text + "' can be reached from other hosts, which takes 'insecure: true'");
+    if (!setup.insecure && carrier != nullptr && carrier->is_exposed(where)) {
+        throw config_error(setup.location_of(key),
+                           "'" + text + "' can be reached from other hosts, which requires 'insecure: true'");
     }
 }
 
 } // namespace
 
-std::string config::place_of(const std::string& key) const {
+std::string config::location_of(const std::string& key) const {
     for (auto known = key; !known.empty(); known.resize(std::min(known.find_last_of(".["), known.size()))) {
         if (const auto found = origins.find(known); found != origins.end()) {
             return found->second + ": " + key;
@@ -46,30 +46,31 @@ std::string config::place_of(const std::string& key) const {
 
 config default_config(const std::string& host, std::uint32_t cores) {
     config made;
-    made.node = node_name_of(host);
+    made.node = to_valid_node_name(host);
     made.listen = {"tcp://127.0.0.1:25370", "udp://127.0.0.1:25370"};
     made.multicast = {.interface = "lo"};
-    made.multicast.required = false; // nobody asked for it
+    made.multicast.required = false; // it was not requested explicitly
     made.workers = cores == 0 ? 1 : cores;
     return made;
 }
 
-void check(const config& whole) {
-    for (std::size_t i = 0; i < whole.listen.size(); ++i) {
-        check_exposure(whole, "listen[" + std::to_string(i) + "]", whole.listen[i]);
+void check(const config& setup) {
+    for (std::size_t i = 0; i < setup.listen.size(); ++i) {
+        check_exposure(setup, "listen[" + std::to_string(i) + "]", setup.listen[i]);
     }
-    if (whole.multicast.is_on() && whole.multicast.interface != "lo" && !whole.insecure) { // `auto` may be any
-        throw config_error(whole.place_of("multicast"), "on '" + whole.multicast.interface +
-                                                            "' other hosts take part, which takes 'insecure: true'");
+    if (setup.multicast.is_on() && setup.multicast.interface != "lo" && !setup.insecure) { // `auto` may choose any
+        throw config_error(setup.location_of("multicast"),
+                           "'" + setup.multicast.interface +
+                               "' can be reached from other hosts, which requires 'insecure: true'");
     }
-    if (whole.peers.contains(whole.node)) {
-        throw config_error(whole.place_of("peers." + whole.node), "is this node's own name");
+    if (setup.peers.contains(setup.node)) {
+        throw config_error(setup.location_of("peers." + setup.node), "is this node's own name");
     }
     std::set<std::string> paths;
-    for (std::size_t i = 0; i < whole.plugins.size(); ++i) {
-        if (!paths.insert(whole.plugins[i].path).second) {
-            throw config_error(whole.place_of("plugins[" + std::to_string(i) + "].path"),
-                               "'" + whole.plugins[i].path + "' is loaded already");
+    for (std::size_t i = 0; i < setup.plugins.size(); ++i) {
+        if (!paths.insert(setup.plugins[i].path).second) {
+            throw config_error(setup.location_of("plugins[" + std::to_string(i) + "].path"),
+                               "'" + setup.plugins[i].path + "' is listed twice");
         }
     }
 }

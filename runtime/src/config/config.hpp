@@ -26,19 +26,20 @@ struct log_config {
 };
 
 struct plugin_config {
-    std::string path;          ///< as it stands in the configuration
-    std::string config = "{}"; ///< JSON, handed to the plugin as it is
+    std::string path;          ///< as written in the configuration
+    std::string config = "{}"; ///< JSON, passed to the plugin unchanged
     bool required = true;      ///< the daemon does not start without it
-    std::string unusable{};    ///< what a trial found (`plugin_setup`); empty: nothing, or there was none
+    std::string
+        trial_error{}; ///< why the plugin cannot be used (`try_plugins`); empty if it can, or has not been tried
 
     bool operator==(const plugin_config&) const = default;
 };
 
-/// How a daemon is set up: what all its sources say together (docs/runtime.md).
+/// The configuration of a daemon, combined from all its sources (docs/runtime.md).
 struct config {
     std::string node;
-    std::string pool;         ///< empty: the one without a name
-    bool allow_clash = false; ///< goes on where another live node had its name first
+    std::string pool;         ///< empty: the unnamed pool
+    bool allow_clash = false; ///< continue if another live node had the name first
     std::vector<std::string> listen;
     bool insecure = false;
     std::vector<std::string> networks;
@@ -48,40 +49,40 @@ struct config {
 
     std::uint32_t workers = 1;
     std::uint32_t queue = 1024;
-    std::chrono::microseconds stuck_after{2'000'000}; ///< past its deadline, before a job's worker is replaced
-    std::uint32_t replacements = 4;                   ///< workers at most that take the place of stuck ones
-    std::chrono::microseconds drain{5'000'000};       ///< what running jobs have to end at a stop
+    std::chrono::microseconds stuck_after{2'000'000}; ///< after its deadline, before a job's worker is replaced
+    std::uint32_t replacements = 4;                   ///< at most so many stuck workers are replaced
+    std::chrono::microseconds drain{5'000'000};       ///< how long running jobs may take to end at a stop
 
     std::vector<plugin_config> plugins;
-    std::vector<std::string> plugin_path; ///< folders where plugins are looked for that are named without one
+    std::vector<std::string> plugin_path; ///< folders to search for plugins named without one
 
     log_config log;
     cles::limits limits;
     std::chrono::microseconds busy_poll{0};
     std::uint32_t real_time = 0;
-    std::optional<std::chrono::microseconds> wake_within; ///< nothing: as the host has it
+    std::optional<std::chrono::microseconds> wake_within; ///< none: not limited
 
-    std::string file; ///< the configuration file; empty: none was there
-    /// Where each value that is no default comes from, by its key's full path: "multicast.port" to "clesd.yaml:4".
+    std::string file; ///< the configuration file; empty if there was none
+    /// Where each value that is not a default comes from, by full key: "multicast.port" to "clesd.yaml:4".
     std::map<std::string, std::string> origins;
 
-    /// How a complaint about a value begins: "clesd.yaml:7: plugins[0].path", with the place of what holds it where it
-    /// has none itself, or the key alone where all is the default.
-    [[nodiscard]] std::string place_of(const std::string& key) const;
+    /// The location and key with which a message about a value begins: "clesd.yaml:7: plugins[0].path". A value without
+    /// a location of its own has that of the value that contains it; a default has none.
+    [[nodiscard]] std::string location_of(const std::string& key) const;
 };
 
-/// What is true where nothing else is said. \param host what the machine is called \param cores that it has
+/// \param host the host's name \param cores the host's number of processor cores
 config default_config(const std::string& host, std::uint32_t cores);
 
-/// What no value shows by itself, only several together. \throws config_error
-void check(const config& whole);
+/// Checks what depends on several values. \throws config_error
+void check(const config& setup);
 
-/// A configuration that cannot be used. Says where and why: "clesd.yaml:7: multicast.port: 70000 is not a number from
-/// 1 to 65535".
+/// A configuration that cannot be used. The message says where and why: "clesd.yaml:7: multicast.port: '70000' is not a
+/// number from 1 to 65535".
 class config_error : public std::runtime_error {
   public:
-    explicit config_error(const std::string& words) : std::runtime_error(words) {}
-    config_error(const std::string& place, const std::string& why) : std::runtime_error(place + ": " + why) {}
+    explicit config_error(const std::string& message) : std::runtime_error(message) {}
+    config_error(const std::string& location, const std::string& why) : std::runtime_error(location + ": " + why) {}
 };
 
 } // namespace cles::runtime

@@ -7,16 +7,16 @@
 
 namespace cles::runtime {
 
-/// Puts what a configuration in YAML says over what is there.
-/// \param name how complaints call it
-/// \throws config_error naming file, line and the key's full path
-void read_config(const std::string& text, const std::string& name, config& over);
+/// Reads a configuration in YAML. It replaces the values in `into` that it contains.
+/// \param name of the file, for messages
+/// \throws config_error naming file, line and full key
+void read_config(const std::string& text, const std::string& name, config& into);
 
-/// The same, of a file. \throws config_error also where it cannot be read, or has more than 1 MiB
-void read_config_file(const std::string& path, config& over);
+/// The same for a file. \throws config_error also if it cannot be read, or is larger than 1 MiB
+void read_config_file(const std::string& path, config& into);
 
-/// The whole configuration as a file would say it, with a comment on each value that is no default: where it comes
-/// from. Read again it says the same.
-std::string to_yaml(const config& whole);
+/// The complete configuration as YAML, with a comment after each value that is not a default: where it comes from.
+/// `read_config` reads it back.
+std::string to_yaml(const config& setup);
 
 } // namespace cles::runtime

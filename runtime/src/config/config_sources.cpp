@@ -13,7 +13,7 @@
 namespace cles::runtime {
 namespace {
 
-std::vector<std::string> parts_of(std::string_view text) {
+std::vector<std::string> split_list(std::string_view text) {
     std::vector<std::string> parts;
     while (!text.empty()) {
         const auto comma = text.find(',');
@@ -29,28 +29,28 @@ std::vector<std::string> parts_of(std::string_view text) {
 }
 
 template <class T, class F>
-void take(const std::optional<overrides::given<T>>& from, config& over, const std::string& key, F use) {
+void apply_override(const std::optional<overrides::given<T>>& from, config& into, const std::string& key, F use) {
     if (!from) {
         return;
     }
-    // What the file said of the key and its parts counts no more.
-    std::erase_if(over.origins, [&](const auto& origin) {
+    // The file's values of the key and its parts are replaced.
+    std::erase_if(into.origins, [&](const auto& origin) {
         const auto& known = origin.first;
         return known.starts_with(key) &&
                (known.size() == key.size() || known[key.size()] == '[' || known[key.size()] == '.');
     });
-    over.origins[key] = from->by;
+    into.origins[key] = from->source;
     try {
         use(from->value);
-    } catch (const bad_value& wrong) {
-        throw config_error(from->by, wrong.what());
+    } catch (const invalid_value& e) {
+        throw config_error(from->source, e.what());
     }
 }
 
-std::vector<std::string> urls(const std::vector<std::string>& texts, config& over, const std::string& key) {
+std::vector<std::string> urls(const std::vector<std::string>& texts, config& into, const std::string& key) {
     std::vector<std::string> all;
     for (const auto& text : texts) {
-        over.origins[key + "[" + std::to_string(all.size()) + "]"] = over.origins[key];
+        into.origins[key + "[" + std::to_string(all.size()) + "]"] = into.origins[key];
         all.push_back(to_url(text));
     }
     return all;
@@ -66,7 +66,7 @@ overrides from_environment(const std::function<const char*(const char*)>& variab
         }
     };
     const auto whole = [](const char* value) { return std::string{value}; };
-    const auto several = [](const char* value) { return parts_of(value); };
+    const auto several = [](const char* value) { return split_list(value); };
     text("CLES_NODE", found.node, whole);
     text("CLES_POOL", found.pool, whole);
     text("CLES_LISTEN", found.listen, several);
@@ -76,16 +76,17 @@ overrides from_environment(const std::function<const char*(const char*)>& variab
     return found;
 }
 
-void apply(const overrides& wanted, config& over) {
-    take(wanted.node, over, "node", [&](const std::string& text) { over.node = to_node_name(text); });
-    take(wanted.pool, over, "pool", [&](const std::string& text) { over.pool = to_pool_name(text); });
-    take(wanted.allow_clash, over, "allow_clash", [&](bool value) { over.allow_clash = value; });
-    take(wanted.listen, over, "listen",
-         [&](const std::vector<std::string>& texts) { over.listen = urls(texts, over, "listen"); });
-    take(wanted.seeds, over, "seeds",
-         [&](const std::vector<std::string>& texts) { over.seeds = urls(texts, over, "seeds"); });
-    take(wanted.multicast, over, "multicast", [&](const std::string& text) { over.multicast = to_multicast(text); });
-    take(wanted.log, over, "log", [&](const std::string& text) { over.log = to_log(text, over.log); });
+void apply(const overrides& wanted, config& into) {
+    apply_override(wanted.node, into, "node", [&](const std::string& text) { into.node = to_node_name(text); });
+    apply_override(wanted.pool, into, "pool", [&](const std::string& text) { into.pool = to_pool_name(text); });
+    apply_override(wanted.allow_clash, into, "allow_clash", [&](bool value) { into.allow_clash = value; });
+    apply_override(wanted.listen, into, "listen",
+                   [&](const std::vector<std::string>& texts) { into.listen = urls(texts, into, "listen"); });
+    apply_override(wanted.seeds, into, "seeds",
+                   [&](const std::vector<std::string>& texts) { into.seeds = urls(texts, into, "seeds"); });
+    apply_override(wanted.multicast, into, "multicast",
+                   [&](const std::string& text) { into.multicast = to_multicast(text); });
+    apply_override(wanted.log, into, "log", [&](const std::string& text) { into.log = to_log_config(text, into.log); });
 }
 
 namespace {
@@ -95,7 +96,7 @@ std::string value_of(const std::function<const char*(const char*)>& variable, co
     return value == nullptr ? "" : value;
 }
 
-// One that was named has to be there; of the usual places, one that is there but cannot be read is not passed over.
+// A file that is named has to exist. A file in a default location that exists but cannot be read is an error.
 std::string file_of(const config_sources& from) {
     if (from.file) {
         return *from.file;
@@ -103,9 +104,9 @@ std::string file_of(const config_sources& from) {
     if (auto named = value_of(from.variable, "CLES_CONFIG"); !named.empty()) {
         return named;
     }
-    for (auto& place : usual_places(from.variable)) {
-        if (::access(place.c_str(), F_OK) == 0) {
-            return std::move(place);
+    for (auto& location : default_locations(from.variable)) {
+        if (::access(location.c_str(), F_OK) == 0) {
+            return std::move(location);
         }
     }
     return {};
@@ -113,15 +114,15 @@ std::string file_of(const config_sources& from) {
 
 } // namespace
 
-std::vector<std::string> usual_places(const std::function<const char*(const char*)>& variable) {
-    std::vector<std::string> places{"./clesd.yaml"};
+std::vector<std::string> default_locations(const std::function<const char*(const char*)>& variable) {
+    std::vector<std::string> locations{"./clesd.yaml"};
     if (const auto own = value_of(variable, "XDG_CONFIG_HOME"); !own.empty()) {
-        places.push_back(own + "/cles/clesd.yaml");
+        locations.push_back(own + "/cles/clesd.yaml");
     } else if (const auto home = value_of(variable, "HOME"); !home.empty()) {
-        places.push_back(home + "/.config/cles/clesd.yaml");
+        locations.push_back(home + "/.config/cles/clesd.yaml");
     }
-    places.emplace_back("/etc/cles/clesd.yaml");
-    return places;
+    locations.emplace_back("/etc/cles/clesd.yaml");
+    return locations;
 }
 
 config load(const config_sources& from) {

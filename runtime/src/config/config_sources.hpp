@@ -10,12 +10,12 @@
 
 namespace cles::runtime {
 
-/// What the environment or the flags say over the file.
+/// Values from the environment or from flags, which override those of the file.
 struct overrides {
     template <class T>
     struct given {
         T value{};
-        std::string by; ///< "CLES_NODE", "--node"
+        std::string source; ///< "CLES_NODE", "--node"
     };
 
     std::optional<given<std::string>> node;
@@ -27,26 +27,26 @@ struct overrides {
     std::optional<given<std::string>> log;
 };
 
-/// CLES_NODE, CLES_POOL, CLES_LISTEN and CLES_SEEDS (several with commas between), CLES_MULTICAST, CLES_LOG. A variable
-/// that is empty counts as not there. \param variable gives the value of a variable, or null
+/// Reads CLES_NODE, CLES_POOL, CLES_LISTEN and CLES_SEEDS (lists separated by commas), CLES_MULTICAST and CLES_LOG.
+/// Empty variables are ignored. \param variable returns the value of a variable, or null
 overrides from_environment(const std::function<const char*(const char*)>& variable);
 
 /// \throws config_error naming the variable or flag
-void apply(const overrides& wanted, config& over);
+void apply(const overrides& wanted, config& into);
 
-/// Where a daemon's configuration comes from: a flag goes before the environment, that before the file, that before
-/// the defaults. Kept, so that it can be read again.
+/// The sources of a daemon's configuration: flags override the environment, which overrides the file, which overrides
+/// the defaults. Kept in order to reload the configuration.
 struct config_sources {
-    std::optional<std::string> file; ///< by flag
+    std::optional<std::string> file; ///< given by flag
     overrides flags;
-    std::function<const char*(const char*)> variable; ///< of the environment; null where there is none
-    std::string host;                                 ///< what the machine is called
+    std::function<const char*(const char*)> variable; ///< returns an environment variable, or null
+    std::string host;                                 ///< the host's name
     std::uint32_t cores = 1;
 };
 
-/// The files that are looked for where none is named, the first that is there being taken: `./clesd.yaml`,
-/// `$XDG_CONFIG_HOME/cles/clesd.yaml` (`$HOME/.config` where that is not set), `/etc/cles/clesd.yaml`.
-std::vector<std::string> usual_places(const std::function<const char*(const char*)>& variable);
+/// The files of which the first that exists is read if none is named: `./clesd.yaml`,
+/// `$XDG_CONFIG_HOME/cles/clesd.yaml` (`$HOME/.config` if that is not set), `/etc/cles/clesd.yaml`.
+std::vector<std::string> default_locations(const std::function<const char*(const char*)>& variable);
 
 /// \throws config_error
 config load(const config_sources& from);

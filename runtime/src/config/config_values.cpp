@@ -20,10 +20,10 @@ namespace {
 using std::chrono::microseconds;
 
 [[noreturn]] void refuse(std::string_view text, const std::string& why) {
-    throw bad_value("'" + std::string{text} + "' " + why);
+    throw invalid_value("'" + std::string{text} + "' " + why);
 }
 
-// The number at the text's beginning; what follows it is left in `text`.
+// Reads the number at the beginning of the text, and removes it from `text`.
 template <class T>
 bool take_number(std::string_view& text, T& number) {
     const auto* end = text.data() + text.size();
@@ -32,9 +32,9 @@ bool take_number(std::string_view& text, T& number) {
     return code == std::errc{};
 }
 
-std::uint64_t within(std::string_view text, std::uint64_t number, std::uint64_t least, std::uint64_t most) {
-    if (number < least || number > most) {
-        refuse(text, "is not a number from " + std::to_string(least) + " to " + std::to_string(most));
+std::uint64_t within(std::string_view text, std::uint64_t number, std::uint64_t min, std::uint64_t max) {
+    if (number < min || number > max) {
+        refuse(text, "is not a number from " + std::to_string(min) + " to " + std::to_string(max));
     }
     return number;
 }
@@ -42,29 +42,29 @@ std::uint64_t within(std::string_view text, std::uint64_t number, std::uint64_t 
 constexpr std::array<std::pair<std::string_view, std::uint64_t>, 4> sizes{
     {{"", 1}, {"KiB", 1U << 10U}, {"MiB", 1U << 20U}, {"GiB", 1U << 30U}}};
 
-// The largest first.
+// Largest first.
 constexpr std::array<std::pair<std::string_view, std::int64_t>, 5> units{
     {{"h", 3'600'000'000}, {"min", 60'000'000}, {"s", 1'000'000}, {"ms", 1'000}, {"us", 1}}};
-constexpr microseconds longest_span = std::chrono::hours{24};
+constexpr microseconds max_duration = std::chrono::hours{24};
 
 constexpr std::array<std::pair<std::string_view, log_level>, 4> levels{{{"debug", log_level::debug},
                                                                         {"info", log_level::info},
                                                                         {"warning", log_level::warning},
                                                                         {"error", log_level::error}}};
 
-// What the library says is wrong with a URL or the like.
+// Converts the library's errors.
 template <class F>
-auto in_our_words(F read) {
+auto with_invalid_value(F read) {
     try {
         return read();
     } catch (const error& e) {
-        throw bad_value(e.message());
+        throw invalid_value(e.message());
     }
 }
 
 } // namespace
 
-bool to_switch(std::string_view text) {
+bool to_bool(std::string_view text) {
     if (text == "true" || text == "on" || text == "yes") {
         return true;
     }
@@ -74,24 +74,24 @@ bool to_switch(std::string_view text) {
     refuse(text, "is neither true nor false");
 }
 
-std::uint64_t to_count(std::string_view text, std::uint64_t least, std::uint64_t most) {
+std::uint64_t to_count(std::string_view text, std::uint64_t min, std::uint64_t max) {
     auto rest = text;
     std::uint64_t number = 0;
     if (!take_number(rest, number) || !rest.empty()) {
-        refuse(text, "is not a number from " + std::to_string(least) + " to " + std::to_string(most));
+        refuse(text, "is not a number from " + std::to_string(min) + " to " + std::to_string(max));
     }
-    return within(text, number, least, most);
+    return within(text, number, min, max);
 }
 
-std::uint64_t to_size(std::string_view text, std::uint64_t least, std::uint64_t most) {
+std::uint64_t to_size(std::string_view text, std::uint64_t min, std::uint64_t max) {
     auto rest = text;
     std::uint64_t number = 0;
     const bool is_number = take_number(rest, number);
     const auto* const unit = std::ranges::find(sizes, rest, &decltype(sizes)::value_type::first);
     if (!is_number || unit == sizes.end()) {
-        refuse(text, "is no size: write bytes, or 64KiB, 1MiB, 1GiB");
+        refuse(text, "is not a size: write bytes, or 64KiB, 1MiB, 1GiB");
     }
-    return within(text, number > most / unit->second ? most + 1 : number * unit->second, least, most);
+    return within(text, number > max / unit->second ? max + 1 : number * unit->second, min, max);
 }
 
 microseconds to_duration(std::string_view text) {
@@ -103,26 +103,26 @@ microseconds to_duration(std::string_view text) {
     }
     const auto* const unit = std::ranges::find(units, rest, &decltype(units)::value_type::first);
     if (!is_number || unit == units.end()) {
-        refuse(text, "is no time: write 50us, 250ms, 2s, 1min or 1h");
+        refuse(text, "is not a duration: write 50us, 250ms, 2s, 1min or 1h");
     }
     const double span = number * static_cast<double>(unit->second);
-    if (span > static_cast<double>(longest_span.count())) {
+    if (span > static_cast<double>(max_duration.count())) {
         refuse(text, "is more than a day");
     }
-    return microseconds{number > 0 ? std::max(std::llround(span), 1LL) : 0}; // 0 has a meaning of its own
+    return microseconds{number > 0 ? std::max(std::llround(span), 1LL) : 0}; // 0 has a special meaning
 }
 
-std::optional<microseconds> to_wake_bound(std::string_view text) {
+std::optional<microseconds> to_wake_within(std::string_view text) {
     if (text == "off") {
         return std::nullopt;
     }
     if (text == "0") {
-        refuse(text, "is neither: write off, or 0us for cores that stay awake");
+        refuse(text, "is ambiguous: write off, or 0us to keep the cores awake");
     }
     return to_duration(text);
 }
 
-std::string wake_bound_text(std::optional<microseconds> bound) {
+std::string wake_within_text(std::optional<microseconds> bound) {
     if (!bound) {
         return "off";
     }
@@ -142,28 +142,28 @@ bool is_name(std::string_view text) {
 
 std::string to_pool_name(std::string_view text) {
     if (!text.empty() && !is_name(text)) {
-        refuse(text, "is not a pool's name (1 to 64 letters, digits, '_', '-', '.')");
+        refuse(text, "is not a valid pool name (1 to 64 letters, digits, '_', '-', '.')");
     }
     return std::string{text};
 }
 
 std::string to_node_name(std::string_view text) {
     if (!is_name(text)) {
-        refuse(text, "is no node's name (1 to 64 letters, digits, '_', '-', '.')");
+        refuse(text, "is not a valid node name (1 to 64 letters, digits, '_', '-', '.')");
     }
     if (text == "self" || text == "any" || text == "all") {
-        refuse(text, "is no node's name, since every node understands it");
+        refuse(text, "is not a valid node name, because every node answers to it");
     }
     return std::string{text};
 }
 
 std::string to_url(std::string_view text) {
-    const auto where = in_our_words([&] { return parse_url(text); });
+    const auto where = with_invalid_value([&] { return parse_url(text); });
     if (where.scheme == "inproc") {
-        refuse(text, "is inside one process: nobody else could reach it");
+        refuse(text, "cannot be reached from outside the process");
     }
     if (find_transport(where.scheme) == nullptr) {
-        refuse(text, "has a scheme that this program does not know");
+        refuse(text, "has an unknown scheme");
     }
     return std::string{text};
 }
@@ -174,28 +174,28 @@ std::string to_network(std::string_view text) {
     boost::asio::ip::make_network_v4(text, not_v4);
     boost::asio::ip::make_network_v6(text, not_v6);
     if (not_v4 && not_v6) {
-        refuse(text, "is no network: write 10.0.0.0/8 or fd00::/8");
+        refuse(text, "is not a network: write 10.0.0.0/8 or fd00::/8");
     }
     return std::string{text};
 }
 
 multicast_options to_multicast(std::string_view text) {
-    return in_our_words([&] { return parse_multicast(text); });
+    return with_invalid_value([&] { return parse_multicast(text); });
 }
 
 std::string to_interfaces(std::string_view text) {
     if (text.empty() || text == "off") {
-        refuse(text, "is no interface; 'multicast: off' turns it off");
+        refuse(text, "is not an interface; 'multicast: off' turns multicast off");
     }
     multicast_options where{.interface = std::string{text}};
-    in_our_words([&] { check(where); });
+    with_invalid_value([&] { check(where); });
     return std::move(where.interface);
 }
 
 log_level to_log_level(std::string_view text) {
     const auto* const found = std::ranges::find(levels, text, &decltype(levels)::value_type::first);
     if (found == levels.end()) {
-        refuse(text, "is none of debug, info, warning, error");
+        refuse(text, "is not one of debug, info, warning, error");
     }
     return found->second;
 }
@@ -210,22 +210,24 @@ log_format to_log_format(std::string_view text) {
     refuse(text, "is neither text nor json");
 }
 
-log_config to_log(std::string_view text, log_config otherwise) {
+log_config to_log_config(std::string_view text, log_config current) {
     const auto whole = text;
     for (bool more = true; more;) {
         const auto comma = text.find(',');
         const auto part = text.substr(0, comma);
         if (part == "text" || part == "json") {
-            otherwise.format = to_log_format(part);
+            current.format = to_log_format(part);
         } else if (std::ranges::find(levels, part, &decltype(levels)::value_type::first) != levels.end()) {
-            otherwise.level = to_log_level(part);
+            current.level = to_log_level(part);
         } else {
-            refuse(whole, "is not what to log: debug, info, warning, error, text, json, or two of them, as debug,json");
+            refuse(
+                whole,
+                "is not a log setting: write debug, info, warning, error, text, json, or two of them, as debug,json");
         }
         more = comma != std::string_view::npos;
         text.remove_prefix(more ? comma + 1 : text.size());
     }
-    return otherwise;
+    return current;
 }
 
 std::string_view to_string(log_level level) noexcept {

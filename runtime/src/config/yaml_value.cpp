@@ -10,52 +10,52 @@
 
 namespace cles::runtime {
 
-config_node::config_node(const YAML::Node& value, std::string key, const std::string& file,
-                         std::map<std::string, std::string>& origins)
+yaml_value::yaml_value(const YAML::Node& value, std::string key, const std::string& file,
+                       std::map<std::string, std::string>& origins)
     : value_(value), key_(std::move(key)), file_(file), origins_(origins) {
     if (!key_.empty()) {
-        origins_[key_] = place();
+        origins_[key_] = location();
     }
 }
 
-const std::string& config_node::text() const {
+const std::string& yaml_value::scalar() const {
     if (value_.IsNull()) {
-        refuse("has no value");
+        fail("has no value");
     }
     if (!value_.IsScalar()) {
-        refuse("has to be a single value");
+        fail("has to be a single value");
     }
     return value_.Scalar();
 }
 
-void config_node::map(const readers& known) const {
-    each_pair([&](const std::string& name, const config_node& value) {
+void yaml_value::read_map(const readers& known) const {
+    for_each_pair([&](const std::string& name, const yaml_value& value) {
         const auto found = known.find(name);
         if (found == known.end()) {
             std::string all;
             for (const auto& [key, unused] : known) {
                 all.append(all.empty() ? "" : ", ").append(key);
             }
-            value.refuse("unknown key; known here: " + all);
+            value.fail("unknown key; known here: " + all);
         }
         found->second(value);
     });
 }
 
-void config_node::names(const std::function<void(const std::string&, const config_node&)>& each) const {
-    each_pair([&](const std::string& name, const config_node& value) {
+void yaml_value::read_names(const std::function<void(const std::string&, const yaml_value&)>& each) const {
+    for_each_pair([&](const std::string& name, const yaml_value& value) {
         try {
             to_node_name(name);
-        } catch (const bad_value& wrong) {
-            value.refuse(wrong.what());
+        } catch (const invalid_value& e) {
+            value.fail(e.what());
         }
         each(name, value);
     });
 }
 
-void config_node::list(const reader& each) const {
+void yaml_value::read_list(const reader& each) const {
     if (!value_.IsSequence()) {
-        refuse("has to be a list: [one, two]");
+        fail("has to be a list: [one, two]");
     }
     std::size_t at = 0;
     for (const auto& item : value_) {
@@ -63,22 +63,22 @@ void config_node::list(const reader& each) const {
     }
 }
 
-std::string config_node::json() const {
+std::string yaml_value::json() const {
     try {
-        auto text = json_of(value_); // which refuses what nests without end
-        keep_places(value_, key_);
+        auto text = yaml_to_json(value_); // throws if it is nested endlessly
+        record_locations(value_, key_);
         return text;
-    } catch (const bad_value& wrong) {
-        refuse(wrong.what());
+    } catch (const invalid_value& e) {
+        fail(e.what());
     }
 }
 
-void config_node::keep_places(const YAML::Node& value, const std::string& key) const {
-    constexpr std::size_t most = 10'000; // anchors may multiply what is there
+void yaml_value::record_locations(const YAML::Node& value, const std::string& key) const {
+    constexpr std::size_t max_locations = 10'000; // anchors may multiply the values
     const auto keep = [&](const YAML::Node& inner, int line, const std::string& inner_key) {
-        if (origins_.size() < most) {
+        if (origins_.size() < max_locations) {
             origins_[inner_key] = file_ + ":" + std::to_string(line + 1);
-            keep_places(inner, inner_key);
+            record_locations(inner, inner_key);
         }
     };
     if (value.IsMap()) {
@@ -93,33 +93,33 @@ void config_node::keep_places(const YAML::Node& value, const std::string& key) c
     }
 }
 
-void config_node::refuse(const std::string& why) const {
-    throw config_error(key_.empty() ? place() : place() + ": " + key_, why);
+void yaml_value::fail(const std::string& why) const {
+    throw config_error(key_.empty() ? location() : location() + ": " + key_, why);
 }
 
-void config_node::each_pair(const std::function<void(const std::string&, const config_node&)>& each) const {
+void yaml_value::for_each_pair(const std::function<void(const std::string&, const yaml_value&)>& each) const {
     if (!value_.IsMap()) {
-        refuse(value_.IsNull() ? "has no value" : "has to have keys of its own");
+        fail(value_.IsNull() ? "has no value" : "has to be a map");
     }
     std::map<std::string, int> lines;
     for (const auto& pair : value_) {
         const auto& key = pair.first;
         if (!key.IsScalar()) {
-            refuse("a key has to be a word");
+            fail("keys have to be scalars");
         }
         const auto& name = key.Scalar();
-        // A value that is missing has no line of its own.
-        const config_node made{pair.second, key_.empty() ? name : key_ + "." + name, file_, origins_};
+        // A missing value has no line.
+        const yaml_value made{pair.second, key_.empty() ? name : key_ + "." + name, file_, origins_};
         const auto line = key.Mark().line + 1;
         origins_[made.key_] = file_ + ":" + std::to_string(line);
         if (const auto [first, is_new] = lines.emplace(name, line); !is_new) {
-            made.refuse("is there already, in line " + std::to_string(first->second));
+            made.fail("is a duplicate of the key in line " + std::to_string(first->second));
         }
         each(name, made);
     }
 }
 
-std::string config_node::place() const {
+std::string yaml_value::location() const {
     if (const auto known = origins_.find(key_); !key_.empty() && known != origins_.end()) {
         return known->second;
     }
@@ -129,12 +129,12 @@ std::string config_node::place() const {
 
 namespace {
 
-constexpr int deepest = 32;
-constexpr std::size_t longest = 1U << 20U;
+constexpr int max_depth = 32;
+constexpr std::size_t max_json_size = 1U << 20U;
 
 bool is_number(const std::string& text) {
-    const bool begins_so = !text.empty() && (text[0] == '-' || (text[0] >= '0' && text[0] <= '9'));
-    return begins_so && is_valid_json("[" + text + "]");
+    const bool may_be_number = !text.empty() && (text[0] == '-' || (text[0] >= '0' && text[0] <= '9'));
+    return may_be_number && is_valid_json("[" + text + "]");
 }
 
 void write_scalar(json_writer& w, const YAML::Node& value) {
@@ -149,19 +149,19 @@ void write_scalar(json_writer& w, const YAML::Node& value) {
     }
 }
 
-// The bounds end what anchors may multiply, or turn into a ring.
+// The limits stop anchors that multiply values or form a cycle.
 void write(json_writer& w, const std::string& out, const YAML::Node& value, int depth) {
-    if (depth > deepest) {
-        throw bad_value("nests deeper than " + std::to_string(deepest));
+    if (depth > max_depth) {
+        throw invalid_value("is nested deeper than " + std::to_string(max_depth) + " levels");
     }
-    if (out.size() > longest) {
-        throw bad_value("is more than " + std::to_string(longest) + " bytes of JSON");
+    if (out.size() > max_json_size) {
+        throw invalid_value("exceeds " + std::to_string(max_json_size) + " bytes of JSON");
     }
     if (value.IsMap()) {
         w.begin_object();
         for (const auto& pair : value) {
             if (!pair.first.IsScalar()) {
-                throw bad_value("holds a key that is no word");
+                throw invalid_value("contains a key that is not a scalar");
             }
             w.key(pair.first.Scalar());
             write(w, out, pair.second, depth + 1);
@@ -182,12 +182,12 @@ void write(json_writer& w, const std::string& out, const YAML::Node& value, int 
 
 } // namespace
 
-std::string json_of(const YAML::Node& value) {
+std::string yaml_to_json(const YAML::Node& value) {
     if (value.IsNull()) {
         return "{}";
     }
     if (!value.IsMap() && !value.IsSequence()) {
-        throw bad_value("has to have keys of its own, or be a list");
+        throw invalid_value("has to be a map or a list");
     }
     std::string out;
     json_writer w{out};

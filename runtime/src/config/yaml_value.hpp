@@ -14,44 +14,44 @@
 
 namespace cles::runtime {
 
-/// A value in the configuration file, which knows its key's full path and its line, so that a complaint names them.
-/// Every function throws config_error.
-class config_node {
+/// A value in the configuration file, with its full key and its line, so that messages can name them. All functions may
+/// throw config_error.
+class yaml_value {
   public:
-    using reader = std::function<void(const config_node&)>;
+    using reader = std::function<void(const yaml_value&)>;
     using readers = std::map<std::string_view, reader>;
 
-    /// \param file as complaints name it \param origins filled with the places of all values that are read
-    config_node(const YAML::Node& value, std::string key, const std::string& file,
-                std::map<std::string, std::string>& origins);
+    /// \param file its name, for messages \param origins receives the locations of all values that are read
+    yaml_value(const YAML::Node& value, std::string key, const std::string& file,
+               std::map<std::string, std::string>& origins);
 
-    [[nodiscard]] bool is_text() const { return value_.IsScalar(); }
+    [[nodiscard]] bool is_scalar() const { return value_.IsScalar(); }
     [[nodiscard]] bool is_list() const { return value_.IsSequence(); }
-    [[nodiscard]] const std::string& text() const;
-    /// The text as what it stands for; `to` throws bad_value.
+    [[nodiscard]] const std::string& scalar() const;
+    /// The scalar, converted by a function that may throw invalid_value.
     template <class F>
-    auto as(F to) const {
+    auto as(F convert) const {
         try {
-            return to(text());
-        } catch (const bad_value& wrong) {
-            refuse(wrong.what());
+            return convert(scalar());
+        } catch (const invalid_value& e) {
+            fail(e.what());
         }
     }
 
-    /// Each key's value goes to its reader; a key without one is unknown.
-    void map(const readers& known) const;
-    /// The same for a map whose keys are names.
-    void names(const std::function<void(const std::string&, const config_node&)>& each) const;
-    void list(const reader& each) const;
-    /// As JSON. The places of what it holds are kept too.
+    /// Passes the value of each key to the key's reader. Keys without a reader are errors.
+    void read_map(const readers& known) const;
+    /// The same for a map whose keys are node names.
+    void read_names(const std::function<void(const std::string&, const yaml_value&)>& each) const;
+    void read_list(const reader& each) const;
+    /// The value as JSON. Records the locations of everything it contains.
     [[nodiscard]] std::string json() const;
 
-    [[noreturn]] void refuse(const std::string& why) const;
+    [[noreturn]] void fail(const std::string& why) const;
 
   private:
-    void each_pair(const std::function<void(const std::string&, const config_node&)>& each) const;
-    [[nodiscard]] std::string place() const;
-    void keep_places(const YAML::Node& value, const std::string& key) const;
+    void for_each_pair(const std::function<void(const std::string&, const yaml_value&)>& each) const;
+    [[nodiscard]] std::string location() const;
+    void record_locations(const YAML::Node& value, const std::string& key) const;
 
     YAML::Node value_;
     std::string key_;
@@ -59,9 +59,9 @@ class config_node {
     std::map<std::string, std::string>& origins_;
 };
 
-/// A plugin's part of the configuration as JSON: a map or a list; nothing is `{}`. What is not quoted and reads as a
-/// number, true, false or null in JSON is one; all else is text.
-/// \throws bad_value where it is neither, nests deeper than 32, or makes more than 1 MiB
-std::string json_of(const YAML::Node& value);
+/// The settings of a plugin as JSON: a map or a list; null becomes `{}`. Unquoted scalars that are a number, true,
+/// false or null in JSON become that; all others become strings. \throws invalid_value if the value is neither, is
+/// nested deeper than 32 levels, or exceeds 1 MiB
+std::string yaml_to_json(const YAML::Node& value);
 
 } // namespace cles::runtime

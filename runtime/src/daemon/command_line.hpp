@@ -10,21 +10,21 @@
 
 namespace cles::runtime {
 
-/// What the command line asks for.
-struct options {
+/// The options of the command line.
+struct command_line_options {
     std::optional<std::string> config;
-    bool check = false;        ///< only looks whether the configuration can be used
-    bool print_config = false; ///< only prints it
+    bool check = false;        ///< only check whether the configuration can be used
+    bool print_config = false; ///< only print it
     overrides flags;
 };
 
-/// A command line that cannot be understood.
+/// An invalid command line.
 class usage_error : public std::runtime_error {
   public:
     using std::runtime_error::runtime_error;
 };
 
-/// The options, or what --help and --version print. \throws usage_error
-std::variant<options, std::string> parse_options(int argc, const char* const* argv);
+/// The options, or the text of --help or --version. \throws usage_error
+std::variant<command_line_options, std::string> parse_command_line(int argc, const char* const* argv);
 
 } // namespace cles::runtime

@@ -22,7 +22,7 @@ using namespace std::chrono_literals;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 
-constexpr int wrong_configuration = 2; // the exit code
+constexpr int exit_configuration_error = 2;
 constexpr std::chrono::seconds start_limit{10};
 
 service_options options_of(const config& setup, const daemon_log& log) {
@@ -36,7 +36,7 @@ service_options options_of(const config& setup, const daemon_log& log) {
     options.limits = setup.limits;
     options.log = log.sink();
     options.routing = cles::routing();
-    options.gossip = cles::gossip(setup.seeds); // without any it may be another's
+    options.gossip = cles::gossip(setup.seeds); // without any, this node may be the seed of others
     return options;
 }
 
@@ -46,15 +46,15 @@ pool_options pool_options_of(const config& setup, const daemon_log& log) {
     options.queue = setup.queue;
     options.replacements = setup.replacements;
     options.grace = std::chrono::ceil<milliseconds>(setup.stuck_after);
-    options.look_in = 250ms;
+    options.check_interval = 250ms;
     options.log = log.sink();
     return options;
 }
 
 plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
     plugin_host_options options{.node = setup.node};
-    options.folders = plugin_folders(setup);
-    options.trial = 0ms; // they were tried before there were threads
+    options.folders = plugin_search_path(setup);
+    options.trial = 0ms; // they were tried before threads were started
     options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
         log.write(level, std::string{plugin} + ": " + std::string{text});
     };
@@ -65,8 +65,8 @@ std::string counted(std::size_t count, const char* what) {
     return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
 
-// What a reload does not change, as text to compare.
-std::string lasting_part(config setup) {
+// The settings that a reload does not change, as text to compare.
+std::string fixed_part(config setup) {
     setup.seeds.clear();
     setup.log = {};
     setup.origins.clear();
@@ -75,14 +75,15 @@ std::string lasting_part(config setup) {
 
 } // namespace
 
-daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log, const notifier& tell)
-    : io_(io), setup_(std::move(setup)), sources_(std::move(sources)), log_(log), tell_(tell),
+daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log,
+               const service_manager& manager)
+    : io_(io), setup_(std::move(setup)), sources_(std::move(sources)), log_(log), service_manager_(manager),
       service_(io,
                [this] {
                    auto options = options_of(setup_, log_);
                    options.load = [this] { return has_pool_ ? pool_.load() : node_load{}; };
                    if (!setup_.allow_clash) {
-                       options.on_name_taken = [this](std::string_view where) { give_way(where); };
+                       options.on_name_taken = [this](std::string_view where) { on_name_conflict(where); };
                    }
                    options.metrics = [this](json_writer& w) { write_metrics(w); };
                    return options;
@@ -94,7 +95,7 @@ daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources
     try {
         load_plugins();
     } catch (...) {
-        service_.stop(); // while there is all that it asks for
+        service_.stop(); // while everything that it uses exists
         throw;
     }
 }
@@ -105,22 +106,22 @@ void daemon::load_plugins() {
     pooled_registrar tasks{service_, pool_};
     for (std::size_t i = 0; i < setup_.plugins.size(); ++i) {
         const auto& wanted = setup_.plugins[i];
-        if (!wanted.unusable.empty()) {
-            log_.warning(wanted.unusable + " (goes on without it)");
+        if (!wanted.trial_error.empty()) {
+            log_.warning(wanted.trial_error + " (continuing without it)");
             continue;
         }
         try {
-            const auto path = plugin_file(setup_, wanted);
-            const plugin_start_guard guard{"clesd: " + setup_.place_of("plugins[" + std::to_string(i) + "].path") +
+            const auto path = resolve_plugin_path(setup_, wanted);
+            const plugin_start_guard guard{"clesd: " + setup_.location_of("plugins[" + std::to_string(i) + "].path") +
                                                ": " + path,
-                                           wrong_configuration, start_limit};
+                                           exit_configuration_error, start_limit};
             plugins_.load(path, wanted.config, tasks);
-        } catch (const plugin_error& wrong) {
-            const auto complaint = complaint_about(setup_, i, wrong);
+        } catch (const plugin_error& e) {
+            const auto message = plugin_error_message(setup_, i, e);
             if (wanted.required) {
-                throw config_error(complaint);
+                throw config_error(message);
             }
-            log_.warning(complaint + " (goes on without it)");
+            log_.warning(message + " (continuing without it)");
             continue;
         }
         const auto& loaded = plugins_.plugins().back();
@@ -163,13 +164,13 @@ void daemon::wait_for_signal() {
 void daemon::stop(int signal) {
     const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
     if (std::exchange(signalled_, true)) {
-        log_.warning("stopping at once, on a second signal");
-        cut_short_ = true;
+        log_.warning("stopping immediately on a second signal");
+        stopped_at_once_ = true;
         finish();
         return;
     }
     if (std::exchange(stopping_, true)) {
-        log_.info(name + ": it is stopping already; a second signal ends it at once");
+        log_.info(name + ": already stopping; a second signal stops immediately");
         return;
     }
     stop_begun_ = steady_clock::now();
@@ -179,34 +180,34 @@ void daemon::stop(int signal) {
     drain();
 }
 
-void daemon::give_way(std::string_view where) {
+void daemon::on_name_conflict(std::string_view where) {
     if (std::exchange(stopping_, true)) {
         return;
     }
-    gave_way_ = true;
+    lost_name_ = true;
     stop_begun_ = steady_clock::now();
     log_.error("stopping: the node at " + std::string{where} + " had the name '" + setup_.node +
-               "' first; give this one another (--node), or let it go on all the same (--allow-clash)");
+               "' first; choose another name (--node), or allow it (--allow-clash)");
     drain();
 }
 
 void daemon::drain() {
-    if (!tell_.stopping()) {
-        log_.warning("the service manager could not be told");
+    if (!service_manager_.stopping()) {
+        log_.warning("the service manager could not be notified");
     }
-    service_.leave(); // nobody is to send jobs that would be refused
-    pool_.drain(std::chrono::ceil<milliseconds>(setup_.drain), [this](const drain_report& how) { close(how); });
+    service_.leave(); // so that other nodes send no jobs that would be refused
+    pool_.drain(std::chrono::ceil<milliseconds>(setup_.drain), [this](const drain_report& report) { close(report); });
 }
 
 milliseconds daemon::time_left() const {
     return std::chrono::floor<milliseconds>(stop_begun_ + setup_.drain - steady_clock::now());
 }
 
-void daemon::close(const drain_report& how) {
-    if (how.abandoned > 0) {
-        log_.warning(counted(how.abandoned, "job") + " did not end in time");
+void daemon::close(const drain_report& report) {
+    if (report.abandoned > 0) {
+        log_.warning(counted(report.abandoned, "job") + " did not end in time");
     }
-    // What it passes on to others, and what its plugins serve without workers, is to be answered too.
+    // Forwarded requests, and those that plugins serve without workers, have to be answered too.
     service_.async_close(std::max<milliseconds>(time_left(), 100ms), [this](boost::system::error_code) { finish(); });
 }
 
@@ -214,54 +215,54 @@ void daemon::finish() {
     if (std::exchange(finished_, true)) {
         return;
     }
-    // A plugin gets what is left of the time to let go of what it holds; and enough in any case, for it is over sooner
-    // unless a plugin blocks.
-    const auto stopped =
-        plugins_.stop(cut_short_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::least_stop, 2000ms));
+    // Plugins may use the remaining time to stop, and at least `min_stop_time`: only a plugin that blocks takes so
+    // long.
+    const auto stopped = plugins_.stop(
+        stopped_at_once_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::min_stop_time, 2000ms));
     for (const auto& name : stopped.late) {
         log_.warning("plugin " + name + " did not stop in time");
     }
     if (stopped.callbacks > 0) {
         log_.warning(counted(stopped.callbacks, "on_stop callback") + " of plugins did not return");
     }
-    leaves_something_ = !stopped.late.empty() || stopped.callbacks > 0;
+    unfinished_work_ = !stopped.late.empty() || stopped.callbacks > 0;
     service_.stop();
     close_pool();
     signals_.cancel();
     log_.info("stopped");
-    // A job that does not end is still watched, and keeps the context at work.
+    // A job that does not end is still watched, and keeps the context running.
     boost::asio::post(io_, [this] { io_.stop(); });
 }
 
-// Here, and not in the destructor, so that it is known whether anything is left. Jobs that were told to stop at the end
-// of the drain get a moment to do so.
+// Closed here, and not in the destructor, to find out whether work is unfinished. Jobs that were told to stop at the
+// end of the drain get a moment to do so.
 void daemon::close_pool() {
-    if (!cut_short_) {
-        leaves_something_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || leaves_something_;
+    if (!stopped_at_once_) {
+        unfinished_work_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || unfinished_work_;
     }
 }
 
-// -- reading again -------------------------------------------------------------------------------------------------
+// -- reload --------------------------------------------------------------------------------------------------------
 
 void daemon::reload() {
-    bool told = tell_.reloading(steady_clock::now());
+    bool notified = service_manager_.reloading(steady_clock::now());
     try {
         auto fresh = load(sources_);
         log_.set(fresh.log);
-        log_.info("read the configuration again: " + counted(fresh.seeds.size(), "seed") + ", log " +
+        log_.info("reloaded the configuration: " + counted(fresh.seeds.size(), "seed") + ", log " +
                   std::string{to_string(fresh.log.level)});
-        if (lasting_part(fresh) != lasting_part(setup_)) {
-            log_.warning("what else has changed in the configuration takes effect at the next start");
+        if (fixed_part(fresh) != fixed_part(setup_)) {
+            log_.warning("other changes of the configuration take effect at the next start");
         }
         service_.set_gossip(cles::gossip(fresh.seeds));
         setup_.seeds = fresh.seeds;
         setup_.log = fresh.log;
-    } catch (const config_error& wrong) {
-        log_.error(std::string{"all stays as it was, since the configuration cannot be used: "} + wrong.what());
+    } catch (const config_error& e) {
+        log_.error(std::string{"kept the old configuration, because the new one cannot be used: "} + e.what());
     }
-    told = tell_.ready() && told;
-    if (!told) {
-        log_.warning("the service manager could not be told");
+    notified = service_manager_.ready() && notified;
+    if (!notified) {
+        log_.warning("the service manager could not be notified");
     }
 }
 

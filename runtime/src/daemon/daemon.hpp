@@ -20,35 +20,36 @@
 
 namespace cles::runtime {
 
-/// A node that runs plugins on its workers until it is told to stop: what `clesd` is, put together.
+/// `clesd`: a node that runs plugins on its workers until it is told to stop.
 ///
-/// Used on the thread that runs the context. It ends by itself: after SIGTERM or SIGINT it admits no more jobs, lets
-/// those that run end within `config::drain`, and stops the context; a second signal cuts that short. Where another
-/// live node had its name first it does the same, unless `config::allow_clash` says otherwise.
+/// To be used on the thread that runs the context. After SIGTERM or SIGINT it admits no more jobs, lets the running
+/// ones end within `config::drain`, and stops the context; a second signal stops it at once. It also stops if another
+/// live node had its name first, unless `config::allow_clash` is set.
 class daemon {
   public:
-    /// Loads the plugins and listens. \param log, tell have to outlive it
-    /// \throws config_error naming the plugin that is required and cannot be used; cles::error as `service` does
-    daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log, const notifier& tell);
+    /// Loads the plugins and listens. \param log, manager have to outlive this
+    /// \throws config_error if a required plugin cannot be used; cles::error as `service` does
+    daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log,
+           const service_manager& manager);
     daemon(const daemon&) = delete;
     daemon& operator=(const daemon&) = delete;
     ~daemon();
 
     [[nodiscard]] std::vector<std::string> endpoints() const { return service_.endpoints(); }
-    /// Whether it has ended because another live node had its name first.
-    [[nodiscard]] bool gave_way() const noexcept { return gave_way_; }
-    /// Whether something is left that does not end, a job, an `on_stop` callback or a plugin: the process then has to
-    /// go without waiting for it, by `std::_Exit`.
-    [[nodiscard]] bool leaves_something() const noexcept { return cut_short_ || leaves_something_; }
+    /// Whether it stopped because another live node had its name first.
+    [[nodiscard]] bool lost_name() const noexcept { return lost_name_; }
+    /// Whether a job, an `on_stop` callback or a plugin has not ended: the process then has to end with `std::_Exit`,
+    /// without waiting for it.
+    [[nodiscard]] bool has_unfinished_work() const noexcept { return stopped_at_once_ || unfinished_work_; }
 
   private:
     void load_plugins();
     void write_metrics(json_writer& w) const;
     void wait_for_signal();
     void stop(int signal);
-    void give_way(std::string_view where);
+    void on_name_conflict(std::string_view where);
     void drain();
-    void close(const drain_report& how);
+    void close(const drain_report& report);
     void finish();
     void close_pool();
     [[nodiscard]] std::chrono::milliseconds time_left() const;
@@ -58,8 +59,8 @@ class daemon {
     config setup_;
     const config_sources sources_;
     daemon_log& log_;
-    const notifier& tell_;
-    bool has_pool_ = false; // the service asks for its load
+    const service_manager& service_manager_;
+    bool has_pool_ = false; // whether the service may read its load
     service service_;
     job_pool pool_;
     plugin_host plugins_;
@@ -67,10 +68,10 @@ class daemon {
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;
     bool signalled_ = false;
-    bool cut_short_ = false; // by a second signal: it is not known what is left
+    bool stopped_at_once_ = false; // by a second signal: unfinished work is unknown
     bool finished_ = false;
-    bool leaves_something_ = false;
-    bool gave_way_ = false;
+    bool unfinished_work_ = false;
+    bool lost_name_ = false;
 };
 
 } // namespace cles::runtime

@@ -36,7 +36,7 @@ void append_printable(std::string& out, std::string_view text) {
 
 } // namespace
 
-std::string text_of(std::string_view node, const log_entry& entry) {
+std::string format_text(std::string_view node, const log_entry& entry) {
     std::string out;
     append_printable(out, node);
     if (!entry.peer.empty()) {
@@ -49,7 +49,7 @@ std::string text_of(std::string_view node, const log_entry& entry) {
     return out;
 }
 
-std::string json_of(std::string_view node, const log_entry& entry) {
+std::string format_json(std::string_view node, const log_entry& entry) {
     std::string out;
     json_writer w{out};
     w.begin_object();
@@ -74,7 +74,7 @@ namespace {
 constexpr auto text_pattern = "%Y-%m-%dT%H:%M:%S.%e%z %^%-7l%$ %v";
 constexpr auto json_pattern = R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%v})";
 
-spdlog::level::level_enum rank_of(log_level level) {
+spdlog::level::level_enum spdlog_level(log_level level) {
     switch (level) {
     case log_level::debug: return spdlog::level::debug;
     case log_level::info: return spdlog::level::info;
@@ -84,7 +84,7 @@ spdlog::level::level_enum rank_of(log_level level) {
     return spdlog::level::err;
 }
 
-spdlog::color_mode colours() {
+spdlog::color_mode stderr_color_mode() {
     const char* none = std::getenv("NO_COLOR");
     const bool wanted = (none == nullptr || *none == '\0') && ::isatty(STDERR_FILENO) == 1;
     return wanted ? spdlog::color_mode::automatic : spdlog::color_mode::never;
@@ -93,8 +93,9 @@ spdlog::color_mode colours() {
 } // namespace
 
 daemon_log::daemon_log(std::string node, log_config how)
-    : node_(std::move(node)), logger_(std::make_shared<spdlog::logger>(
-                                  "clesd", std::make_shared<spdlog::sinks::ansicolor_stderr_sink_st>(colours()))),
+    : node_(std::move(node)),
+      logger_(std::make_shared<spdlog::logger>(
+          "clesd", std::make_shared<spdlog::sinks::ansicolor_stderr_sink_st>(stderr_color_mode()))),
       format_(how.format) {
     logger_->flush_on(spdlog::level::debug);
     set(how);
@@ -103,16 +104,16 @@ daemon_log::daemon_log(std::string node, log_config how)
 void daemon_log::set(log_config how) {
     const std::scoped_lock lock{mutex_};
     logger_->set_pattern(how.format == log_format::json ? json_pattern : text_pattern);
-    logger_->set_level(rank_of(how.level));
+    logger_->set_level(spdlog_level(how.level));
     format_ = how.format;
 }
 
 void daemon_log::write(log_level level, const log_entry& entry) const {
-    const auto rank = rank_of(level);
-    if (logger_->should_log(rank)) {
+    const auto native = spdlog_level(level);
+    if (logger_->should_log(native)) {
         const std::scoped_lock lock{mutex_};
-        const auto line = format_ == log_format::json ? json_of(node_, entry) : text_of(node_, entry);
-        logger_->log(rank, spdlog::string_view_t{line});
+        const auto line = format_ == log_format::json ? format_json(node_, entry) : format_text(node_, entry);
+        logger_->log(native, spdlog::string_view_t{line});
     }
 }
 

@@ -10,26 +10,22 @@
 #include <string>
 #include <string_view>
 
-namespace cles::runtime {
-
-/// What a person reads, on one line: "sat1 tcp://127.0.0.1:4242 id=7: denied". Control characters become escapes, so
-/// that a peer's text cannot drive a terminal, nor begin a line of its own.
-std::string text_of(std::string_view node, const log_entry& entry);
-
-/// The same as members of a JSON object, without its brackets: `"node":"sat1","peer":"tcp://…","id":7,"message":"…"`.
-/// Those that there are none of are left out.
-std::string json_of(std::string_view node, const log_entry& entry);
-
-} // namespace cles::runtime
-
 namespace spdlog {
 class logger;
 } // namespace spdlog
 
 namespace cles::runtime {
 
-/// The daemon's log, on stderr: text, in colour on a terminal that wants it (NO_COLOR unset), or JSON, an object a
-/// line. May be used from any thread.
+/// A log entry for people, on one line: "sat1 tcp://127.0.0.1:4242 id=7: denied". Control characters are escaped, so
+/// that a peer's text can neither control a terminal nor start a new line.
+std::string format_text(std::string_view node, const log_entry& entry);
+
+/// The same as the members of a JSON object, without braces: `"node":"sat1","peer":"tcp://…","id":7,"message":"…"`.
+/// Missing ones are omitted.
+std::string format_json(std::string_view node, const log_entry& entry);
+
+/// The daemon's log, on stderr: text, in colour on a terminal (unless NO_COLOR is set), or JSON, one object per line.
+/// May be used from any thread.
 class daemon_log {
   public:
     daemon_log(std::string node, log_config how);
@@ -48,7 +44,7 @@ class daemon_log {
   private:
     const std::string node_;
     const std::shared_ptr<spdlog::logger> logger_;
-    mutable std::mutex mutex_; // a line is made and written in one format
+    mutable std::mutex mutex_; // so that a line is formatted and written in one format
     log_format format_;
 };
 

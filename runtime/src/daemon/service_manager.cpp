@@ -10,20 +10,20 @@
 
 namespace cles::runtime {
 
-bool notifier::tell(std::string_view state) const {
+bool service_manager::notify(std::string_view state) const {
     if (socket_.empty()) {
         return true;
     }
-    sockaddr_un where{};
-    where.sun_family = AF_UNIX;
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
     const bool is_abstract = socket_.front() == '@';
-    // A path needs its final zero; an abstract name has none.
-    if ((!is_abstract && socket_.front() != '/') || socket_.size() > sizeof(where.sun_path) - (is_abstract ? 0 : 1)) {
+    // A path ends with a null character; an abstract name does not.
+    if ((!is_abstract && socket_.front() != '/') || socket_.size() > sizeof(address.sun_path) - (is_abstract ? 0 : 1)) {
         return false;
     }
-    std::ranges::copy(socket_, std::begin(where.sun_path));
+    std::ranges::copy(socket_, std::begin(address.sun_path));
     if (is_abstract) {
-        where.sun_path[0] = '\0';
+        address.sun_path[0] = '\0';
     }
     const auto length =
         static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + socket_.size() + (is_abstract ? 0 : 1));
@@ -33,14 +33,14 @@ bool notifier::tell(std::string_view state) const {
         return false;
     }
     const auto sent = ::sendto(descriptor, state.data(), state.size(), MSG_NOSIGNAL,
-                               reinterpret_cast<const sockaddr*>(&where), length);
+                               reinterpret_cast<const sockaddr*>(&address), length);
     ::close(descriptor);
     return sent == static_cast<ssize_t>(state.size());
 }
 
-bool notifier::reloading(std::chrono::steady_clock::time_point now) const {
+bool service_manager::reloading(std::chrono::steady_clock::time_point now) const {
     const auto since = std::chrono::duration_cast<std::chrono::microseconds>(now.time_since_epoch());
-    return tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(since.count()));
+    return notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(since.count()));
 }
 
 } // namespace cles::runtime

@@ -8,20 +8,20 @@
 
 namespace cles::runtime {
 
-/// Tells the service manager how the daemon is, as sd_notify(3) does: one datagram to the Unix socket that
-/// NOTIFY_SOCKET names, an abstract one where the name begins with '@'.
-class notifier {
+/// Notifies the service manager of the daemon's state, as sd_notify(3) does: with one datagram to the Unix socket that
+/// NOTIFY_SOCKET names, an abstract one if the name begins with '@'.
+class service_manager {
   public:
-    /// \param socket what NOTIFY_SOCKET says; empty: nobody is told
-    explicit notifier(std::string socket) : socket_(std::move(socket)) {}
+    /// \param socket the value of NOTIFY_SOCKET; empty: there is no service manager
+    explicit service_manager(std::string socket) : socket_(std::move(socket)) {}
 
-    /// Lines of KEY=VALUE, such as "READY=1". False where it could not be told; nobody to tell is no failure.
-    [[nodiscard]] bool tell(std::string_view state) const;
+    /// Sends lines of KEY=VALUE, such as "READY=1". False if that fails; without a service manager it does not.
+    [[nodiscard]] bool notify(std::string_view state) const;
 
-    [[nodiscard]] bool ready() const { return tell("READY=1"); }
-    /// \param now by the monotonic clock, which tells systemd this reload from earlier ones
+    [[nodiscard]] bool ready() const { return notify("READY=1"); }
+    /// \param now of the monotonic clock, by which systemd distinguishes reloads
     [[nodiscard]] bool reloading(std::chrono::steady_clock::time_point now) const;
-    [[nodiscard]] bool stopping() const { return tell("STOPPING=1"); }
+    [[nodiscard]] bool stopping() const { return notify("STOPPING=1"); }
 
   private:
     std::string socket_;

@@ -5,22 +5,22 @@
 
 namespace cles::runtime {
 
-/// A mutex that is held for some tens of nanoseconds: who finds it taken looks again a few times before going to sleep,
-/// which would take a hundred times longer than what it waits for.
-class brief_mutex {
+/// A mutex for critical sections of some tens of nanoseconds: it spins briefly before it sleeps, because sleeping would
+/// take a hundred times longer than the wait.
+class adaptive_mutex {
   public:
-    brief_mutex() noexcept {
-        pthread_mutexattr_t how;
-        ::pthread_mutexattr_init(&how);
+    adaptive_mutex() noexcept {
+        pthread_mutexattr_t attributes;
+        ::pthread_mutexattr_init(&attributes);
 #ifdef PTHREAD_ADAPTIVE_MUTEX_INITIALIZER_NP
-        ::pthread_mutexattr_settype(&how, PTHREAD_MUTEX_ADAPTIVE_NP);
+        ::pthread_mutexattr_settype(&attributes, PTHREAD_MUTEX_ADAPTIVE_NP);
 #endif
-        ::pthread_mutex_init(&mutex_, &how);
-        ::pthread_mutexattr_destroy(&how);
+        ::pthread_mutex_init(&mutex_, &attributes);
+        ::pthread_mutexattr_destroy(&attributes);
     }
-    brief_mutex(const brief_mutex&) = delete;
-    brief_mutex& operator=(const brief_mutex&) = delete;
-    ~brief_mutex() { ::pthread_mutex_destroy(&mutex_); }
+    adaptive_mutex(const adaptive_mutex&) = delete;
+    adaptive_mutex& operator=(const adaptive_mutex&) = delete;
+    ~adaptive_mutex() { ::pthread_mutex_destroy(&mutex_); }
 
     void lock() noexcept { ::pthread_mutex_lock(&mutex_); }
     void unlock() noexcept { ::pthread_mutex_unlock(&mutex_); }

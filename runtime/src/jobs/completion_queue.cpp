@@ -7,15 +7,15 @@
 
 namespace cles::runtime {
 
-bool result_box::put(item what, bool in_time) {
+bool completion_queue::push(entry what, bool deferred) {
     bool first = false;
     {
         const std::lock_guard lock{mutex_};
         if (closed_) {
             return false;
         }
-        items_.push_back(what);
-        first = !in_time && wakes();
+        entries_.push_back(what);
+        first = !deferred && needs_wake();
     }
     if (first) {
         wake();
@@ -23,26 +23,26 @@ bool result_box::put(item what, bool in_time) {
     return true;
 }
 
-void result_box::flush() {
+void completion_queue::flush() {
     bool first = false;
     {
         const std::lock_guard lock{mutex_};
-        first = !closed_ && !items_.empty() && wakes();
+        first = !closed_ && !entries_.empty() && needs_wake();
     }
     if (first) {
         wake();
     }
 }
 
-bool result_box::put(errand what) {
+bool completion_queue::post(function what) {
     bool first = false;
     {
         const std::lock_guard lock{mutex_};
-        if (closed_ || errands_.size() >= most_errands) {
+        if (closed_ || functions_.size() >= max_functions) {
             return false;
         }
-        errands_.push_back(std::move(what));
-        first = wakes();
+        functions_.push_back(std::move(what));
+        first = needs_wake();
     }
     if (first) {
         wake();
@@ -50,35 +50,35 @@ bool result_box::put(errand what) {
     return true;
 }
 
-bool result_box::wakes() noexcept {
+bool completion_queue::needs_wake() noexcept {
     if (std::exchange(woken_, true)) {
         return false;
     }
-    waking_.fetch_add(1, std::memory_order_relaxed);
+    wakers_.fetch_add(1, std::memory_order_relaxed);
     return true;
 }
 
-// Without the lock, for it takes long; `close` waits until nobody is here any more.
-void result_box::wake() {
+// Runs without the lock, because it takes long; `close` waits until no thread is in it.
+void completion_queue::wake() {
     wake_();
-    waking_.fetch_sub(1, std::memory_order_release);
+    wakers_.fetch_sub(1, std::memory_order_release);
 }
 
-void result_box::take(std::vector<item>& items, std::vector<errand>& errands) {
+void completion_queue::take(std::vector<entry>& entries, std::vector<function>& functions) {
     const std::lock_guard lock{mutex_};
-    items.swap(items_);
-    errands.swap(errands_);
+    entries.swap(entries_);
+    functions.swap(functions_);
     woken_ = false;
 }
 
-void result_box::close(std::vector<item>& items, std::vector<errand>& errands) {
+void completion_queue::close(std::vector<entry>& entries, std::vector<function>& functions) {
     {
         const std::lock_guard lock{mutex_};
         closed_ = true;
-        items.swap(items_);
-        errands.swap(errands_);
+        entries.swap(entries_);
+        functions.swap(functions_);
     }
-    while (waking_.load(std::memory_order_acquire) != 0) {
+    while (wakers_.load(std::memory_order_acquire) != 0) {
         std::this_thread::yield();
     }
 }

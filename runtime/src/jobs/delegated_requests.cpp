@@ -8,42 +8,43 @@
 
 namespace cles::runtime {
 
-void onward_requests::send(const job_context& asks, const responder* by, const std::string& command,
-                           const call_options& options, const answer_callback& answered) {
+void delegated_requests::send(const job_context& job, const responder* by, const std::string& command,
+                              const call_options& options, const answer_callback& callback) {
     const auto ticket = ++last_ticket_;
-    open_.emplace(ticket, question{asks, answered});
+    open_.emplace(ticket, open_request{job, callback});
     if (by == nullptr) {
-        answer(ticket, errc::cancelled, "{}", "nobody waits for the job that asks");
+        complete(ticket, errc::cancelled, "{}", "the requester of the job does not wait any more");
         return;
     }
-    auto chosen = options;
+    auto forwarded = options;
     if (options.on_progress_) {
-        chosen.on_progress([this, asks, told = options.on_progress_](double fraction, std::string_view json) {
-            workers_.resume(*asks.record_, [told, fraction, json = std::string{json}] { told(fraction, json); });
+        forwarded.on_progress([this, job, on_progress = options.on_progress_](double fraction, std::string_view json) {
+            workers_.schedule(*job.record_,
+                              [on_progress, fraction, json = std::string{json}] { on_progress(fraction, json); });
         });
     }
-    // The job that asks keeps this alive, also where the answer comes after the end.
-    by->delegate(command, chosen,
-                 [this, asks, ticket](boost::system::error_code code, std::string_view json, std::string_view message) {
-                     answer(ticket, code, json, message);
+    // The job keeps this alive, even if the answer comes after `close`.
+    by->delegate(command, forwarded,
+                 [this, job, ticket](boost::system::error_code code, std::string_view json, std::string_view message) {
+                     complete(ticket, code, json, message);
                  });
 }
 
-void onward_requests::answer(std::uint64_t ticket, boost::system::error_code code, std::string_view json,
-                             std::string_view message) {
+void delegated_requests::complete(std::uint64_t ticket, boost::system::error_code code, std::string_view json,
+                                  std::string_view message) {
     const auto found = open_.find(ticket);
     if (found == open_.end()) {
         return;
     }
-    const auto q = std::move(found->second);
+    const auto done = std::move(found->second);
     open_.erase(found);
-    workers_.resume(*q.asks.record_, [answered = q.answered, code, json = std::string{json},
-                                      message = std::string{message}] { answered(code, json, message); });
+    workers_.schedule(*done.job.record_, [callback = done.callback, code, json = std::string{json},
+                                          message = std::string{message}] { callback(code, json, message); });
 }
 
-void onward_requests::close() {
+void delegated_requests::close() {
     while (!open_.empty()) {
-        answer(open_.begin()->first, errc::unavailable, "{}", "the node is stopping");
+        complete(open_.begin()->first, errc::unavailable, "{}", "the node is stopping");
     }
 }
 

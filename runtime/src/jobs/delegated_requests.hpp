@@ -16,30 +16,31 @@ namespace cles::runtime {
 
 class worker_pool;
 
-/// What jobs ask others: sent from the service's executor, and answered on a worker, as a part of the job that asks.
-/// Each is answered once, by `close` at the latest.
-class onward_requests {
+/// The requests that jobs send to other nodes. They are sent from the service's executor; their callbacks run on a
+/// worker, as continuations of the job. Each callback is called once, by `close` at the latest.
+class delegated_requests {
   public:
-    explicit onward_requests(worker_pool& workers) noexcept : workers_(workers) {}
-    onward_requests(const onward_requests&) = delete;
-    onward_requests& operator=(const onward_requests&) = delete;
-    ~onward_requests() = default;
+    explicit delegated_requests(worker_pool& workers) noexcept : workers_(workers) {}
+    delegated_requests(const delegated_requests&) = delete;
+    delegated_requests& operator=(const delegated_requests&) = delete;
+    ~delegated_requests() = default;
 
-    /// \param by the responder of the job that asks; null where nobody waits for it any more
-    void send(const job_context& asks, const responder* by, const std::string& command, const call_options& options,
-              const answer_callback& answered);
-    /// Answers all that are open with `unavailable`.
+    /// \param by the responder of the job; null if its requester waits no more
+    void send(const job_context& job, const responder* by, const std::string& command, const call_options& options,
+              const answer_callback& callback);
+    /// Completes all open requests with `unavailable`.
     void close();
 
   private:
-    struct question {
-        job_context asks;
-        answer_callback answered;
+    struct open_request {
+        job_context job;
+        answer_callback callback;
     };
-    void answer(std::uint64_t ticket, boost::system::error_code code, std::string_view json, std::string_view message);
+    void complete(std::uint64_t ticket, boost::system::error_code code, std::string_view json,
+                  std::string_view message);
 
     worker_pool& workers_;
-    boost::unordered_flat_map<std::uint64_t, question> open_;
+    boost::unordered_flat_map<std::uint64_t, open_request> open_;
     std::uint64_t last_ticket_ = 0;
 };
 

@@ -9,7 +9,7 @@
 namespace cles::runtime {
 namespace {
 
-/// A job as what a responder speaks to.
+/// Connects a responder to a job.
 class job_control final : public detail::call_control {
   public:
     explicit job_control(job_context job) noexcept : job_(std::move(job)) {}
@@ -71,9 +71,9 @@ void job_context::log(log_level level, std::string_view text) const { record_->l
 
 responder job_context::as_responder() const { return responder{std::make_shared<job_control>(*this)}; }
 
-std::string& job_context::room_for_result() const { return record_->result_text(); }
+std::string& job_context::result_buffer() const { return record_->result_buffer(); }
 
-void job_context::written() const { record_->set_written(); }
+void job_context::set_result_written() const { record_->set_result_written(); }
 
 boost::asio::any_io_executor job_context::executor() const { return record_->executor(); }
 

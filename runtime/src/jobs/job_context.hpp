@@ -21,15 +21,15 @@
 namespace cles::runtime {
 
 class job_record;
-class onward_requests;
-class pool_state;
+class delegated_requests;
+class job_dispatcher;
 
-/// What a job sees of the world: what was asked, and how to answer.
+/// What a job works with: the request, and the means to answer it.
 ///
-/// A job answers once, on its worker or later, from any thread, also after the pool has ended; a second answer is
-/// counted and ignored, and one that comes after the requester withdrew is ignored. A copy keeps the job open. When the
-/// last one goes and nothing that the job started is still to call back, a job without an answer is answered `failed`.
-/// All functions may be called from any thread.
+/// A job answers once, on its worker or later, from any thread, even after the pool has ended. A second answer is
+/// counted and ignored; one that comes after the requester withdrew is ignored. Each copy of the context keeps the job
+/// open. When the last copy is destroyed, and no callback of the job is outstanding, a job without an answer is
+/// answered `failed`. All functions may be called from any thread.
 class job_context {
   public:
     /// Takes over one reference to the record.
@@ -45,61 +45,73 @@ class job_context {
     /// Valid as long as this context or a copy of it.
     [[nodiscard]] const cles::request& request() const noexcept;
     [[nodiscard]] time_point deadline() const noexcept { return request().deadline(); }
-    /// Whether nobody waits for the answer any more: withdrawn, the link lost, the time over, the pool at its end.
+    /// Whether the answer is no longer needed: the request was withdrawn, the link was lost, the time is over, or the
+    /// pool ends.
     [[nodiscard]] bool stopped() const noexcept;
 
-    /// Answers with JSON text; nothing becomes {}, a scalar {"value":x}. What is not JSON becomes `failed`.
+    /// Answers with JSON text. Nothing becomes {}, a scalar {"value":x}; invalid JSON becomes `failed`.
     void done(std::string_view json = {}) const;
     void fail(errc code, std::string_view message) const;
-    /// Answers `busy`: the work was not begun. The requester is told when it is worth asking again.
+    /// Answers `busy`: the work was not begun. The reply says when to retry.
     void refuse(std::string_view message, std::chrono::milliseconds retry) const;
-    /// A `cles::error` with its code, anything else `failed`.
+    /// Answers with the code of a `cles::error`; with `failed` for any other exception.
     void fail(const std::exception_ptr& thrown) const;
-    /// Tells how far it is, from 0 to 1, with a JSON object. False where nobody listens.
+    /// Reports progress, from 0 to 1, with a JSON object. False if the requester does not want it.
     bool progress(double fraction, std::string_view json = "{}") const;
 
-    /// Called once when the job is stopped, on a thread that serves these calls alone; at once, in this thread, where
-    /// it has been. It should be quick: others wait for it. The last one counts.
+    /// Calls back once when the job is stopped, on a thread that only makes these calls; or at once, in this thread, if
+    /// it has been stopped. The callback should be quick, because others wait for it. A later callback replaces an
+    /// earlier one.
     void on_stop(std::function<void()> callback) const;
 
-    /// Asks another node, as `responder::delegate` does, and holds no worker while it waits: the callback runs on a
-    /// worker as a part of this job. Callbacks of one job run neither at the same time as each other nor as the job's
-    /// beginning. The request has no longer than this job, and is withdrawn when it is stopped. Where the pool ends
-    /// first, the callback is told `unavailable`; it is only then dropped uncalled where no worker is free for it in
-    /// time, since those that are left are in jobs that do not end. (Where too much is asked at once, it is called with
-    /// `busy` before this returns.)
+    /// Sends a request to another node, as `responder::delegate` does. No worker is held while it waits: the callback
+    /// runs on a worker as a continuation of this job. The start and the continuations of one job never run at the same
+    /// time. The request ends with this job's deadline at the latest, and is withdrawn when the job is stopped. If the
+    /// pool ends first, the callback gets `unavailable`; it is dropped without a call only if no worker becomes free
+    /// for it in time, because all that are left are in jobs that do not end. (If too many requests are made at once,
+    /// it is called with `busy` before this function returns.)
     void delegate(std::string_view command, const call_options& options, answer_callback answered) const;
 
-    /// For the log of the node. Where it comes too fast, some is dropped and counted.
+    /// Writes to the log of the node. Entries that come too fast are dropped and counted.
     void log(log_level level, std::string_view text) const;
 
-    /// The service's: what is posted there is not on a worker.
+    /// The service's executor: what is posted there does not run on a worker.
     [[nodiscard]] boost::asio::any_io_executor executor() const;
-    /// The same as a responder, which, unlike a service's own, may be used from any thread.
+    /// The same job as a responder. Unlike a service's own, it may be used from any thread.
     [[nodiscard]] responder as_responder() const;
 
-    /// The quickest way to answer, for work that does so last: what `write(json_writer&)` writes. What it throws passes
-    /// through. The worker has to be the only one who holds the job.
+    /// The fastest way to answer, for work that answers as its last action: the result is what `write(json_writer&)`
+    /// writes. Exceptions pass through. The worker has to be the only holder of the job.
     template <class F>
     void answer_last(F&& write) const {
-        json_writer writer{room_for_result()};
+        json_writer writer{result_buffer()};
         std::forward<F>(write)(writer);
-        written();
+        set_result_written();
     }
 
   private:
     friend job_record;
-    friend onward_requests;
-    friend pool_state;
+    friend delegated_requests;
+    friend job_dispatcher;
 
-    [[nodiscard]] std::string& room_for_result() const;
-    void written() const;
+    [[nodiscard]] std::string& result_buffer() const;
+    void set_result_written() const;
 
     job_record* record_;
 };
 
-/// What the jobs of one task do. It runs on a worker, on several at once for several jobs, and answers through the
-/// context, then or later. What it throws becomes the answer.
+/// What the jobs of one task do. It runs on workers, for several jobs at once, and answers through the context, then or
+/// later. An exception from it becomes the answer.
 using job_work = std::function<void(const job_context&)>;
 
+/// JSON text that is known to be valid and free of white space, as a result: it is written unchanged.
+struct compact_json {
+    std::string_view text;
+};
+
 } // namespace cles::runtime
+
+template <>
+struct cles::converter<cles::runtime::compact_json> {
+    static void write(json_writer& w, const runtime::compact_json& value) { w.raw(value.text); }
+};

@@ -13,24 +13,24 @@
 
 namespace cles::runtime {
 
-void draining::begin(std::chrono::milliseconds limit, std::function<void()> at_limit,
-                     std::function<void(const drain_report&)> done) {
+void drain_operation::begin(std::chrono::milliseconds limit, std::function<void()> on_limit,
+                            std::function<void(const drain_report&)> done) {
     done_ = std::move(done);
     limit_->expires_after(limit);
-    limit_->async_wait([at_limit = std::move(at_limit)](boost::system::error_code code) {
+    limit_->async_wait([on_limit = std::move(on_limit)](boost::system::error_code code) {
         if (!code) {
-            at_limit();
+            on_limit();
         }
     });
 }
 
-void draining::end(const drain_report& how) {
+void drain_operation::complete(const drain_report& report) {
     limit_->cancel();
     const auto done = std::exchange(done_, nullptr);
-    done(how);
+    done(report);
 }
 
-void draining::forget() {
+void drain_operation::cancel() {
     done_ = nullptr;
     limit_.reset();
 }
@@ -41,13 +41,13 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// Jobs of one burst past which further workers are woken at once, instead of when the burst has been read.
-constexpr std::size_t most_unwoken = 32;
+// After so many jobs of one burst further workers are woken at once, and not when the burst has been read.
+constexpr std::size_t max_unwoken_jobs = 32;
 
-// When all is read that came during a pause: so many rounds of the executor have brought no job and no withdrawal, or
-// this has taken so long.
-constexpr unsigned most_quiet_rounds = 16;
-constexpr std::chrono::milliseconds longest_reading{250};
+// The input that arrived during a pause counts as read when so many rounds of the executor have brought no job and no
+// withdrawal, or after this time.
+constexpr unsigned max_quiet_rounds = 16;
+constexpr std::chrono::milliseconds max_recovery{250};
 
 std::string seconds(std::chrono::nanoseconds span) {
     const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(span).count() / 100;
@@ -56,41 +56,41 @@ std::string seconds(std::chrono::nanoseconds span) {
 
 } // namespace
 
-pool_state::pool_state(asio::any_io_executor executor, pool_options options)
-    : executor_(std::move(executor)), options_(std::move(options)), box_([this] {
-          // The thread that wakes holds a job, and so this.
+job_dispatcher::job_dispatcher(asio::any_io_executor executor, pool_options options)
+    : executor_(std::move(executor)), options_(std::move(options)), completions_([this] {
+          // The thread that wakes the executor holds a job, and so this object.
           asio::post(executor_, [weak = weak_from_this()] {
               if (const auto self = weak.lock()) {
-                  self->collect();
+                  self->process_completions();
               }
           });
       }),
-      workers_(options_, box_), onward_(workers_), tick_(std::in_place, executor_), drain_(executor_),
-      patience_(options_.patience) {}
+      workers_(options_, completions_), delegated_(workers_), timer_(std::in_place, executor_), drain_(executor_),
+      close_timeout_(options_.close_timeout) {}
 
-pool_state::~pool_state() = default;
+job_dispatcher::~job_dispatcher() = default;
 
-asio::any_io_executor pool_state::executor() const {
+asio::any_io_executor job_dispatcher::executor() const {
     const std::lock_guard lock{executor_mutex_};
     return executor_;
 }
 
-void pool_state::start() {
+void job_dispatcher::start() {
     workers_.start(std::shared_ptr<worker_pool>{shared_from_this(), &workers_}, [this] {
-        // Where this fails, the next tick does it.
-        static_cast<void>(box_.put([this] { look_for_pause(); }));
+        // If this fails, the next timer does it.
+        static_cast<void>(completions_.post([this] { check_for_pause(); }));
     });
-    if (options_.look_in.count() > 0) {
-        // From when the executor runs, which may take a while.
+    if (options_.check_interval.count() > 0) {
+        // Once the executor runs, which may be later.
         asio::post(executor_, [weak = weak_from_this()] {
             if (const auto self = weak.lock()) {
-                self->arm_tick();
+                self->arm_timer();
             }
         });
     }
 }
 
-void pool_state::say(log_level level, const log_entry& what) const {
+void job_dispatcher::write_log(log_level level, const log_entry& what) const {
     if (options_.log) {
         options_.log(level, what);
     }
@@ -98,45 +98,45 @@ void pool_state::say(log_level level, const log_entry& what) const {
 
 // -- records -------------------------------------------------------------------------------------------------------
 
-job_record& pool_state::take_record() {
-    auto& r = records_.take(shared_from_this());
+job_record& job_dispatcher::acquire_record() {
+    auto& r = records_.acquire(shared_from_this());
     if (records_.size() == 1) {
-        busy_ = asio::prefer(executor_, asio::execution::outstanding_work.tracked);
-        arm_tick();
+        work_guard_ = asio::prefer(executor_, asio::execution::outstanding_work.tracked);
+        arm_timer();
     }
     return r;
 }
 
-void pool_state::recycle(job_record& r) {
+void job_dispatcher::recycle(job_record& r) {
     records_.recycle(r);
     if (records_.size() == 0) {
-        busy_ = {};
+        work_guard_ = {};
     }
 }
 
-void pool_state::give_back(job_record& r) noexcept {
-    if (!box_.put({&r, result_box::news::gone}, !draining_.load(std::memory_order_relaxed))) {
+void job_dispatcher::return_record(job_record& r) noexcept {
+    if (!completions_.push({&r, completion_queue::event::released}, !draining_.load(std::memory_order_relaxed))) {
         const std::unique_ptr<job_record> owned{&r};
-        const auto keep = std::move(r.pool_);
+        const auto keep = std::move(r.dispatcher_);
     }
 }
 
 // -- admission -----------------------------------------------------------------------------------------------------
 
-void pool_state::submit(job what) {
+void job_dispatcher::submit(job what) {
     if (closed_) {
-        what.answer.fail(errc::unavailable, "its workers have gone");
+        what.answer.fail(errc::unavailable, "its workers have stopped");
         return;
     }
     if (draining_) {
         refuse(what.answer, worker_pool::admission::no_workers);
         return;
     }
-    notice_pause();
+    detect_pause();
     ++changes_;
-    auto& r = take_record();
+    auto& r = acquire_record();
     r.requester = reinterpret_cast<std::uintptr_t>(&what.what.peer());
-    r.request_.keep(what.what, peers_.copy_of(what.what.peer()));
+    r.request_.assign(what.what, identities_.copy_of(what.what.peer()));
     r.work_ = std::move(what.work);
     const auto admission = workers_.push(r);
     if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
@@ -146,31 +146,31 @@ void pool_state::submit(job what) {
         return;
     }
     ++figures_.admitted;
-    // The worker may have it by now, and does not look at what is set here.
-    answers_.add(r, std::move(what.answer));
-    r.answer_->on_stop([this, &r] { stop(r); });
-    if (admission == worker_pool::admission::wants_workers) {
+    // A worker may already run it; workers do not use what is set here.
+    replies_.add(r, std::move(what.answer));
+    r.requester_->on_stop([this, &r] { stop(r); });
+    if (admission == worker_pool::admission::needs_wake) {
         wake_workers();
     }
 }
 
-// A job alone is begun at once. With others, more may come with the same read, and workers are woken for all.
-void pool_state::wake_workers() {
-    if (answers_.size() == 1 || ++unwoken_ >= most_unwoken) {
-        unwoken_ = 0;
+// A single job starts at once. Otherwise more may come with the same read, and workers are woken for all together.
+void job_dispatcher::wake_workers() {
+    if (replies_.size() == 1 || ++unwoken_jobs_ >= max_unwoken_jobs) {
+        unwoken_jobs_ = 0;
         workers_.wake();
-    } else if (!std::exchange(wake_asked_, true)) {
+    } else if (!std::exchange(wake_posted_, true)) {
         asio::post(executor_, [self = shared_from_this()] {
-            self->wake_asked_ = false;
-            self->unwoken_ = 0;
+            self->wake_posted_ = false;
+            self->unwoken_jobs_ = 0;
             self->workers_.wake();
         });
     }
 }
 
-void pool_state::refuse(responder& answer, worker_pool::admission why) {
+void job_dispatcher::refuse(responder& answer, worker_pool::admission why) {
     ++figures_.refused;
-    const auto retry = retry_delay(workers_.queued(), workers_.usable(), workers_.count().service_time);
+    const auto retry = retry_delay(workers_.queued(), workers_.usable(), workers_.read_figures().service_time);
     if (draining_) {
         answer.refuse("it is shutting down", 1s);
     } else if (why == worker_pool::admission::no_workers) {
@@ -182,34 +182,34 @@ void pool_state::refuse(responder& answer, worker_pool::admission why) {
 
 // -- results -------------------------------------------------------------------------------------------------------
 
-void pool_state::collect() {
-    auto items = std::move(items_);
-    auto errands = std::move(errands_);
-    items.clear();
-    errands.clear();
-    box_.take(items, errands);
-    for (const auto& [record, what] : items) {
-        if (what == result_box::news::gone) {
+void job_dispatcher::process_completions() {
+    auto entries = std::move(entries_);
+    auto functions = std::move(functions_);
+    entries.clear();
+    functions.clear();
+    completions_.take(entries, functions);
+    for (const auto& [record, what] : entries) {
+        if (what == completion_queue::event::released) {
             recycle(*record);
             continue;
         }
-        answers_.tell_progress(*record);
-        if (what == result_box::news::ended) {
-            figures_.answered += answers_.give(*record) ? 1 : 0;
+        replies_.send_progress(*record);
+        if (what == completion_queue::event::answered) {
+            figures_.answered += replies_.send(*record) ? 1 : 0;
         }
-        let_go(*record);
+        release_record(*record);
     }
-    for (const auto& errand : errands) {
-        errand();
+    for (const auto& function : functions) {
+        function();
     }
-    items_ = std::move(items);
-    errands_ = std::move(errands);
-    errands_.clear();
-    follow_drain(false);
+    entries_ = std::move(entries);
+    functions_ = std::move(functions);
+    functions_.clear();
+    update_drain(false);
 }
 
-void pool_state::let_go(job_record& r) {
-    // Who comes here has seen to its answer.
+void job_dispatcher::release_record(job_record& r) {
+    // The caller has dealt with its answer.
     if (r.references_.fetch_sub(1, std::memory_order_acq_rel) == 1) {
         r.answered_.load() ? recycle(r) : (r.add_reference(), r.release());
     }
@@ -217,7 +217,7 @@ void pool_state::let_go(job_record& r) {
 
 // -- stopping ------------------------------------------------------------------------------------------------------
 
-void pool_state::stop(job_record& r) {
+void job_dispatcher::stop(job_record& r) {
     ++changes_;
     std::function<void()> callback;
     {
@@ -225,15 +225,15 @@ void pool_state::stop(job_record& r) {
         r.stopped_.store(true, std::memory_order_release);
         callback.swap(r.on_stop_);
     }
-    answers_.give_up(r);
-    if (workers_.take_back(r)) {
+    replies_.stop_awaiting(r);
+    if (workers_.withdraw(r)) {
         ++figures_.withdrawn;
         r.answered_ = true;
-        answers_.conclude(r);
-        let_go(r);
+        replies_.remove(r);
+        release_record(r);
         return;
     }
-    workers_.expect_end(r, clock::now());
+    workers_.job_stopped(r, clock::now());
     if (callback) {
         r.add_reference();
         stop_notifier_.notify(
@@ -244,46 +244,47 @@ void pool_state::stop(job_record& r) {
     }
 }
 
-// -- asking others -------------------------------------------------------------------------------------------------
+// -- requests to other nodes ---------------------------------------------------------------------------------------
 
-void pool_state::delegate(job_context asks, std::string command, call_options options, answer_callback answered) {
-    const auto asked = std::make_shared<answer_callback>(std::move(answered));
-    const auto put = box_.put([this, asks, command = std::move(command), options, asked] {
-        const auto& by = asks.record_->answer_;
-        onward_.send(asks, by ? &*by : nullptr, command, options, *asked);
+void job_dispatcher::delegate(job_context job, std::string command, call_options options, answer_callback answered) {
+    const auto callback = std::make_shared<answer_callback>(std::move(answered));
+    const auto put = completions_.post([this, job, command = std::move(command), options, callback] {
+        const auto& by = job.record_->requester_;
+        delegated_.send(job, by ? &*by : nullptr, command, options, *callback);
     });
     if (put) {
         return;
     }
-    // As any other answer: later, and as a part of the job.
-    const auto refuse = [asked, ending = draining_.load()] {
-        ending ? (*asked)(errc::unavailable, "{}", "the node is stopping")
-               : (*asked)(errc::busy, "{}", "too much is asked at once");
+    // Like any other answer: later, as a continuation of the job.
+    const auto refuse = [callback, ending = draining_.load()] {
+        ending ? (*callback)(errc::unavailable, "{}", "the node is stopping")
+               : (*callback)(errc::busy, "{}", "too many requests at once");
     };
-    if (!workers_.resume(*asks.record_, refuse)) {
+    if (!workers_.schedule(*job.record_, refuse)) {
         refuse(); // no worker is left
     }
 }
 
 // -- figures -------------------------------------------------------------------------------------------------------
 
-node_load pool_state::load() const noexcept {
+node_load job_dispatcher::load() const noexcept {
     const auto queued = workers_.queued();
-    const auto open = static_cast<std::uint32_t>(answers_.size());
-    const auto begun = open - std::min(queued, open);
-    // Where no worker comes free the next job waits at least as long as that has been so.
-    const auto held = std::chrono::duration_cast<std::chrono::microseconds>(workers_.held_for(clock::now())).count();
-    constexpr std::int64_t most = 1'000'000'000;
+    const auto open = static_cast<std::uint32_t>(replies_.size());
+    const auto started = open - std::min(queued, open);
+    // While no worker becomes free, the next job waits at least as long as this has lasted.
+    const auto saturated =
+        std::chrono::duration_cast<std::chrono::microseconds>(workers_.saturated_for(clock::now())).count();
+    constexpr std::int64_t max_us = 1'000'000'000;
     return {.queued = queued,
-            .running = std::max(begun, workers_.running()),
+            .running = std::max(started, workers_.running()),
             .workers = workers_.usable(),
             .service_us =
-                std::max(workers_.service_us(), static_cast<std::uint32_t>(std::min<std::int64_t>(held, most)))};
+                std::max(workers_.service_us(), static_cast<std::uint32_t>(std::min<std::int64_t>(saturated, max_us)))};
 }
 
-pool_figures pool_state::figures() const {
+pool_figures job_dispatcher::figures() const {
     const auto now = load();
-    const auto workers = workers_.count();
+    const auto workers = workers_.read_figures();
     auto all = figures_;
     all.threw = counts_.threw.load(std::memory_order_relaxed);
     all.answerless = counts_.answerless.load(std::memory_order_relaxed);
@@ -302,15 +303,15 @@ pool_figures pool_state::figures() const {
     return all;
 }
 
-// -- talking -------------------------------------------------------------------------------------------------------
+// -- log -----------------------------------------------------------------------------------------------------------
 
-void pool_state::log(job_context says, log_level level, std::string text) {
-    const auto put = box_.put([this, says = std::move(says), level, text = std::move(text)] {
-        const auto& r = *says.record_;
-        if (r.answer_) {
-            r.answer_->log(level, text); // which knows the request's id
+void job_dispatcher::log(job_context job, log_level level, std::string text) {
+    const auto put = completions_.post([this, job = std::move(job), level, text = std::move(text)] {
+        const auto& r = *job.record_;
+        if (r.requester_) {
+            r.requester_->log(level, text); // adds the request's id
         } else {
-            say(level, {text, r.request().peer().address});
+            write_log(level, {text, r.request().peer().address});
         }
     });
     if (!put) {
@@ -318,204 +319,204 @@ void pool_state::log(job_context says, log_level level, std::string text) {
     }
 }
 
-void pool_state::note_inline(std::string_view task, std::chrono::nanoseconds took) {
+void job_dispatcher::record_inline_call(std::string_view task, std::chrono::nanoseconds took) {
     ++figures_.inline_calls;
     const auto us = static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(took).count());
     figures_.inline_worst_us = std::max(figures_.inline_worst_us, us);
     if (took > options_.slow_inline) {
         ++figures_.inline_slow;
-        say(log_level::warning, "the task '" + std::string{task} + "' held up everything else for " +
-                                    std::to_string(us / 1000) + " ms: it should not be marked as quick");
+        write_log(log_level::warning, "the task '" + std::string{task} + "' blocked the node for " +
+                                          std::to_string(us / 1000) + " ms: it should not be marked inline_ok");
     }
 }
 
-// -- watching ------------------------------------------------------------------------------------------------------
+// -- timer ---------------------------------------------------------------------------------------------------------
 
-void pool_state::arm_tick() {
-    const bool at_work = records_.size() != 0;
-    if (closed_ || (ticking_ && !(idle_tick_ && at_work))) {
+void job_dispatcher::arm_timer() {
+    const bool has_jobs = records_.size() != 0;
+    if (closed_ || (timer_armed_ && !(timer_idle_ && has_jobs))) {
         return;
     }
-    ticking_ = true;
-    idle_tick_ = !at_work;
-    tick_span_ = at_work ? std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms) : options_.look_in;
-    expect_tick(clock::now());
-    tick_->expires_after(tick_span_);
-    tick_->async_wait([weak = weak_from_this()](boost::system::error_code code) {
+    timer_armed_ = true;
+    timer_idle_ = !has_jobs;
+    timer_interval_ =
+        has_jobs ? std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms) : options_.check_interval;
+    update_executor_due(clock::now());
+    timer_->expires_after(timer_interval_);
+    timer_->async_wait([weak = weak_from_this()](boost::system::error_code code) {
         if (const auto self = weak.lock(); self && !code) {
-            self->tick();
+            self->on_timer();
         }
     });
 }
 
-void pool_state::tick() {
-    ticking_ = false;
+void job_dispatcher::on_timer() {
+    timer_armed_ = false;
     if (closed_) {
         return;
     }
-    look_for_pause();
+    check_for_pause();
     report_stuck();
-    collect(); // what went without a word
-    if (records_.size() != 0 || options_.look_in.count() > 0) {
-        arm_tick();
+    process_completions(); // deferred ones
+    if (records_.size() != 0 || options_.check_interval.count() > 0) {
+        arm_timer();
     }
 }
 
 // -- pauses --------------------------------------------------------------------------------------------------------
 
-void pool_state::expect_tick(time_point now) {
-    if (options_.look_in.count() > 0) {
-        workers_.expect_executor(now + tick_span_ + options_.late_executor);
+void job_dispatcher::update_executor_due(time_point now) {
+    if (options_.check_interval.count() > 0) {
+        workers_.set_executor_due(now + timer_interval_ + options_.executor_lateness);
     }
 }
 
-// The process was stopped, or the machine suspended, or a handler held up the executor: requesters may have
-// withdrawn meanwhile, which stands in what has not been read.
-void pool_state::notice_pause() {
+// The process or the machine was suspended, or a handler blocked the executor. Requesters may have withdrawn in the
+// meantime, in input that has not been read.
+void job_dispatcher::detect_pause() {
     const auto now = clock::now();
     if (closed_ || !workers_.executor_is_late(now)) {
         return;
     }
-    expect_tick(now);
-    if (std::exchange(reading_, true)) {
+    update_executor_due(now);
+    if (std::exchange(recovering_, true)) {
         return;
     }
-    workers_.hold();
-    reading_since_ = now;
+    workers_.pause();
+    recovery_began_ = now;
     quiet_rounds_ = 0;
-    changes_before_ = changes_;
-    say(log_level::warning, "this node was stopped or held up for more than " +
-                                seconds(tick_span_ + options_.late_executor) +
-                                ": what came meanwhile is read before a job begins");
-    read_on();
+    changes_last_round_ = changes_;
+    write_log(log_level::warning, "this node was suspended or blocked for more than " +
+                                      seconds(timer_interval_ + options_.executor_lateness) +
+                                      ": no job starts until the input that arrived since has been read");
+    post_recovery_round();
 }
 
-// A worker that has found the executor late waits to be woken, also where the pause has been dealt with before it says
-// so.
-void pool_state::look_for_pause() {
-    notice_pause();
-    if (!reading_ && !closed_) {
+// A worker that has found the executor late waits to be woken, even if the pause has been handled before the worker
+// reports it.
+void job_dispatcher::check_for_pause() {
+    detect_pause();
+    if (!recovering_ && !closed_) {
         workers_.wake();
     }
 }
 
-// What is posted comes after what is ready, and after a look for what has become ready.
-void pool_state::read_on() {
+// Posted functions run after those that are ready, and after a check for new input.
+void job_dispatcher::post_recovery_round() {
     asio::post(executor_, [weak = weak_from_this()] {
         if (const auto self = weak.lock(); self && !self->closed_) {
-            self->begin_again();
+            self->recovery_round();
         }
     });
 }
 
-void pool_state::begin_again() {
-    quiet_rounds_ = changes_ == changes_before_ ? quiet_rounds_ + 1 : 0;
-    changes_before_ = changes_;
+void job_dispatcher::recovery_round() {
+    quiet_rounds_ = changes_ == changes_last_round_ ? quiet_rounds_ + 1 : 0;
+    changes_last_round_ = changes_;
     const auto now = clock::now();
-    if (quiet_rounds_ < most_quiet_rounds && now - reading_since_ < longest_reading) {
-        read_on();
+    if (quiet_rounds_ < max_quiet_rounds && now - recovery_began_ < max_recovery) {
+        post_recovery_round();
         return;
     }
-    reading_ = false;
-    expect_tick(now);
-    workers_.release();
+    recovering_ = false;
+    update_executor_due(now);
+    workers_.unpause();
 }
 
-void pool_state::report_stuck() {
-    workers_.watch(clock::now(), [this](const worker_watch::finding& found, const job_record& r) {
-        say(log_level::error,
-            {"worker " + std::to_string(found.place + 1) + " is stuck in " +
-                 std::string{to_string(r.request().verb())} + " '" + std::string{r.request().task()} + "' since " +
-                 seconds(found.busy_for) +
-                 (found.replaced ? ": another takes its place" : ": there is nobody to take its place"),
-             r.request().peer().address});
+void job_dispatcher::report_stuck() {
+    workers_.check_stuck(clock::now(), [this](const worker_watchdog::stuck_worker& found, const job_record& r) {
+        write_log(log_level::error, {"worker " + std::to_string(found.slot + 1) + " is stuck in " +
+                                         std::string{to_string(r.request().verb())} + " '" +
+                                         std::string{r.request().task()} + "' for " + seconds(found.busy_for) +
+                                         (found.replaced ? ": replaced by another" : ": no replacement is left"),
+                                     r.request().peer().address});
     });
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------
 
-void pool_state::drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done) {
+void job_dispatcher::drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done) {
     draining_ = true;
     drain_.begin(
         limit,
         [weak = weak_from_this()] {
             if (const auto self = weak.lock()) {
-                self->follow_drain(true);
+                self->update_drain(true);
             }
         },
         std::move(done));
     asio::post(executor_, [weak = weak_from_this()] {
         if (const auto self = weak.lock()) {
-            self->follow_drain(false);
+            self->update_drain(false);
         }
     });
 }
 
-void pool_state::follow_drain(bool over) {
-    if (!drain_.under_way() || !(over || (answers_.awaited() == 0 && workers_.running() == 0))) {
+void job_dispatcher::update_drain(bool over) {
+    if (!drain_.is_pending() || !(over || (replies_.awaited() == 0 && workers_.running() == 0))) {
         return;
     }
     drain_report report;
     if (over) {
-        abandon(report);
-        patience_ = 0ms;
+        fail_open_jobs(report);
+        close_timeout_ = 0ms;
     }
     report.stuck = workers_.running();
-    drain_.end(report);
+    drain_.complete(report);
 }
 
-// Answers whatever is open, and tells it to stop.
-void pool_state::abandon(drain_report& report) {
+// Answers all open jobs, and tells them to stop.
+void job_dispatcher::fail_open_jobs(drain_report& report) {
     for (std::size_t i = 0; i < records_.size();) {
         auto& r = records_[i];
-        if (!r.answer_) {
+        if (!r.requester_) {
             ++i;
-            continue; // what is taken back leaves the list, and another is in its place
+            continue; // a withdrawn record leaves the list, and another takes its index
         }
-        auto told = *r.answer_;
+        auto requester = *r.requester_;
         const auto before = figures_.withdrawn;
         stop(r);
         if (figures_.withdrawn != before) {
             ++report.refused;
-            told.refuse("it is shutting down", 1s);
+            requester.refuse("it is shutting down", 1s);
         } else {
             ++report.abandoned;
-            told.fail(errc::unavailable, "it shut down before the job had ended");
-            answers_.conclude(r);
+            requester.fail(errc::unavailable, "it shut down before the job had ended");
+            replies_.remove(r);
         }
     }
 }
 
-std::size_t pool_state::close(std::chrono::milliseconds limit) {
+std::size_t job_dispatcher::close(std::chrono::milliseconds limit) {
     if (closed_) {
         return 0;
     }
     const auto end = clock::now() + limit;
     draining_ = true;
-    drain_report unheard;
-    abandon(unheard);
+    drain_report unreported;
+    fail_open_jobs(unreported);
     closed_ = true;
-    drain_.forget();
-    tick_.reset();
+    drain_.cancel();
+    timer_.reset();
     workers_.close([](job_record& r) { r.release(); });
-    std::vector<result_box::item> items;
-    std::vector<result_box::errand> errands;
-    box_.close(items, errands);
-    for (const auto& errand : errands) { // what is asked has to be answered
-        errand();
+    std::vector<completion_queue::entry> entries;
+    std::vector<completion_queue::function> functions;
+    completions_.close(entries, functions);
+    for (const auto& function : functions) { // their requests have to be answered
+        function();
     }
-    onward_.close();
-    records_.disown();
-    busy_ = {};
-    for (const auto& [record, what] : items) {
-        if (what == result_box::news::gone) {
+    delegated_.close();
+    records_.detach_all();
+    work_guard_ = {};
+    for (const auto& [record, what] : entries) {
+        if (what == completion_queue::event::released) {
             const std::unique_ptr<job_record> owned{record};
-            record->pool_.reset();
+            record->dispatcher_.reset();
         } else {
             record->release();
         }
     }
-    errands.clear();
+    functions.clear();
     {
         const std::lock_guard lock{executor_mutex_};
         executor_ = {};
@@ -525,14 +526,14 @@ std::size_t pool_state::close(std::chrono::milliseconds limit) {
     };
     const auto workers = workers_.join(time_left());
     if (workers != 0) {
-        say(log_level::error, "workers left behind in jobs that do not end: " + std::to_string(workers));
+        write_log(log_level::error, "workers abandoned in jobs that do not end: " + std::to_string(workers));
     }
-    const auto callbacks = stop_notifier_.end(time_left());
+    const auto callbacks = stop_notifier_.close(time_left());
     if (callbacks != 0) {
-        say(log_level::error,
-            "threads left behind in on_stop callbacks that do not return: " + std::to_string(callbacks));
+        write_log(log_level::error,
+                  "threads abandoned in on_stop callbacks that do not return: " + std::to_string(callbacks));
     }
-    records_.drop_spare();
+    records_.free_spare();
     return workers + callbacks;
 }
 

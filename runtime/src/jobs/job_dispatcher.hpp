@@ -28,45 +28,45 @@
 
 namespace cles::runtime {
 
-/// The wait for the last jobs of a pool: it ends once, by the last job or by the limit.
-class draining {
+/// Waits for the last jobs of a pool: completes once, with the last job or at the limit.
+class drain_operation {
   public:
-    explicit draining(const boost::asio::any_io_executor& executor) : limit_(std::in_place, executor) {}
+    explicit drain_operation(const boost::asio::any_io_executor& executor) : limit_(std::in_place, executor) {}
 
-    /// \param at_limit called unless `end` or `forget` was before
-    void begin(std::chrono::milliseconds limit, std::function<void()> at_limit,
+    /// \param on_limit called unless `complete` or `cancel` was called before
+    void begin(std::chrono::milliseconds limit, std::function<void()> on_limit,
                std::function<void(const drain_report&)> done);
-    [[nodiscard]] bool under_way() const noexcept { return done_ != nullptr; }
-    void end(const drain_report& how);
-    /// Nobody waits any more; nothing of the executor is held from here on.
-    void forget();
+    [[nodiscard]] bool is_pending() const noexcept { return done_ != nullptr; }
+    void complete(const drain_report& report);
+    /// Completes without a call, and refers to nothing of the executor any more.
+    void cancel();
 
   private:
     std::optional<boost::asio::steady_timer> limit_;
     std::function<void(const drain_report&)> done_;
 };
 
-/// The inside of a pool: what happens on the service's executor, one step from a job's admission to its end after the
-/// other. What the steps need is kept by its parts. It lives as long as a job that somebody holds.
-class pool_state final : public std::enable_shared_from_this<pool_state> {
+/// Takes jobs through a pool, on the service's executor, from admission to reply: it is the sequence of these steps,
+/// and its parts keep their state. It lives as long as any job is held.
+class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher> {
   public:
-    pool_state(boost::asio::any_io_executor executor, pool_options options);
-    pool_state(const pool_state&) = delete;
-    pool_state& operator=(const pool_state&) = delete;
-    ~pool_state();
+    job_dispatcher(boost::asio::any_io_executor executor, pool_options options);
+    job_dispatcher(const job_dispatcher&) = delete;
+    job_dispatcher& operator=(const job_dispatcher&) = delete;
+    ~job_dispatcher();
 
     // -- on the service's executor ---------------------------------------------------------------------------------
-    /// To be called first, when it is owned.
+    /// To be called first, once a shared_ptr owns this.
     void start();
     void submit(job what);
     [[nodiscard]] node_load load() const noexcept;
     [[nodiscard]] pool_figures figures() const;
     void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
-    /// Returns how many threads are left behind.
+    /// Returns how many threads are abandoned.
     std::size_t close(std::chrono::milliseconds limit);
-    std::size_t close() { return close(patience_); }
-    /// A handler ran on this executor for so long.
-    void note_inline(std::string_view task, std::chrono::nanoseconds took);
+    std::size_t close() { return close(close_timeout_); }
+    /// A handler has run on this executor.
+    void record_inline_call(std::string_view task, std::chrono::nanoseconds took);
 
     // -- from any thread -------------------------------------------------------------------------------------------
     struct shared_counts {
@@ -76,73 +76,73 @@ class pool_state final : public std::enable_shared_from_this<pool_state> {
         std::atomic<std::uint64_t> logs_dropped{0};
     };
     [[nodiscard]] shared_counts& counts() noexcept { return counts_; }
-    [[nodiscard]] result_box& box() noexcept { return box_; }
-    /// The service's; empty after the end.
+    [[nodiscard]] completion_queue& completions() noexcept { return completions_; }
+    /// The service's; empty after `close`.
     [[nodiscard]] boost::asio::any_io_executor executor() const;
-    /// Nobody holds it any more.
-    void give_back(job_record& r) noexcept;
-    void delegate(job_context asks, std::string command, call_options options, answer_callback answered);
-    void log(job_context says, log_level level, std::string text);
+    /// The last reference to the record has been released.
+    void return_record(job_record& r) noexcept;
+    void delegate(job_context job, std::string command, call_options options, answer_callback answered);
+    void log(job_context job, log_level level, std::string text);
 
   private:
-    job_record& take_record();
+    job_record& acquire_record();
     void recycle(job_record& r);
     void wake_workers();
     void refuse(responder& answer, worker_pool::admission why);
 
-    void collect();
-    void let_go(job_record& r);
+    void process_completions();
+    void release_record(job_record& r);
     void stop(job_record& r);
 
-    void tick();
-    void arm_tick();
-    void expect_tick(time_point now);
-    void notice_pause();
-    void look_for_pause();
-    void read_on();
-    void begin_again();
+    void on_timer();
+    void arm_timer();
+    void update_executor_due(time_point now);
+    void detect_pause();
+    void check_for_pause();
+    void post_recovery_round();
+    void recovery_round();
     void report_stuck();
-    void abandon(drain_report& report);
-    void follow_drain(bool over);
-    void say(log_level level, const log_entry& what) const;
+    void fail_open_jobs(drain_report& report);
+    void update_drain(bool over);
+    void write_log(log_level level, const log_entry& what) const;
 
-    mutable brief_mutex executor_mutex_;
+    mutable adaptive_mutex executor_mutex_;
     boost::asio::any_io_executor executor_;
     pool_options options_;
     shared_counts counts_;
-    result_box box_;
+    completion_queue completions_;
     worker_pool workers_;
-    onward_requests onward_;
+    delegated_requests delegated_;
     stop_notifier stop_notifier_;
 
-    job_records records_;
-    open_answers answers_;
-    kept_peers peers_;
-    bool wake_asked_ = false;
-    std::size_t unwoken_ = 0;
-    std::vector<result_box::item> items_;
-    std::vector<result_box::errand> errands_;
+    job_record_pool records_;
+    pending_replies replies_;
+    identity_cache identities_;
+    bool wake_posted_ = false;
+    std::size_t unwoken_jobs_ = 0;
+    std::vector<completion_queue::entry> entries_;
+    std::vector<completion_queue::function> functions_;
 
-    // These three hold nothing of the executor after the end, for the context may go then.
-    boost::asio::any_io_executor busy_; // keeps it at work while there are jobs
-    std::optional<boost::asio::steady_timer> tick_;
-    draining drain_;
-    bool ticking_ = false;
-    bool idle_tick_ = false; // set while there was no job
-    std::chrono::milliseconds tick_span_{0};
+    // These three hold nothing of the executor after `close`, because its context may be destroyed then.
+    boost::asio::any_io_executor work_guard_; // keeps it running while there are jobs
+    std::optional<boost::asio::steady_timer> timer_;
+    drain_operation drain_;
+    bool timer_armed_ = false;
+    bool timer_idle_ = false; // armed while there was no job
+    std::chrono::milliseconds timer_interval_{0};
 
-    // While what came during a pause is read.
-    bool reading_ = false;
-    time_point reading_since_;
+    // While the input that arrived during a pause is read.
+    bool recovering_ = false;
+    time_point recovery_began_;
     unsigned quiet_rounds_ = 0;
-    std::uint64_t changes_ = 0; // jobs that came and were stopped, so far
-    std::uint64_t changes_before_ = 0;
+    std::uint64_t changes_ = 0; // jobs that arrived or were stopped, so far
+    std::uint64_t changes_last_round_ = 0;
 
     std::atomic<bool> draining_{false};
     bool closed_ = false;
-    std::chrono::milliseconds patience_;
+    std::chrono::milliseconds close_timeout_;
 
-    pool_figures figures_; // of which it keeps those that are its own
+    pool_figures figures_; // those that are counted here
 };
 
 } // namespace cles::runtime

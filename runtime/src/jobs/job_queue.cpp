@@ -7,100 +7,100 @@
 namespace cles::runtime {
 
 /// The waiting jobs of one requester.
-struct turn {
+struct requester_queue {
     std::uint64_t requester = 0;
     job_queue::item* first = nullptr;
     job_queue::item* last = nullptr;
-    // The ring; both null where there are no jobs.
-    turn* before = nullptr;
-    turn* after = nullptr;
+    // The ring of requesters; both null without jobs.
+    requester_queue* before = nullptr;
+    requester_queue* after = nullptr;
 };
 
 namespace {
 
-// So many requesters are remembered whose last job has gone, for they are likely to come again.
-constexpr std::size_t most_idle = 64;
+// How many requesters without jobs are kept, because they are likely to send more.
+constexpr std::size_t max_idle = 64;
 
-void enter_ring(turn*& next, turn& t) noexcept {
+void enter_ring(requester_queue*& next, requester_queue& q) noexcept {
     if (next == nullptr) {
-        next = t.before = t.after = &t;
+        next = q.before = q.after = &q;
         return;
     }
-    t.after = next; // last in turn is who stands before the next
-    t.before = next->before;
-    t.before->after = &t;
-    next->before = &t;
+    q.after = next; // the one before the next is the last to be served
+    q.before = next->before;
+    q.before->after = &q;
+    next->before = &q;
 }
 
-void leave_ring(turn*& next, turn& t) noexcept {
-    if (t.after == &t) {
+void leave_ring(requester_queue*& next, requester_queue& q) noexcept {
+    if (q.after == &q) {
         next = nullptr;
     } else {
-        t.before->after = t.after;
-        t.after->before = t.before;
-        next = next == &t ? t.after : next;
+        q.before->after = q.after;
+        q.after->before = q.before;
+        next = next == &q ? q.after : next;
     }
-    t.before = t.after = nullptr;
+    q.before = q.after = nullptr;
 }
 
 } // namespace
 
-job_queue::job_queue(std::size_t capacity) : capacity_(capacity) { spare_.reserve(most_idle); }
+job_queue::job_queue(std::size_t capacity) : capacity_(capacity) { spare_.reserve(max_idle); }
 
 job_queue::~job_queue() = default;
 
-turn* job_queue::turn_of(std::uint64_t requester) {
-    if (const auto found = turns_.find(requester); found != turns_.end()) {
+requester_queue* job_queue::queue_of(std::uint64_t requester) {
+    if (const auto found = requesters_.find(requester); found != requesters_.end()) {
         if (found->second->first == nullptr) {
             --idle_;
             enter_ring(next_, *found->second);
         }
         return found->second.get();
     }
-    auto made = std::make_unique<turn>();
+    auto made = std::make_unique<requester_queue>();
     if (!spare_.empty()) {
         made = std::move(spare_.back());
         spare_.pop_back();
     }
     made->requester = requester;
-    auto* t = turns_.emplace(requester, std::move(made)).first->second.get();
-    enter_ring(next_, *t);
-    return t;
+    auto* q = requesters_.emplace(requester, std::move(made)).first->second.get();
+    enter_ring(next_, *q);
+    return q;
 }
 
 bool job_queue::push(item& job) {
     if (size_ >= capacity_) {
         return false;
     }
-    auto& t = *turn_of(job.requester);
-    job.in_ = &t;
-    job.before_ = t.last;
-    job.after_ = nullptr;
-    (t.last != nullptr ? t.last->after_ : t.first) = &job;
-    t.last = &job;
+    auto& q = *queue_of(job.requester);
+    job.queue_ = &q;
+    job.previous_ = q.last;
+    job.next_in_queue_ = nullptr;
+    (q.last != nullptr ? q.last->next_in_queue_ : q.first) = &job;
+    q.last = &job;
     ++size_;
     return true;
 }
 
-void job_queue::push_begun(item& job) {
-    auto& t = *turn_of(job.requester);
-    job.in_ = &t;
-    job.before_ = nullptr;
-    job.after_ = t.first;
-    (t.first != nullptr ? t.first->before_ : t.last) = &job;
-    t.first = &job;
+void job_queue::push_resumed(item& job) {
+    auto& q = *queue_of(job.requester);
+    job.queue_ = &q;
+    job.previous_ = nullptr;
+    job.next_in_queue_ = q.first;
+    (q.first != nullptr ? q.first->previous_ : q.last) = &job;
+    q.first = &job;
     ++size_;
 }
 
-void job_queue::take_out(item& job) noexcept {
-    auto& t = *job.in_;
-    (job.before_ != nullptr ? job.before_->after_ : t.first) = job.after_;
-    (job.after_ != nullptr ? job.after_->before_ : t.last) = job.before_;
-    job.in_ = nullptr;
-    job.before_ = job.after_ = nullptr;
+void job_queue::unlink(item& job) noexcept {
+    auto& q = *job.queue_;
+    (job.previous_ != nullptr ? job.previous_->next_in_queue_ : q.first) = job.next_in_queue_;
+    (job.next_in_queue_ != nullptr ? job.next_in_queue_->previous_ : q.last) = job.previous_;
+    job.queue_ = nullptr;
+    job.previous_ = job.next_in_queue_ = nullptr;
     --size_;
-    if (t.first == nullptr) {
-        leave_ring(next_, t);
+    if (q.first == nullptr) {
+        leave_ring(next_, q);
         ++idle_;
     }
 }
@@ -109,32 +109,32 @@ job_queue::item* job_queue::pop() noexcept {
     if (next_ == nullptr) {
         return nullptr;
     }
-    auto& t = *next_;
-    next_ = t.after;
-    auto* job = t.first;
-    take_out(*job);
-    sweep();
+    auto& q = *next_;
+    next_ = q.after;
+    auto* job = q.first;
+    unlink(*job);
+    forget_idle();
     return job;
 }
 
 void job_queue::remove(item& job) noexcept {
-    if (job.in_ != nullptr) {
-        take_out(job);
-        sweep();
+    if (job.queue_ != nullptr) {
+        unlink(job);
+        forget_idle();
     }
 }
 
-// Forgets those who have no jobs, once they are many; so that each costs a constant share of it.
-void job_queue::sweep() {
-    if (idle_ <= std::max(most_idle, turns_.size() / 2)) {
+// Removes the requesters without jobs once there are many, so that the cost per job is constant.
+void job_queue::forget_idle() {
+    if (idle_ <= std::max(max_idle, requesters_.size() / 2)) {
         return;
     }
-    for (auto at = turns_.begin(); at != turns_.end();) {
+    for (auto at = requesters_.begin(); at != requesters_.end();) {
         if (at->second->first == nullptr) {
-            if (spare_.size() < most_idle) {
+            if (spare_.size() < max_idle) {
                 spare_.push_back(std::move(at->second));
             }
-            turns_.erase(at++);
+            requesters_.erase(at++);
         } else {
             ++at;
         }

@@ -10,36 +10,37 @@
 namespace cles::runtime {
 namespace {
 
-// Reports of progress that wait for the executor, past which the newest replaces the one before it.
-constexpr std::size_t most_reports = 16;
-constexpr std::size_t longest_log = 4096;
-constexpr std::size_t roomy_result = 65536;
+// Progress reports that wait for the executor; beyond that the newest replaces the one before it.
+constexpr std::size_t max_reports = 16;
+constexpr std::size_t max_log_length = 4096;
+constexpr std::size_t max_retained_result = 65536;
+constexpr std::size_t max_spare = 1024; // records
 
-thread_local job_record::at_work* here = nullptr;
+thread_local job_record::current_run* current = nullptr;
 
 } // namespace
 
-// -- its memory ----------------------------------------------------------------------------------------------------
+// -- memory --------------------------------------------------------------------------------------------------------
 
-void job_record::open(std::shared_ptr<pool_state> pool) {
-    pool_ = std::move(pool);
+void job_record::open(std::shared_ptr<job_dispatcher> dispatcher) {
+    dispatcher_ = std::move(dispatcher);
     references_.store(1, std::memory_order_relaxed);
     answered_.store(false, std::memory_order_relaxed);
     stopped_.store(false, std::memory_order_relaxed);
-    unheard_.store(false, std::memory_order_relaxed);
-    listens_.store(false, std::memory_order_relaxed);
-    written_ = begun = awaited_ = false;
+    progress_unwanted_.store(false, std::memory_order_relaxed);
+    has_on_stop_.store(false, std::memory_order_relaxed);
+    result_written_ = started = awaited_ = false;
 }
 
 void job_record::clear() {
-    pool_.reset();
+    dispatcher_.reset();
     work_.reset();
     reports_.clear();
     on_stop_ = nullptr;
     failure_.reset();
     retry_.reset();
     result_.clear();
-    if (result_.capacity() > roomy_result) {
+    if (result_.capacity() > max_retained_result) {
         result_ = {};
     }
     request_.clear();
@@ -51,67 +52,67 @@ void job_record::release() noexcept {
     if (references_.fetch_sub(1, std::memory_order_acq_rel) != 1) {
         return;
     }
-    if (!answered_.exchange(true)) { // nobody is left who could answer
+    if (!answered_.exchange(true)) { // it cannot be answered any more
         references_.store(1, std::memory_order_relaxed);
         failure_ = errc::failed;
         result_ = "the job ended without an answer";
-        pool_->counts().answerless.fetch_add(1, std::memory_order_relaxed);
-        if (pool_->box().put({this, result_box::news::ended})) {
+        dispatcher_->counts().answerless.fetch_add(1, std::memory_order_relaxed);
+        if (dispatcher_->completions().push({this, completion_queue::event::answered})) {
             return;
         }
         references_.store(0, std::memory_order_relaxed);
     }
-    pool_->give_back(*this);
+    dispatcher_->return_record(*this);
 }
 
-bool job_record::settle(bool may_keep) noexcept {
-    if (!written_) {
+bool job_record::finish_run(bool may_defer) noexcept {
+    if (!result_written_) {
         release();
         return false;
     }
-    // The box takes over the reference.
-    if (!claim() || !pool_->box().put({this, result_box::news::ended}, may_keep)) {
+    // The queue takes over the reference.
+    if (!claim_answer() || !dispatcher_->completions().push({this, completion_queue::event::answered}, may_defer)) {
         release();
     }
     return true;
 }
 
-void job_record::set_at_work(at_work* record) noexcept { here = record; }
+void job_record::set_current_run(current_run* run) noexcept { current = run; }
 
 // -- answers -------------------------------------------------------------------------------------------------------
 
-bool job_record::claim() noexcept {
+bool job_record::claim_answer() noexcept {
     if (answered_.exchange(true)) {
-        pool_->counts().answered_twice.fetch_add(1, std::memory_order_relaxed);
+        dispatcher_->counts().answered_twice.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
-    if (listens_.load(std::memory_order_acquire)) {
-        forget_on_stop();
+    if (has_on_stop_.load(std::memory_order_acquire)) {
+        drop_on_stop();
     }
     return true;
 }
 
-// A job that has answered is not told any more, and what it left for that goes here, where the job is at home, rather
-// than on the executor.
-void job_record::forget_on_stop() noexcept {
+// A job that has answered is not told to stop any more. Its callback is destroyed here, on the job's thread, and not on
+// the executor.
+void job_record::drop_on_stop() noexcept {
     std::function<void()> dropped;
     const std::lock_guard lock{mutex_};
     dropped.swap(on_stop_);
 }
 
-void job_record::publish() noexcept {
-    const bool keep = here != nullptr && here->job == this && here->may_keep;
-    if (keep) {
-        here->kept = true;
+void job_record::post_answer() noexcept {
+    const bool defer = current != nullptr && current->job == this && current->may_defer;
+    if (defer) {
+        current->deferred = true;
     }
     add_reference();
-    if (!pool_->box().put({this, result_box::news::ended}, keep)) {
+    if (!dispatcher_->completions().push({this, completion_queue::event::answered}, defer)) {
         release();
     }
 }
 
 void job_record::done(std::string_view json) {
-    if (!claim()) {
+    if (!claim_answer()) {
         return;
     }
     try {
@@ -123,26 +124,26 @@ void job_record::done(std::string_view json) {
         result_ = e.message();
         failure_ = errc::failed;
     }
-    publish();
+    post_answer();
 }
 
 void job_record::fail(errc code, std::string_view message) {
-    if (!claim()) {
+    if (!claim_answer()) {
         return;
     }
     result_ = message;
     failure_ = code;
-    publish();
+    post_answer();
 }
 
 void job_record::refuse(std::string_view message, std::chrono::milliseconds retry) {
-    if (!claim()) {
+    if (!claim_answer()) {
         return;
     }
     result_ = message;
     failure_ = errc::busy;
     retry_ = retry;
-    publish();
+    post_answer();
 }
 
 void job_record::fail(const std::exception_ptr& thrown) {
@@ -151,7 +152,7 @@ void job_record::fail(const std::exception_ptr& thrown) {
 }
 
 bool job_record::progress(double fraction, std::string_view json) {
-    if (stopped() || answered_.load(std::memory_order_relaxed) || unheard_.load(std::memory_order_relaxed)) {
+    if (stopped() || answered_.load(std::memory_order_relaxed) || progress_unwanted_.load(std::memory_order_relaxed)) {
         return false;
     }
     std::string details;
@@ -162,31 +163,31 @@ bool job_record::progress(double fraction, std::string_view json) {
     }
     {
         const std::lock_guard lock{mutex_};
-        if (reports_.size() >= most_reports) {
+        if (reports_.size() >= max_reports) {
             reports_.back() = {fraction, std::move(details)};
             return true;
         }
         reports_.push_back({fraction, std::move(details)});
         if (reports_.size() != 1) {
-            return true; // the one before is on its way
+            return true; // an earlier one is being delivered
         }
     }
     add_reference();
-    if (!pool_->box().put({this, result_box::news::progress})) {
+    if (!dispatcher_->completions().push({this, completion_queue::event::progress})) {
         release();
         return false;
     }
     return true;
 }
 
-// -- the rest of the world -----------------------------------------------------------------------------------------
+// -- the rest of the context ---------------------------------------------------------------------------------------
 
 void job_record::on_stop(std::function<void()> callback) {
     {
         const std::lock_guard lock{mutex_};
         if (!stopped()) {
             on_stop_.swap(callback);
-            listens_.store(true, std::memory_order_release);
+            has_on_stop_.store(true, std::memory_order_release);
             return;
         }
     }
@@ -197,80 +198,76 @@ void job_record::on_stop(std::function<void()> callback) {
 
 void job_record::delegate(std::string_view command, const call_options& options, answer_callback answered) {
     add_reference();
-    pool_->delegate(job_context{*this}, std::string{command}, options, std::move(answered));
+    dispatcher_->delegate(job_context{*this}, std::string{command}, options, std::move(answered));
 }
 
 void job_record::log(log_level level, std::string_view text) {
     add_reference();
-    pool_->log(job_context{*this}, level, std::string{text.substr(0, longest_log)});
+    dispatcher_->log(job_context{*this}, level, std::string{text.substr(0, max_log_length)});
 }
 
-boost::asio::any_io_executor job_record::executor() const { return pool_->executor(); }
+boost::asio::any_io_executor job_record::executor() const { return dispatcher_->executor(); }
 
 // -- work ----------------------------------------------------------------------------------------------------------
 
-bool job_record::begin(time_point listening_until) noexcept {
+bool job_record::start(time_point executor_due) noexcept {
     try {
         const auto now = time_point::clock::now();
-        if (stopped()) { // while its worker took it
-            fail(errc::cancelled, "nobody waits for it any more");
+        if (stopped()) { // while a worker took it from the queue
+            fail(errc::cancelled, "the requester does not wait for it any more");
             return true;
         }
         if (const auto due = request().deadline(); due != time_point{} && due <= now) {
-            fail(errc::deadline, "its time was over before it began");
+            fail(errc::deadline, "its deadline had passed before it began");
             return true;
         }
-        if (now > listening_until) {
+        if (now > executor_due) {
             return false;
         }
-        // It borrows the worker's reference.
-        struct lent {
+        // The context borrows the worker's reference.
+        struct borrowed {
             job_context context;
-            ~lent() { context.record_ = nullptr; }
+            ~borrowed() { context.record_ = nullptr; }
         };
-        const lent to{job_context{*this}};
-        (*work_)(to.context);
+        const borrowed job{job_context{*this}};
+        (*work_)(job.context);
     } catch (...) {
-        pool_->counts().threw.fetch_add(1, std::memory_order_relaxed);
+        dispatcher_->counts().threw.fetch_add(1, std::memory_order_relaxed);
         fail(std::current_exception());
     }
     return true;
 }
 
-void job_record::run(const std::function<void()>& part) noexcept {
+void job_record::run(const std::function<void()>& continuation) noexcept {
     try {
-        part();
+        continuation();
     } catch (...) {
-        pool_->counts().threw.fetch_add(1, std::memory_order_relaxed);
+        dispatcher_->counts().threw.fetch_add(1, std::memory_order_relaxed);
         fail(std::current_exception());
     }
 }
 
-namespace {
+// -- the records of a pool -----------------------------------------------------------------------------------------
 
-constexpr std::size_t most_spare = 1024;
-
-} // namespace
-
-job_record& job_records::take(std::shared_ptr<pool_state> pool) {
+job_record& job_record_pool::acquire(std::shared_ptr<job_dispatcher> dispatcher) {
     if (spare_.empty()) {
         spare_.push_back(std::make_unique<job_record>());
     }
     auto& r = *spare_.back().release();
     spare_.pop_back();
-    r.open(std::move(pool));
+    r.open(std::move(dispatcher));
     r.index = in_use_.size();
     in_use_.push_back(&r);
     return r;
 }
 
-void job_records::recycle(job_record& r) {
+void job_record_pool::recycle(job_record& r) {
     std::unique_ptr<job_record> owned{&r};
     in_use_.back()->index = r.index;
     in_use_[r.index] = in_use_.back();
     in_use_.pop_back();
-    r.clear(); // the pool lives: it runs
-    if (spare_.size() < most_spare) {
+    r.clear(); // the dispatcher, which runs, outlives this
+    if (spare_.size() < max_spare) {
         spare_.push_back(std::move(owned));
     }
 }

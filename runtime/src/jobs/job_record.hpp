@@ -24,21 +24,21 @@
 
 namespace cles::runtime {
 
-class open_answers;
-class pool_state;
+class pending_replies;
+class job_dispatcher;
 
-/// One job from its admission until nobody holds it any more; then its memory serves for another.
+/// One job, from its admission until its last holder releases it; then the memory is reused for another job.
 ///
-/// Each member belongs to one of four: the service's executor, of which what keeps the records has a part, the worker
-/// pool (under its mutex), or everybody.
+/// Members are grouped by who may use them: any thread, the worker pool (under its mutex), the owner of the records, or
+/// the service's executor (of which the owner of the records is a part).
 class job_record final : public job_queue::item {
   public:
     job_record() = default;
     ~job_record() = default;
 
-    // -- everybody's -----------------------------------------------------------------------------------------------
+    // -- any thread ------------------------------------------------------------------------------------------------
     void add_reference() noexcept { references_.fetch_add(1, std::memory_order_relaxed); }
-    /// When the last one goes, the job is answered where it has not been, and given back.
+    /// The last release answers the job if it has not been answered, and returns the record.
     void release() noexcept;
 
     void done(std::string_view json);
@@ -52,104 +52,103 @@ class job_record final : public job_queue::item {
     [[nodiscard]] const cles::request& request() const noexcept { return request_.get(); }
     [[nodiscard]] boost::asio::any_io_executor executor() const;
 
-    /// Where the worker that is alone with the job writes its result.
-    std::string& result_text() noexcept { return result_; }
-    /// It has written it, and will settle.
-    void set_written() noexcept { written_ = true; }
+    /// Where a worker that is the only holder of the job writes its result.
+    std::string& result_buffer() noexcept { return result_; }
+    /// The result has been written; `finish_run` sends it.
+    void set_result_written() noexcept { result_written_ = true; }
 
-    /// Runs the job's beginning on a worker, unless nobody waits for it any more or its time is over. False where the
-    /// executor, which would know of a withdrawal, was to be back by a time that has passed: then nothing has been
-    /// done.
-    [[nodiscard]] bool begin(time_point listening_until) noexcept;
-    /// Runs a part of it that was called back, on a worker.
-    void run(const std::function<void()>& part) noexcept;
-    /// The worker has let go of everything else: it answers where it has written, and lets go of the job. True where
-    /// there was a result, which `may_keep` has fetched when the executor comes by.
-    bool settle(bool may_keep) noexcept;
-    /// What the job's task is told apart by.
+    /// Runs the job's work on a worker, unless its requester has withdrawn or its time is over. False if the executor,
+    /// which would know of a withdrawal, is late (`executor_due` has passed): then nothing has been done.
+    [[nodiscard]] bool start(time_point executor_due) noexcept;
+    /// Runs a continuation of the job on a worker.
+    void run(const std::function<void()>& continuation) noexcept;
+    /// The worker is done with the job: sends the written result, if any, and releases the job. Returns whether there
+    /// was a result. \param may_defer sends it without waking the executor
+    bool finish_run(bool may_defer) noexcept;
+    /// Identifies the job's task.
     [[nodiscard]] const void* task() const noexcept { return work_.get(); }
 
-    /// Whether this thread, which is at a job, may keep its result back; and whether it has.
-    struct at_work {
+    /// The job that this thread runs: whether its result may be deferred, and whether it has been.
+    struct current_run {
         const job_record* job = nullptr;
-        bool may_keep = false;
-        bool kept = false;
+        bool may_defer = false;
+        bool deferred = false;
     };
-    static void set_at_work(at_work* record) noexcept;
+    static void set_current_run(current_run* run) noexcept;
 
-    // -- the worker pool's -----------------------------------------------------------------------------------------
-    enum class place : std::uint8_t { nowhere, queued, at_work };
-    place where = place::nowhere;
-    bool begun = false;
-    std::size_t worker = 0;                           ///< where it is at work
-    std::vector<std::function<void()>> called_back{}; ///< to be run when it is its turn
+    // -- the worker pool -------------------------------------------------------------------------------------------
+    enum class run_state : std::uint8_t { idle, queued, running };
+    run_state state = run_state::idle;
+    bool started = false;
+    std::size_t worker_slot = 0;                        ///< of the worker that runs it
+    std::vector<std::function<void()>> continuations{}; ///< to run at its next turn
 
-    // -- of what keeps the records ---------------------------------------------------------------------------------
-    /// It serves for a new job, with one reference.
-    void open(std::shared_ptr<pool_state> pool);
-    /// Lets go of all that belonged to its job, but for some memory.
+    // -- the owner of the records ----------------------------------------------------------------------------------
+    /// Prepares the record for a new job, with one reference.
+    void open(std::shared_ptr<job_dispatcher> dispatcher);
+    /// Releases what belonged to the job, except for some memory.
     void clear();
-    std::size_t index = 0; ///< among those in use
+    std::size_t index = 0; ///< among the records in use
 
   private:
-    friend open_answers;
-    friend pool_state;
+    friend pending_replies;
+    friend job_dispatcher;
 
-    struct report {
+    struct progress_report {
         double fraction;
         std::string json;
     };
 
     void fail(const std::exception_ptr& thrown);
-    [[nodiscard]] bool claim() noexcept;
-    void forget_on_stop() noexcept;
-    void publish() noexcept;
+    [[nodiscard]] bool claim_answer() noexcept;
+    void drop_on_stop() noexcept;
+    void post_answer() noexcept;
 
-    // -- everybody's -----------------------------------------------------------------------------------------------
+    // -- any thread ------------------------------------------------------------------------------------------------
     std::atomic<int> references_{0};
     std::atomic<bool> answered_{false}; // the thread that sets it writes the result
     std::atomic<bool> stopped_{false};
-    std::atomic<bool> unheard_{false}; // nobody wants its progress
-    std::atomic<bool> listens_{false}; // to be told that it is stopped
-    brief_mutex mutex_;                // of the next two
-    std::vector<report> reports_;
+    std::atomic<bool> progress_unwanted_{false};
+    std::atomic<bool> has_on_stop_{false};
+    adaptive_mutex mutex_; // of the next two
+    std::vector<progress_report> reports_;
     std::function<void()> on_stop_;
     std::string result_;
     std::optional<errc> failure_;                    // then the result is its message
-    std::optional<std::chrono::milliseconds> retry_; // of a job that refuses
-    bool written_ = false;                           // the worker's own
-    kept_request request_;
-    std::shared_ptr<pool_state> pool_;
+    std::optional<std::chrono::milliseconds> retry_; // of a refusal
+    bool result_written_ = false;                    // used by the worker only
+    owned_request request_;
+    std::shared_ptr<job_dispatcher> dispatcher_;
     std::shared_ptr<const job_work> work_;
 
-    // -- the executor's --------------------------------------------------------------------------------------------
-    std::optional<responder> answer_;
+    // -- the executor ----------------------------------------------------------------------------------------------
+    std::optional<responder> requester_;
     bool awaited_ = false; // neither answered nor stopped
 };
 
-/// The records of a pool's jobs: those in use, and some that wait to be used again. On the service's executor.
-class job_records {
+/// The records of a pool's jobs: those in use, and some spare ones. Used on the service's executor.
+class job_record_pool {
   public:
-    job_records() = default;
-    job_records(const job_records&) = delete;
-    job_records& operator=(const job_records&) = delete;
-    ~job_records() = default;
+    job_record_pool() = default;
+    job_record_pool(const job_record_pool&) = delete;
+    job_record_pool& operator=(const job_record_pool&) = delete;
+    ~job_record_pool() = default;
 
-    /// One for a new job, with one reference.
-    job_record& take(std::shared_ptr<pool_state> pool);
-    /// Nobody holds it any more.
+    /// A record for a new job, with one reference.
+    job_record& acquire(std::shared_ptr<job_dispatcher> dispatcher);
+    /// Takes back a record without references.
     void recycle(job_record& r);
-    /// From now on each ends itself.
-    void disown() noexcept { in_use_.clear(); }
-    void drop_spare() noexcept { spare_.clear(); }
+    /// From now on the records destroy themselves.
+    void detach_all() noexcept { in_use_.clear(); }
+    void free_spare() noexcept { spare_.clear(); }
 
-    /// Those in use, in no order; what is recycled leaves its place to another.
+    /// The records in use, in no particular order: recycling one moves another.
     [[nodiscard]] std::size_t size() const noexcept { return in_use_.size(); }
     [[nodiscard]] job_record& operator[](std::size_t index) const noexcept { return *in_use_[index]; }
 
   private:
     std::vector<std::unique_ptr<job_record>> spare_;
-    std::vector<job_record*> in_use_; // owned; each knows its place here
+    std::vector<job_record*> in_use_; // owned; each knows its index
 };
 
 } // namespace cles::runtime

@@ -6,6 +6,8 @@
 namespace cles::runtime {
 namespace {
 
+constexpr std::size_t max_retained = 16384; // bytes of memory that a record keeps
+
 bool is_same(const identity& a, const identity& b) {
     return a.address == b.address && a.transport == b.transport && a.name == b.name && a.uid == b.uid &&
            a.local == b.local;
@@ -13,30 +15,24 @@ bool is_same(const identity& a, const identity& b) {
 
 } // namespace
 
-std::shared_ptr<const identity> kept_peers::copy_of(const identity& peer) {
-    if (all_.size() > most) {
-        all_.clear();
+std::shared_ptr<const identity> identity_cache::copy_of(const identity& peer) {
+    if (copies_.size() > max_copies) {
+        copies_.clear();
     }
-    auto& kept = all_[&peer];
-    if (!kept || !is_same(*kept, peer)) { // another link may be where one was
-        kept = std::make_shared<identity>(peer);
+    auto& copy = copies_[&peer];
+    if (!copy || !is_same(*copy, peer)) { // another link may be at the address of an earlier one
+        copy = std::make_shared<identity>(peer);
     }
-    return kept;
+    return copy;
 }
 
-namespace {
-
-constexpr std::size_t roomy = 16384;
-
-} // namespace
-
-void kept_request::keep(const request& what, std::shared_ptr<const identity> peer) {
+void owned_request::assign(const request& what, std::shared_ptr<const identity> peer) {
     auto size = what.node().size() + what.task().size() + what.body().size();
     for (const auto p : what.parameters()) {
         size += p.size();
     }
     text_.clear();
-    text_.reserve(size); // the views must stay
+    text_.reserve(size); // views refer to it
     const auto copy = [this](std::string_view part) {
         const auto at = text_.size();
         text_.append(part);
@@ -56,10 +52,10 @@ void kept_request::keep(const request& what, std::shared_ptr<const identity> pee
     data_.deadline = what.deadline();
 }
 
-void kept_request::clear() {
+void owned_request::clear() {
     peer_.reset();
     data_ = {};
-    if (text_.capacity() > roomy) {
+    if (text_.capacity() > max_retained) {
         text_ = {};
     }
 }

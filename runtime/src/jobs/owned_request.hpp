@@ -14,26 +14,26 @@
 
 namespace cles::runtime {
 
-/// Copies of the identities of those who ask, which all jobs of one share: a job may outlive the link that it came by.
-class kept_peers {
+/// Copies of the requesters' identities. All jobs of one requester share a copy, which may outlive the link.
+class identity_cache {
   public:
     [[nodiscard]] std::shared_ptr<const identity> copy_of(const identity& peer);
 
   private:
-    static constexpr std::size_t most = 1024;
-    boost::unordered_flat_map<const identity*, std::shared_ptr<const identity>> all_;
+    static constexpr std::size_t max_copies = 1024;
+    boost::unordered_flat_map<const identity*, std::shared_ptr<const identity>> copies_;
 };
 
-/// A request's own copy in memory that is used again for the next one.
-class kept_request {
+/// A copy of a request, in memory that is reused for the next one.
+class owned_request {
   public:
-    kept_request() = default;
-    kept_request(const kept_request&) = delete;
-    kept_request& operator=(const kept_request&) = delete;
+    owned_request() = default;
+    owned_request(const owned_request&) = delete;
+    owned_request& operator=(const owned_request&) = delete;
 
-    /// `peer` is the request's own, in memory that stays.
-    void keep(const request& what, std::shared_ptr<const identity> peer);
-    /// Forgets what is large, so that one big request does not fill memory for good.
+    /// \param peer a copy of the identity of the request's peer
+    void assign(const request& what, std::shared_ptr<const identity> peer);
+    /// Frees the memory of a large request, so that it is not held for ever.
     void clear();
     [[nodiscard]] const request& get() const noexcept { return request_; }
 

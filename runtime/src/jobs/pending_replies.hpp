@@ -8,32 +8,32 @@
 
 namespace cles::runtime {
 
-/// Those who wait for the answers of jobs: each is answered once, and told of progress until then. On the service's
-/// executor.
-class open_answers {
+/// The requests that wait for the replies of jobs: each gets one reply, and progress reports until then. Used on the
+/// service's executor.
+class pending_replies {
   public:
-    open_answers() = default;
-    open_answers(const open_answers&) = delete;
-    open_answers& operator=(const open_answers&) = delete;
-    ~open_answers() = default;
+    pending_replies() = default;
+    pending_replies(const pending_replies&) = delete;
+    pending_replies& operator=(const pending_replies&) = delete;
+    ~pending_replies() = default;
 
     void add(job_record& r, responder to);
-    /// Answers with what the job has left in its record. False where nobody waits.
-    bool give(job_record& r);
-    void tell_progress(job_record& r);
-    /// Nobody waits any more: answered in another way, or gone.
-    void conclude(job_record& r);
-    /// The job has been told to stop, and is not waited for, though its requester may still be answered.
-    void give_up(job_record& r) noexcept;
+    /// Replies with the result in the job's record. False if no request waits for it.
+    bool send(job_record& r);
+    void send_progress(job_record& r);
+    /// The request has been answered in another way, or has been withdrawn.
+    void remove(job_record& r);
+    /// The job has been told to stop: its end is not awaited any more, but its request may still be answered.
+    void stop_awaiting(job_record& r) noexcept;
 
     [[nodiscard]] std::size_t size() const noexcept { return size_; }
-    /// How many have neither been answered nor given up.
+    /// How many jobs have neither answered nor been told to stop.
     [[nodiscard]] std::size_t awaited() const noexcept { return awaited_; }
 
   private:
     std::size_t size_ = 0;
     std::size_t awaited_ = 0;
-    std::vector<job_record::report> reports_; // while they are told
+    std::vector<job_record::progress_report> reports_; // while they are sent
 };
 
 } // namespace cles::runtime

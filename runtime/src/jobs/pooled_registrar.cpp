@@ -9,16 +9,16 @@
 namespace cles::runtime {
 namespace {
 
-/// Tells the pool how long it lived, whatever is thrown meanwhile.
-class stopwatch {
+/// Reports its own lifetime to the dispatcher, even if an exception passes.
+class inline_timer {
   public:
-    stopwatch(pool_state& tells, std::string_view task) noexcept : tells_(tells), task_(task) {}
-    stopwatch(const stopwatch&) = delete;
-    stopwatch& operator=(const stopwatch&) = delete;
-    ~stopwatch() { tells_.note_inline(task_, std::chrono::steady_clock::now() - begun_); }
+    inline_timer(job_dispatcher& dispatcher, std::string_view task) noexcept : dispatcher_(dispatcher), task_(task) {}
+    inline_timer(const inline_timer&) = delete;
+    inline_timer& operator=(const inline_timer&) = delete;
+    ~inline_timer() { dispatcher_.record_inline_call(task_, std::chrono::steady_clock::now() - begun_); }
 
   private:
-    pool_state& tells_;
+    job_dispatcher& dispatcher_;
     std::string_view task_;
     std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
 };
@@ -44,14 +44,14 @@ void pooled_registrar::add(registration task) {
 
 void pooled_registrar::add_inline(registration task) {
     if (task.plain) {
-        task.plain = [handler = std::move(task.plain), state = state_](const request& r, json_writer& w) {
-            const stopwatch timed{*state, r.task()};
+        task.plain = [handler = std::move(task.plain), dispatcher = dispatcher_](const request& r, json_writer& w) {
+            const inline_timer timed{*dispatcher, r.task()};
             handler(r, w);
         };
     }
     if (task.async) {
-        task.async = [handler = std::move(task.async), state = state_](const request& r, responder answer) {
-            const stopwatch timed{*state, r.task()};
+        task.async = [handler = std::move(task.async), dispatcher = dispatcher_](const request& r, responder answer) {
+            const inline_timer timed{*dispatcher, r.task()};
             handler(r, std::move(answer));
         };
     }
@@ -60,9 +60,9 @@ void pooled_registrar::add_inline(registration task) {
 
 void pooled_registrar::add_work(cles::verb verb, std::string task, task_info info, job_work work) {
     registration entry{.verb = verb, .task = std::move(task), .info = std::move(info)};
-    entry.async = [state = state_, work = std::make_shared<const job_work>(std::move(work))](const request& r,
-                                                                                             responder answer) {
-        state->submit({.what = r, .answer = std::move(answer), .work = work});
+    entry.async = [dispatcher = dispatcher_,
+                   work = std::make_shared<const job_work>(std::move(work))](const request& r, responder answer) {
+        dispatcher->submit({.what = r, .answer = std::move(answer), .work = work});
     };
     host_.add(std::move(entry));
 }

@@ -17,36 +17,36 @@ namespace {
 
 using steady = std::chrono::steady_clock;
 
-constexpr std::chrono::milliseconds least_patience{1};
+constexpr std::chrono::milliseconds min_patience{1};
 
 } // namespace
 
-struct stop_notifier::inside : std::enable_shared_from_this<inside> {
-    // A call that is under way.
+struct stop_notifier::state : std::enable_shared_from_this<state> {
+    // A call that is running.
     struct call {
         notice what;
         steady::time_point begun = steady::now();
-        bool blocks = false; // another thread has taken over
+        bool blocks = false; // another thread has replaced it
     };
 
-    explicit inside(std::chrono::milliseconds most_patience) : patience(most_patience) {}
+    explicit state(std::chrono::milliseconds max_patience) : patience(max_patience) {}
 
-    // The more calls block, the sooner the next one counts as blocking: together they delay the others by no more than
-    // some tens of milliseconds.
+    // The more calls block, the sooner the next one counts as blocking, so that together they delay the others by some
+    // tens of milliseconds at most.
     [[nodiscard]] steady::time_point due() const {
-        return current->begun + std::max(patience / (1U << std::min<std::size_t>(blocked, 16)), least_patience);
+        return current->begun + std::max(patience / (1U << std::min<std::size_t>(blocked, 16)), min_patience);
     }
 
-    // With the lock. A thread to make calls, or to take over from the one that does.
+    // With the lock. Adds a thread that makes calls, or replaces the one that does.
     void add_thread() {
-        if (ended || working >= most_threads) {
+        if (ended || working >= max_threads) {
             return;
         }
         try {
             if (threads.count() <= working) {
                 threads.add();
             }
-        } catch (const std::system_error&) { // those that are there have to do
+        } catch (const std::system_error&) { // the existing threads have to suffice
             return;
         }
         ++working;
@@ -56,10 +56,10 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
             }
         });
     }
-    // With the lock: whether somebody waits for the call that is under way.
+    // With the lock. Whether anything waits for the call that is running.
     [[nodiscard]] bool is_awaited() const { return !waiting.empty() || (ending && current != nullptr); }
-    // With the lock: one makes the calls, and one waits whether it is blocked.
-    void see_to_threads() {
+    // With the lock. One thread makes the calls, and one watches whether it blocks.
+    void ensure_threads() {
         const std::size_t wanted = blocked + (is_awaited() ? 1 : 0) + (current == nullptr ? 0 : 1);
         while (working < wanted) {
             const auto before = working;
@@ -80,7 +80,7 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
             } else if (steady::now() < due()) {
                 changed.wait_until(lock, due());
             } else {
-                take_over(lock);
+                replace_blocked(lock);
             }
         }
         --working;
@@ -91,12 +91,12 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
         waiting.pop_front();
         current = mine;
         ++calls;
-        see_to_threads();
+        ensure_threads();
         lock.unlock();
         try {
             mine->what.callback();
         } catch (...) {
-            log(*mine, log_level::warning, "a job threw when it was told to stop");
+            log(*mine, log_level::warning, "its on_stop callback threw");
         }
         mine->what.callback = nullptr;
         lock.lock();
@@ -111,14 +111,14 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
         changed.notify_all();
     }
 
-    void take_over(std::unique_lock<std::mutex>& lock) {
+    void replace_blocked(std::unique_lock<std::mutex>& lock) {
         const auto slow = std::exchange(current, nullptr);
         slow->blocks = true;
         ++blocked;
-        see_to_threads();
+        ensure_threads();
         changed.notify_all();
         const auto blocked_threads = blocked;
-        const bool last = blocked + 1 >= most_threads && !std::exchange(exhausted, true);
+        const bool last = blocked + 1 >= max_threads && !std::exchange(exhausted, true);
         lock.unlock();
         log(*slow, log_level::warning, "its on_stop callback does not return; another thread notifies the other jobs");
         if (last) {
@@ -139,55 +139,55 @@ struct stop_notifier::inside : std::enable_shared_from_this<inside> {
     std::mutex mutex;
     std::condition_variable changed;
     std::deque<notice> waiting;
-    std::shared_ptr<call> current; // for which the others wait; null: the next thread may begin the next call
+    std::shared_ptr<call> current; // the call that is running; null: the next thread makes the next call
     std::size_t working = 0;       // threads in `work`
-    std::size_t calls = 0;         // under way, those that block too
+    std::size_t calls = 0;         // running, including those that block
     std::size_t blocked = 0;
-    bool exhausted = false; // which has been reported, and is not again before all of them have returned
+    bool exhausted = false; // reported, and not again until all have returned
     bool ending = false;
     bool ended = false;
 };
 
-stop_notifier::stop_notifier(std::chrono::milliseconds patience) : inside_(std::make_shared<inside>(patience)) {}
+stop_notifier::stop_notifier(std::chrono::milliseconds patience) : state_(std::make_shared<state>(patience)) {}
 
-stop_notifier::~stop_notifier() { end(std::chrono::milliseconds{0}); }
+stop_notifier::~stop_notifier() { close(std::chrono::milliseconds{0}); }
 
 bool stop_notifier::notify(notice what) {
-    auto& in = *inside_;
-    const std::lock_guard lock{in.mutex};
-    if (in.ended) {
+    auto& s = *state_;
+    const std::lock_guard lock{s.mutex};
+    if (s.ended) {
         return false;
     }
-    in.waiting.push_back(std::move(what));
-    in.see_to_threads();
-    in.changed.notify_all();
+    s.waiting.push_back(std::move(what));
+    s.ensure_threads();
+    s.changed.notify_all();
     return true;
 }
 
-std::size_t stop_notifier::end(std::chrono::milliseconds limit) {
-    auto& in = *inside_;
+std::size_t stop_notifier::close(std::chrono::milliseconds limit) {
+    auto& s = *state_;
     const auto begun = steady::now();
     const auto end = begun + limit;
-    std::deque<notice> never;
+    std::deque<notice> dropped;
     std::size_t busy = 0;
     {
-        std::unique_lock lock{in.mutex};
-        if (in.ended) {
+        std::unique_lock lock{s.mutex};
+        if (s.ended) {
             return 0;
         }
-        in.ending = true;
-        in.see_to_threads(); // which find out whether the last call blocks, too
-        in.changed.notify_all();
-        in.changed.wait_until(lock, end, [&] { return in.waiting.empty() && in.calls == 0; });
-        in.changed.wait_until(lock, begun + last_moment, [&] { return in.waiting.empty() && in.calls == in.blocked; });
-        never.swap(in.waiting);
-        in.ended = true;
-        busy = in.calls;
-        in.changed.notify_all();
+        s.ending = true;
+        s.ensure_threads(); // so that a last call that blocks is noticed too
+        s.changed.notify_all();
+        s.changed.wait_until(lock, end, [&] { return s.waiting.empty() && s.calls == 0; });
+        s.changed.wait_until(lock, begun + min_close_time, [&] { return s.waiting.empty() && s.calls == s.blocked; });
+        dropped.swap(s.waiting);
+        s.ended = true;
+        busy = s.calls;
+        s.changed.notify_all();
     }
-    never.clear();
+    dropped.clear();
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - steady::now());
-    return in.threads.stop(std::max(left, std::chrono::milliseconds{0}), busy);
+    return s.threads.stop(std::max(left, std::chrono::milliseconds{0}), busy);
 }
 
 } // namespace cles::runtime

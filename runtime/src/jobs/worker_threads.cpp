@@ -8,14 +8,13 @@
 #include <vector>
 
 namespace cles::runtime {
-
 namespace {
 
-constexpr std::chrono::seconds most_to_wake{1};
+constexpr std::chrono::seconds idle_stop_limit{1};
 
 } // namespace
 
-struct worker_threads::inside {
+struct worker_threads::state {
     struct worker {
         std::thread thread;
         bool ended = false;
@@ -28,7 +27,7 @@ struct worker_threads::inside {
     std::size_t running = 0;
 };
 
-worker_threads::worker_threads(std::size_t count) : inside_(std::make_shared<inside>()) {
+worker_threads::worker_threads(std::size_t count) : state_(std::make_shared<state>()) {
     try {
         for (std::size_t i = 0; i < count; ++i) {
             add();
@@ -42,43 +41,43 @@ worker_threads::worker_threads(std::size_t count) : inside_(std::make_shared<ins
 worker_threads::~worker_threads() { stop(std::chrono::milliseconds{0}, count()); }
 
 void worker_threads::add() {
-    const std::lock_guard lock{inside_->mutex};
-    auto made = std::make_unique<inside::worker>();
-    made->thread = std::thread{[self = inside_, mine = made.get()] {
+    const std::lock_guard lock{state_->mutex};
+    auto made = std::make_unique<state::worker>();
+    made->thread = std::thread{[self = state_, mine = made.get()] {
         self->pool.attach();
         const std::lock_guard ending{self->mutex};
         mine->ended = true;
         --self->running;
         self->one_ended.notify_all();
     }};
-    inside_->workers.push_back(std::move(made));
-    ++inside_->running;
+    state_->workers.push_back(std::move(made));
+    ++state_->running;
 }
 
 std::size_t worker_threads::count() const noexcept {
-    const std::lock_guard lock{inside_->mutex};
-    return inside_->workers.size();
+    const std::lock_guard lock{state_->mutex};
+    return state_->workers.size();
 }
 
 boost::asio::thread_pool::executor_type worker_threads::get_executor() const noexcept {
-    return inside_->pool.get_executor();
+    return state_->pool.get_executor();
 }
 
 std::size_t worker_threads::stop(std::chrono::milliseconds limit, std::size_t busy) {
-    inside_->pool.stop();
-    std::unique_lock lock{inside_->mutex};
-    const auto all_ended = [this] { return inside_->running == 0; };
+    state_->pool.stop();
+    std::unique_lock lock{state_->mutex};
+    const auto all_ended = [this] { return state_->running == 0; };
     if (limit == std::chrono::milliseconds::max()) {
-        inside_->one_ended.wait(lock, all_ended);
+        state_->one_ended.wait(lock, all_ended);
     } else {
-        inside_->one_ended.wait_for(lock, limit, all_ended);
-        // Those that run nothing take a moment too.
-        inside_->one_ended.wait_for(lock, most_to_wake, [&] { return inside_->running <= busy; });
+        state_->one_ended.wait_for(lock, limit, all_ended);
+        // Idle threads take a moment too.
+        state_->one_ended.wait_for(lock, idle_stop_limit, [&] { return state_->running <= busy; });
     }
-    // A thread that goes on finds its mark as long as it lives: it holds what the list is in.
+    // An abandoned thread can still set its `ended`: it shares the state.
     std::vector<std::thread> ended;
     std::size_t left = 0;
-    for (const auto& w : inside_->workers) {
+    for (const auto& w : state_->workers) {
         if (!w->thread.joinable()) {
             continue;
         }

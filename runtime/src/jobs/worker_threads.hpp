@@ -9,8 +9,8 @@
 
 namespace cles::runtime {
 
-/// Threads that run what is posted to their `asio::thread_pool`, to which each attaches itself; so that one can be
-/// added at any time, and one that never comes back can be left behind, which a thread pool's own threads cannot.
+/// Threads that attach themselves to an `asio::thread_pool`, and run what is posted to it. Unlike the thread pool's own
+/// threads, further ones can be added at any time, and one that does not return can be abandoned.
 class worker_threads {
   public:
     explicit worker_threads(std::size_t count);
@@ -18,18 +18,19 @@ class worker_threads {
     worker_threads& operator=(const worker_threads&) = delete;
     ~worker_threads();
 
-    /// \throws std::system_error where the system has no more threads to give
+    /// \throws std::system_error if the system has no more threads
     void add();
     [[nodiscard]] std::size_t count() const noexcept;
     [[nodiscard]] boost::asio::thread_pool::executor_type get_executor() const noexcept;
 
-    /// Runs nothing more, and waits so long for what runs, of which `busy` may take longer than that. Returns how many
-    /// threads still run something; they are left to themselves, with what they need. Not from one of them.
+    /// Starts nothing more, and waits up to the limit for the running functions, of which `busy` may take longer.
+    /// Returns how many threads still run something; they are abandoned, with everything they need. Not to be called by
+    /// one of them.
     std::size_t stop(std::chrono::milliseconds limit, std::size_t busy = 0);
 
   private:
-    struct inside;
-    std::shared_ptr<inside> inside_;
+    struct state;
+    std::shared_ptr<state> state_;
 };
 
 } // namespace cles::runtime

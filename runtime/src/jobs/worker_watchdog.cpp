@@ -5,26 +5,26 @@
 
 namespace cles::runtime {
 
-worker_watch::worker_watch(std::size_t workers, std::size_t replacements, std::chrono::nanoseconds grace)
-    : workers_(workers), replacements_(replacements), grace_(grace), places_(workers + replacements) {}
+worker_watchdog::worker_watchdog(std::size_t workers, std::size_t replacements, std::chrono::nanoseconds grace)
+    : workers_(workers), replacements_(replacements), grace_(grace), slots_(workers + replacements) {}
 
-std::size_t worker_watch::enter() {
-    const auto free = std::find_if(places_.begin(), places_.end(), [](const worker& w) { return !w.inside; });
-    *free = {.inside = true};
-    return static_cast<std::size_t>(free - places_.begin());
+std::size_t worker_watchdog::enter() {
+    const auto free = std::find_if(slots_.begin(), slots_.end(), [](const worker& w) { return !w.in_use; });
+    *free = {.in_use = true};
+    return static_cast<std::size_t>(free - slots_.begin());
 }
 
-void worker_watch::leave(std::size_t place) noexcept { places_[place].inside = false; }
+void worker_watchdog::leave(std::size_t slot) noexcept { slots_[slot].in_use = false; }
 
-void worker_watch::begin(std::size_t place, const void* job, time_point now, time_point deadline) noexcept {
-    auto& w = places_[place];
+void worker_watchdog::begin(std::size_t slot, const void* job, time_point now, time_point deadline) noexcept {
+    auto& w = slots_[slot];
     w.job = job;
     w.since = now;
     w.due = deadline;
 }
 
-bool worker_watch::end(std::size_t place) noexcept {
-    auto& w = places_[place];
+bool worker_watchdog::end(std::size_t slot) noexcept {
+    auto& w = slots_[slot];
     w.job = nullptr;
     if (!w.stuck) {
         return false;
@@ -35,20 +35,20 @@ bool worker_watch::end(std::size_t place) noexcept {
     return true;
 }
 
-void worker_watch::stop(std::size_t place, const void* job, time_point now) noexcept {
-    auto& w = places_[place];
+void worker_watchdog::stop(std::size_t slot, const void* job, time_point now) noexcept {
+    auto& w = slots_[slot];
     if (w.job == job) {
         w.due = std::min(w.due, now);
     }
 }
 
-worker_watch::finding worker_watch::give_up(std::size_t place, time_point now) noexcept {
-    auto& w = places_[place];
+worker_watchdog::stuck_worker worker_watchdog::mark_stuck(std::size_t slot, time_point now) noexcept {
+    auto& w = slots_[slot];
     w.stuck = true;
     ++stuck_;
     w.replaced = replaced_ < replacements_;
     replaced_ += w.replaced ? 1 : 0;
-    return {.place = place, .job = w.job, .busy_for = now - w.since, .replaced = w.replaced};
+    return {.slot = slot, .job = w.job, .busy_for = now - w.since, .replaced = w.replaced};
 }
 
 } // namespace cles::runtime

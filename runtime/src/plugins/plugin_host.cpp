@@ -19,10 +19,9 @@
 namespace cles::runtime {
 namespace {
 
-// All hosts' plugins, kept until the process ends, in whatever order the hosts go. A host's destructor cannot know
-// whether a plugin is at rest.
+// Keeps the plugins of all hosts until the process ends, because a host cannot know whether a plugin is idle.
 template <class T>
-void keep_for_ever(T kept) {
+void keep_forever(T kept) {
     static std::mutex mutex;
     static auto* const all = new std::vector<T>;
     const std::scoped_lock lock{mutex};
@@ -33,12 +32,12 @@ void keep_for_ever(T kept) {
 
 struct plugin_host::state {
     plugin_jobs jobs;
-    stop_notifier notifier; ///< for jobs in line; a pool has its own
+    stop_notifier notifier; ///< for inline jobs; a pool has its own
     std::vector<std::unique_ptr<loaded_plugin>> plugins;
     std::vector<boost::dll::shared_library> libraries;
-    std::vector<const cles_plugin*> descriptions; ///< of those that were loaded, to know one again
+    std::vector<const cles_plugin*> descriptions; ///< of the loaded ones, to detect duplicates
 
-    // Of the thread that stops them.
+    // Used by the thread that stops them.
     std::mutex mutex;
     std::condition_variable changed;
     bool all_stopped = false;
@@ -47,7 +46,7 @@ struct plugin_host::state {
 
 plugin_host::plugin_host(plugin_host_options options)
     : options_(std::move(options)), state_(std::make_shared<state>()) {
-    keep_for_ever(state_);
+    keep_forever(state_);
 }
 
 plugin_host::~plugin_host() { stop(std::chrono::seconds{2}); }
@@ -60,7 +59,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
     auto library = open_library(path, file);
     const auto& described = describe_plugin(path, library);
     if (std::find(state_->descriptions.begin(), state_->descriptions.end(), &described) != state_->descriptions.end()) {
-        throw plugin_error(path, "it is loaded already");
+        throw plugin_error(path, "it is already loaded");
     }
     auto owned = std::make_unique<loaded_plugin>(detail::known_part(&described), options_.node, state_->jobs,
                                                  state_->notifier, options_.log);
@@ -69,7 +68,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
     state_->plugins.push_back(std::move(owned));
     state_->descriptions.push_back(&described);
 
-    const auto taken = [this](cles::verb verb, std::string_view task) -> std::optional<std::string> {
+    const auto owner_of = [this](cles::verb verb, std::string_view task) -> std::optional<std::string> {
         const auto wanted = std::string{to_string(verb)} + " " + std::string{task};
         for (const auto& p : plugins_) {
             if (std::find(p.tasks.begin(), p.tasks.end(), wanted) != p.tasks.end()) {
@@ -78,7 +77,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
         }
         return std::nullopt;
     };
-    if (const auto refused = plugin.start(config, into.make_publisher(), taken)) {
+    if (const auto refused = plugin.start(config, into.make_publisher(), owner_of)) {
         throw plugin_error(path, refused->why, refused->setting);
     }
     plugin_info info{.path = path, .name = plugin.name(), .version = plugin.version()};
@@ -88,7 +87,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
             into.add(std::move(task));
         }
     } catch (const error& e) {
-        // Those registered before are answered `unavailable` from now on.
+        // Tasks that were registered are answered `unavailable` from now on.
         plugin.close();
         plugin.stop();
         throw plugin_error(path, e.what());
@@ -97,7 +96,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
 }
 
 plugin_figures plugin_host::figures() const {
-    return {.jobs = state_->jobs.size(), .answered_twice = state_->jobs.unknown()};
+    return {.jobs = state_->jobs.size(), .answered_twice = state_->jobs.unknown_answers()};
 }
 
 plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {
@@ -107,17 +106,17 @@ plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {
     for (const auto& plugin : state_->plugins) {
         plugin->close();
     }
-    auto told =
+    auto callbacks =
         state_->jobs.close([&](const responder& to) { to.fail(errc::unavailable, options_.node + " has stopped"); });
-    for (auto& callback : told) {
+    for (auto& callback : callbacks) {
         if (callback) {
             state_->notifier.notify({.callback = std::move(callback)});
         }
     }
-    // A plugin's code may take its time, or never return: it runs where nobody has to wait for it.
+    // On a thread of its own, because a plugin may take long, or never return.
     std::thread{[state = state_, limit] {
         const auto left_behind =
-            state->notifier.end(limit / 2); // one that blocks does not keep the plugins from stopping
+            state->notifier.close(limit / 2); // a callback that blocks must not prevent the plugins from stopping
         {
             const std::scoped_lock lock{state->mutex};
             state->callbacks_left = left_behind;
@@ -136,7 +135,7 @@ plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {
         if (!plugin->has_stopped()) {
             report.late.push_back(plugin->name());
         }
-        plugin->silence(); // the owner of the log may go before a plugin that does not end
+        plugin->disable_log(); // the log may be destroyed before a plugin that does not end
     }
     return report;
 }

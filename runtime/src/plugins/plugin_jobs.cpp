@@ -1,15 +1,28 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "plugins/plugin_jobs.hpp"
 
+#include <cles/plugin_text.hpp>
+
 #include <boost/asio/post.hpp>
+
+#include <string>
 
 namespace cles::runtime {
 namespace {
 
-// Posts the use of a responder, which is let go of there too.
+// Posts the use of a responder, which is released there, too.
 void post_to(responder to, std::function<void(const responder&)> use) {
     const auto executor = to.get_executor();
     boost::asio::post(executor, [to = std::move(to), use = std::move(use)] { use(to); });
+}
+
+// \param name of the error, as static text
+void deliver(decltype(cles_ask::answered) call, void* user, std::string_view name, std::string_view json,
+             std::string_view message) noexcept {
+    try {
+        call(user, detail::abi_text(name), detail::abi_text(json), detail::abi_text(message));
+    } catch (...) { // ignore errors of the plugin
+    }
 }
 
 } // namespace
@@ -20,7 +33,7 @@ plugin_callback::~plugin_callback() {
     if (drop_ != nullptr) {
         try {
             drop_(user_);
-        } catch (...) { // a plugin's mistake is not ours
+        } catch (...) { // ignore errors of the plugin
         }
     }
 }
@@ -29,14 +42,14 @@ void plugin_callback::operator()() {
     if (const auto call = std::exchange(call_, nullptr); call != nullptr) {
         try {
             call(user_);
-        } catch (...) { // as above
+        } catch (...) { // ignore errors of the plugin
         }
     }
 }
 
 // -- handles -------------------------------------------------------------------------------------------------------
 
-// A handle is a slot's number and generation, so that an old one does not fit the slot's next job.
+// A handle consists of a slot's number and generation, so that an old handle is invalid for the slot's next job.
 plugin_jobs::slot* plugin_jobs::find(id job) noexcept {
     return const_cast<slot*>(std::as_const(*this).find(job)); // NOLINT(cppcoreguidelines-pro-type-const-cast)
 }
@@ -52,7 +65,7 @@ const plugin_jobs::slot* plugin_jobs::find(id job) const noexcept {
 
 plugin_jobs::id plugin_jobs::open(responder answer) {
     const std::scoped_lock lock{mutex_};
-    if (closed_ || open_ >= most) {
+    if (closed_ || open_ >= max_open) {
         return 0;
     }
     if (free_.empty()) {
@@ -63,11 +76,11 @@ plugin_jobs::id plugin_jobs::open(responder answer) {
     free_.pop_back();
     auto& s = slots_[index];
     if (++s.generation == 0) {
-        s.generation = 1; // 0 would make the handle 0 in the first slot
+        s.generation = 1; // avoids the handle 0
     }
     s.stopped = false;
-    s.anywhere = answer.is_thread_safe();
-    s.starter = std::this_thread::get_id();
+    s.thread_safe = answer.is_thread_safe();
+    s.starting_thread = std::this_thread::get_id();
     s.answer.emplace(std::move(answer));
     ++open_;
     return (static_cast<id>(s.generation) << 32U) | index;
@@ -76,7 +89,7 @@ plugin_jobs::id plugin_jobs::open(responder answer) {
 void plugin_jobs::started(id job) {
     const std::scoped_lock lock{mutex_};
     if (auto* s = find(job)) {
-        s->starter = {};
+        s->starting_thread = {};
     }
 }
 
@@ -88,9 +101,9 @@ plugin_jobs::slot plugin_jobs::release(id job) {
     return out;
 }
 
-// -- what a plugin says --------------------------------------------------------------------------------------------
+// -- use of the responders -----------------------------------------------------------------------------------------
 
-std::optional<responder> plugin_jobs::take_here(id job) {
+std::optional<responder> plugin_jobs::take_if_direct(id job) {
     slot gone;
     const std::scoped_lock lock{mutex_};
     if (const auto* s = find(job); s != nullptr && is_direct(*s)) {
@@ -105,13 +118,13 @@ bool plugin_jobs::finish(id job, std::function<void(const responder&)> answer) {
         const std::scoped_lock lock{mutex_};
         const auto* s = find(job);
         if (s == nullptr) {
-            ++unknown_;
+            ++unknown_answers_;
             return false;
         }
         const bool direct = is_direct(*s);
         gone = release(job);
         if (!direct) {
-            // With the lock: once `close` returns, nobody posts to an executor that may be gone.
+            // With the lock, so that nothing is posted after `close` to an executor that may be gone.
             post_to(*std::exchange(gone.answer, std::nullopt), std::move(answer));
             return true;
         }
@@ -141,12 +154,12 @@ bool plugin_jobs::use(id job, std::function<void(const responder&)> use) {
 bool plugin_jobs::stopped(id job) const {
     const std::scoped_lock lock{mutex_};
     const auto* s = find(job);
-    return s == nullptr || s->stopped || (s->anywhere && s->answer->stopped());
+    return s == nullptr || s->stopped || (s->thread_safe && s->answer->stopped());
 }
 
 void plugin_jobs::on_stop(id job, plugin_callback callback) {
     shared_callback wanted{std::move(callback)};
-    shared_callback replaced; // goes without the lock
+    shared_callback replaced; // destroyed without the lock
     std::optional<responder> by;
     {
         const std::scoped_lock lock{mutex_};
@@ -155,12 +168,12 @@ void plugin_jobs::on_stop(id job, plugin_callback callback) {
             return;
         }
         if (!s->stopped) {
-            if (s->anywhere) {
+            if (s->thread_safe) {
                 by = s->answer;
             }
             replaced = std::exchange(s->on_stop, wanted);
             if (!by) {
-                wanted = {}; // `stop` hands it out
+                wanted = {}; // `stop` returns it
             }
         }
     }
@@ -181,7 +194,7 @@ shared_callback plugin_jobs::stop(id job) {
     return std::exchange(s->on_stop, {});
 }
 
-// -- the end -------------------------------------------------------------------------------------------------------
+// -- close ---------------------------------------------------------------------------------------------------------
 
 std::vector<shared_callback> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
     std::vector<slot> gone;
@@ -194,12 +207,12 @@ std::vector<shared_callback> plugin_jobs::close(const std::function<void(const r
             }
         }
     }
-    std::vector<shared_callback> told;
+    std::vector<shared_callback> callbacks;
     for (auto& s : gone) {
         answer(*s.answer);
-        told.push_back(std::move(s.on_stop));
+        callbacks.push_back(std::move(s.on_stop));
     }
-    return told;
+    return callbacks;
 }
 
 std::size_t plugin_jobs::size() const {
@@ -207,9 +220,46 @@ std::size_t plugin_jobs::size() const {
     return open_;
 }
 
-std::uint64_t plugin_jobs::unknown() const {
+std::uint64_t plugin_jobs::unknown_answers() const {
     const std::scoped_lock lock{mutex_};
-    return unknown_;
+    return unknown_answers_;
+}
+
+// -- requests ------------------------------------------------------------------------------------------------------
+
+plugin_request::plugin_request(const cles_ask& ask, deferred_call call_later)
+    : answered_(ask.answered), progress_(ask.progress), user_(ask.user), call_later_(std::move(call_later)),
+      sending_thread_(std::this_thread::get_id()) {}
+
+plugin_request::~plugin_request() { complete(errc::unavailable, "{}", "the node has stopped"); }
+
+void plugin_request::complete(boost::system::error_code code, std::string_view json,
+                              std::string_view message) noexcept {
+    if (completed_.exchange(true) || answered_ == nullptr) {
+        return;
+    }
+    const auto name =
+        !code ? std::string_view{}
+              : wire_name(code.category() == error_category() ? static_cast<errc>(code.value()) : errc::unavailable);
+    const auto result = code ? std::string_view{"{}"} : json;
+    try {
+        if (sending_thread_.load() == std::this_thread::get_id()) {
+            call_later_([call = answered_, user = user_, name, result = std::string{result},
+                         text = std::string{message}] { deliver(call, user, name, result, text); });
+            return;
+        }
+    } catch (...) { // no memory or no thread: better now than never
+    }
+    deliver(answered_, user_, name, result, message);
+}
+
+void plugin_request::report_progress(double fraction, std::string_view json) noexcept {
+    if (progress_ != nullptr && !completed_) {
+        try {
+            progress_(user_, fraction, detail::abi_text(json));
+        } catch (...) { // ignore errors of the plugin
+        }
+    }
 }
 
 } // namespace cles::runtime

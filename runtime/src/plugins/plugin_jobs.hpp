@@ -3,7 +3,6 @@
 
 #include <cles/error.hpp>
 #include <cles/plugin_abi.h>
-#include <cles/plugin_text.hpp>
 #include <cles/responder.hpp>
 
 #include <atomic>
@@ -21,7 +20,7 @@
 
 namespace cles::runtime {
 
-/// Something that a plugin wants to be called: once or never, and dropped in the end.
+/// A callback of a plugin: called at most once, then dropped.
 class plugin_callback {
   public:
     using function = void (*)(void*);
@@ -46,159 +45,120 @@ class plugin_callback {
     void* user_ = nullptr;
 };
 
-/// A callback that several may call, of whom the first does.
+/// A callback with several holders, of whom only the first call counts.
 class shared_callback {
   public:
     shared_callback() = default;
-    explicit shared_callback(plugin_callback what) : inside_(std::make_shared<inside>(std::move(what))) {}
+    explicit shared_callback(plugin_callback what) : shared_(std::make_shared<shared_state>(std::move(what))) {}
 
     void operator()() const {
-        if (inside_ && !inside_->called.exchange(true)) {
-            inside_->what();
+        if (shared_ && !shared_->called.exchange(true)) {
+            shared_->what();
         }
     }
-    [[nodiscard]] explicit operator bool() const noexcept { return inside_ != nullptr; }
+    [[nodiscard]] explicit operator bool() const noexcept { return shared_ != nullptr; }
 
   private:
-    struct inside {
-        explicit inside(plugin_callback w) : what(std::move(w)) {}
+    struct shared_state {
+        explicit shared_state(plugin_callback w) : what(std::move(w)) {}
         plugin_callback what;
         std::atomic<bool> called{false};
     };
-    std::shared_ptr<inside> inside_;
+    std::shared_ptr<shared_state> shared_;
 };
 
-/// The jobs of plugins that have not been answered, by their handles.
+/// The open jobs of plugins, by their handles.
 ///
-/// What a plugin holds is a number, never a pointer: where it answers twice, or what never was, the number names
-/// nothing, which is counted.
+/// A plugin holds a number, never a pointer: if it answers a job twice, or one that does not exist, the number is
+/// invalid, which is counted.
 ///
-/// A plugin answers from any thread. The responder of a job on a pool of workers is used right there; it knows by
-/// itself whether it is stopped, and has its callback called. That of a job in line belongs to an executor: while a
-/// task's `start` runs, its own thread may use it, as its caller does; from elsewhere, what a plugin says is
-/// posted, and the code that registers the job calls `stop`. All functions may be called from any thread, but for
-/// `close`, which belongs on the executor of all the responders.
+/// A plugin answers from any thread. The responder of a job on a pool of workers is used on that thread; it knows
+/// itself whether it is stopped, and calls the `on_stop` callback. The responder of an inline job belongs to an
+/// executor: while the task's `start` runs, its thread may use it; from other threads the use is posted, and `stop` has
+/// to be called when the job is stopped. All functions may be called from any thread, except for `close`, which has to
+/// be called on the executor of the responders.
 class plugin_jobs {
   public:
     using id = std::uint64_t;
 
-    static constexpr std::size_t most = 65536;
+    static constexpr std::size_t max_open = 65536;
 
-    /// A handle for a request, whose `start` is about to be called in this thread. 0 where there are too many, or after
+    /// A handle for a request whose `start` is about to be called on this thread. 0 if there are too many, or after
     /// `close`.
     id open(responder answer);
     /// `start` has returned.
     void started(id job);
 
-    /// Ends a job where its responder may be used in this thread: the responder. Nothing where it may not, or where
-    /// there is no such job.
-    std::optional<responder> take_here(id job);
-    /// Ends a job: `answer` is called with its responder, once, now or soon. False where there is no such job.
+    /// Ends a job and returns its responder, if this thread may use it. Nothing if it may not, or there is no such job.
+    std::optional<responder> take_if_direct(id job);
+    /// Ends a job: calls `answer` with its responder, once, now or soon. False if there is no such job.
     bool finish(id job, std::function<void(const responder&)> answer);
-    /// Uses the responder of a job, now or soon. False where there is no such job.
+    /// Calls `use` with the responder of a job, now or soon. False if there is no such job.
     bool use(id job, std::function<void(const responder&)> use);
-    /// Whether nobody waits for it.
+    /// Whether its requester does not wait for it any more.
     [[nodiscard]] bool stopped(id job) const;
-    /// Has it called when nobody waits any more; at once where that is so.
+    /// Calls back when the job is stopped; at once if it has been.
     void on_stop(id job, plugin_callback callback);
-    /// Nobody waits any more for this job, which is one in line. What it wanted to be called then is returned: call it
-    /// where it may take its time.
+    /// An inline job is stopped. Returns its `on_stop` callback, to be called on a thread where it may take long.
     [[nodiscard]] shared_callback stop(id job);
 
-    /// Ends all jobs, by `answer`, and has no further ones. What the plugins wanted to be told then is returned: call
-    /// it where it may take its time. After it, nothing is posted.
+    /// Ends all jobs with `answer`, and accepts no more. Returns their `on_stop` callbacks, to be called on a thread
+    /// where they may take long. Nothing is posted after it returns.
     std::vector<shared_callback> close(const std::function<void(const responder&)>& answer);
 
     [[nodiscard]] std::size_t size() const;
-    /// How often a job was answered that was not there.
-    [[nodiscard]] std::uint64_t unknown() const;
+    /// How many answers were for jobs that do not exist (any more).
+    [[nodiscard]] std::uint64_t unknown_answers() const;
 
   private:
     struct slot {
         std::uint32_t generation = 0;
         bool stopped = false;
-        bool anywhere = false; ///< any thread may use the responder
-        std::thread::id starter{};
+        bool thread_safe = false; ///< any thread may use the responder
+        std::thread::id starting_thread{};
         std::optional<responder> answer{};
         shared_callback on_stop{};
     };
     [[nodiscard]] slot* find(id job) noexcept;
     [[nodiscard]] const slot* find(id job) const noexcept;
     [[nodiscard]] static bool is_direct(const slot& s) noexcept {
-        return s.anywhere || s.starter == std::this_thread::get_id();
+        return s.thread_safe || s.starting_thread == std::this_thread::get_id();
     }
-    /// Empties the slot; what it held is to be destroyed without the lock.
+    /// Empties the slot. The returned contents have to be destroyed without the lock.
     slot release(id job);
 
     mutable std::mutex mutex_;
     std::vector<slot> slots_;
     std::vector<std::uint32_t> free_;
     std::size_t open_ = 0;
-    std::uint64_t unknown_ = 0;
+    std::uint64_t unknown_answers_ = 0;
     bool closed_ = false;
 };
 
-/// A request that a plugin's job has sent: the plugin is told the answer exactly once, even where it never comes, and
-/// never from inside the call that asks.
-class plugin_question {
+/// A request that a plugin's job has sent. The plugin gets the answer exactly once, even if it never arrives, and never
+/// during the call that sends the request.
+class plugin_request {
   public:
-    /// Has something called on another thread, soon.
-    using elsewhere = std::function<void(std::function<void()>)>;
+    /// Calls a function soon, on another thread.
+    using deferred_call = std::function<void(std::function<void()>)>;
 
-    plugin_question(const cles_ask& ask, elsewhere later)
-        : answered_(ask.answered), progress_(ask.progress), user_(ask.user), later_(std::move(later)),
-          asking_(std::this_thread::get_id()) {}
-    plugin_question(const plugin_question&) = delete;
-    plugin_question& operator=(const plugin_question&) = delete;
-    ~plugin_question() { answer(errc::unavailable, "{}", "the node has stopped"); }
+    plugin_request(const cles_ask& ask, deferred_call call_later);
+    plugin_request(const plugin_request&) = delete;
+    plugin_request& operator=(const plugin_request&) = delete;
+    ~plugin_request();
 
-    /// The call that asks is about to return: from now on this thread may be told too.
-    void asked() noexcept { asking_ = std::thread::id{}; }
-
-    void answer(boost::system::error_code code, std::string_view json, std::string_view message) noexcept {
-        if (over_.exchange(true) || answered_ == nullptr) {
-            return;
-        }
-        const auto name = !code ? std::string_view{}
-                                : wire_name(code.category() == error_category() ? static_cast<errc>(code.value())
-                                                                                : errc::unavailable);
-        const auto result = code ? std::string_view{"{}"} : json;
-        try {
-            if (asking_.load() == std::this_thread::get_id()) {
-                later_([call = answered_, user = user_, name, result = std::string{result},
-                        words = std::string{message}] { tell(call, user, name, result, words); });
-                return;
-            }
-        } catch (...) { // no memory, no thread: better here than never
-        }
-        tell(answered_, user_, name, result, message);
-    }
-
-    void report(double fraction, std::string_view json) noexcept {
-        if (progress_ != nullptr && !over_) {
-            try {
-                progress_(user_, fraction, detail::abi_text(json));
-            } catch (...) { // as above
-            }
-        }
-    }
+    /// The call that sends the request is about to return: from now on this thread may deliver the answer.
+    void sent() noexcept { sending_thread_ = std::thread::id{}; }
+    void complete(boost::system::error_code code, std::string_view json, std::string_view message) noexcept;
+    void report_progress(double fraction, std::string_view json) noexcept;
 
   private:
-    // \param name of the error; one of those in the table, which stays
-    static void tell(decltype(cles_ask::answered) call, void* user, std::string_view name, std::string_view json,
-                     std::string_view message) noexcept {
-        try {
-            call(user, detail::abi_text(name), detail::abi_text(json), detail::abi_text(message));
-        } catch (...) { // a plugin's mistake is not ours
-        }
-    }
-
     decltype(cles_ask::answered) answered_;
     decltype(cles_ask::progress) progress_;
     void* user_;
-    elsewhere later_;
-    std::atomic<std::thread::id> asking_;
-    std::atomic<bool> over_{false};
+    deferred_call call_later_;
+    std::atomic<std::thread::id> sending_thread_;
+    std::atomic<bool> completed_{false};
 };
 
 } // namespace cles::runtime

@@ -14,20 +14,20 @@ namespace {
 
 using entry_function = const cles_plugin*();
 
-std::string other_version(const boost::dll::shared_library& library) {
-    constexpr unsigned newest_imaginable = 16;
-    for (unsigned version = 2; version <= newest_imaginable; ++version) {
+std::string missing_entry_message(const boost::dll::shared_library& library) {
+    constexpr unsigned max_version = 16;
+    for (unsigned version = 2; version <= max_version; ++version) {
         if (library.has("cles_plugin_v" + std::to_string(version))) {
             return "it was made for version " + std::to_string(version) + " of the plugin ABI, this host has version " +
                    std::to_string(CLES_PLUGIN_ABI_MAJOR);
         }
     }
-    return std::string{"it is no plugin: it has no function '"} + CLES_PLUGIN_ENTRY + "'";
+    return std::string{"it is not a plugin: it has no function '"} + CLES_PLUGIN_ENTRY + "'";
 }
 
 const cles_plugin& call_entry(const std::string& path, const boost::dll::shared_library& library) {
     if (!library.has(CLES_PLUGIN_ENTRY)) {
-        throw plugin_error(path, other_version(library));
+        throw plugin_error(path, missing_entry_message(library));
     }
     const cles_plugin* described = nullptr;
     try {
@@ -35,17 +35,17 @@ const cles_plugin& call_entry(const std::string& path, const boost::dll::shared_
     } catch (const std::exception& e) {
         throw plugin_error(path, std::string{"its entry threw: "} + e.what());
     } catch (...) {
-        throw plugin_error(path, "its entry threw something that is no exception");
+        throw plugin_error(path, "its entry threw something that is not an exception");
     }
     if (described == nullptr) {
-        throw plugin_error(path, "its entry describes nothing");
+        throw plugin_error(path, "its entry returns no description");
     }
     return *described;
 }
 
 void check_version(const std::string& path, const cles_plugin& described) {
     if (described.size < offsetof(cles_plugin, name)) {
-        throw plugin_error(path, "its description is too short to be one");
+        throw plugin_error(path, "its description is too short");
     }
     const auto wanted = std::to_string(described.abi_major) + "." + std::to_string(described.abi_minor);
     if (described.abi_major != CLES_PLUGIN_ABI_MAJOR || described.abi_minor > CLES_PLUGIN_ABI_MINOR) {
@@ -53,9 +53,9 @@ void check_version(const std::string& path, const cles_plugin& described) {
                                      std::to_string(CLES_PLUGIN_ABI_MAJOR) + "." +
                                      std::to_string(CLES_PLUGIN_ABI_MINOR));
     }
-    const std::size_t least = described.abi_minor == 0 ? offsetof(cles_plugin, check) : sizeof(cles_plugin);
-    if (described.size < least || described.start == nullptr) {
-        throw plugin_error(path, "its description lacks what version " + wanted + " of the plugin ABI has");
+    const std::size_t min_size = described.abi_minor == 0 ? offsetof(cles_plugin, check) : sizeof(cles_plugin);
+    if (described.size < min_size || described.start == nullptr) {
+        throw plugin_error(path, "its description lacks members of version " + wanted + " of the plugin ABI");
     }
 }
 

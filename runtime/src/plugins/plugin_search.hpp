@@ -12,11 +12,11 @@
 
 namespace cles::runtime {
 
-/// Why a plugin cannot be used. `what()` begins with its path, as the configuration names it, and says the rest in one
-/// line.
+/// Why a plugin cannot be used. `what()` is one line that begins with the plugin's path as written in the
+/// configuration.
 class plugin_error : public std::runtime_error {
   public:
-    /// \param setting where one of its settings is to blame: that one's key, empty for all of them together
+    /// \param setting the key of the setting that is invalid, if one is; empty for all of them together
     plugin_error(const std::string& path, const std::string& why, std::optional<std::string> setting = std::nullopt)
         : std::runtime_error(path + ": " + why), setting_(std::move(setting)) {}
 
@@ -26,23 +26,22 @@ class plugin_error : public std::runtime_error {
     std::optional<std::string> setting_;
 };
 
-/// The file of a plugin. A path with a folder in it is taken as it is; a bare name is looked for in the folders, in
-/// their order.
-/// \throws plugin_error where there is no such file, naming the folders
+/// The file of a plugin: a path that names a folder is used as it is; a bare name is searched for in the folders, in
+/// order. \throws plugin_error if there is no such file, naming the folders
 std::filesystem::path find_plugin(const std::string& path, const std::vector<std::filesystem::path>& folders);
 
-/// Where this build installs plugins, from the folder of the program: `../lib/cles`, `../lib/x86_64-linux-gnu/cles`.
+/// Where this build installs plugins, relative to the program: `../lib/cles`, `../lib/x86_64-linux-gnu/cles`.
 extern const char* const installed_plugins;
 
-/// Where plugins lie that came with a program: where it was installed, and beside it in the tree that it was built in.
-std::vector<std::filesystem::path> plugin_folders_of(const std::filesystem::path& program,
-                                                     const std::filesystem::path& installed = installed_plugins);
+/// The folders of the plugins that come with a program: where they are installed, and next to it in its build tree.
+std::vector<std::filesystem::path> default_plugin_folders(const std::filesystem::path& program,
+                                                          const std::filesystem::path& installed = installed_plugins);
 
-/// The file of a plugin as the configuration means it: a path with a folder in it that is not absolute begins where the
-/// configuration file is. A bare name stays one.
-std::string plugin_file(const config& setup, const plugin_config& wanted);
+/// The path of a configured plugin: a relative path that names a folder begins at the folder of the configuration file;
+/// a bare name stays one.
+std::string resolve_plugin_path(const config& setup, const plugin_config& wanted);
 
-/// Where bare names are looked for: `plugin_path`, then where plugins lie that came with this program.
-std::vector<std::filesystem::path> plugin_folders(const config& setup);
+/// The folders to search for bare names: `plugin_path`, then those of the plugins that come with this program.
+std::vector<std::filesystem::path> plugin_search_path(const config& setup);
 
 } // namespace cles::runtime

@@ -29,28 +29,29 @@
 namespace cles::runtime {
 namespace {
 
-// How the child ends. No usual numbers: a library that ends the process may choose any, 0 too.
+// The child's exit codes. Unusual numbers, because a library that ends the process may use any, including 0.
 constexpr int usable = 123;
 constexpr int refused = 124;
-constexpr std::size_t most_words = 2000; // the last ones, which tell why it ended
-constexpr std::size_t roomy_pipe = 256 * 1024;
-// The system keeps a report in one piece, and takes it though nobody reads yet.
-constexpr std::size_t longest_report = 2000;
+constexpr std::chrono::seconds trial_limit{10}; // for loading a plugin and its settings check
+constexpr std::size_t max_output = 2000;        // its last bytes, which say why it ended
+constexpr std::size_t max_read = 256 * 1024;
+// Small enough for the pipe to take a report at once, before it is read.
+constexpr std::size_t max_report = 2000;
 
-// What the child is at, which it writes when it begins with it; then, where the plugin is refused, a line with the key
-// of the setting that is to blame, and why.
+// The report of the child: a character at the beginning of each step; then, if the plugin is refused, a line with the
+// key of the invalid setting, and a line with the reason.
 constexpr char loading = 'l';
 constexpr char describing = 'd';
 constexpr char checking = 'c';
 constexpr char blames_setting = 's';
 constexpr char blames_plugin = 'p';
-constexpr std::string_view verdicts{"sp"};
+constexpr std::string_view verdict_marks{"sp"};
 
-std::string_view words_for(char step) {
+std::string_view step_name(char step) {
     switch (step) {
     case describing: return "its entry point";
-    case checking: return "its check of its settings";
-    default: return "what it runs when it is loaded";
+    case checking: return "its settings check";
+    default: return "its initialization";
     }
 }
 
@@ -72,12 +73,12 @@ class descriptor {
 };
 
 void write_all(int to, std::string_view text) {
-    [[maybe_unused]] const auto written = ::write(to, text.data(), std::min(text.size(), longest_report));
+    [[maybe_unused]] const auto written = ::write(to, text.data(), std::min(text.size(), max_report));
 }
 
-// As in a process that begins: nothing of what the parent does about signals, and no memory image where it crashes.
-void become_a_child(int words) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL); // it may hang for ever, and who gives it up may be killed
+// As in a new process: without the parent's signal handling, and without a core dump if it crashes.
+void reset_process_state(int output) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL); // it may hang, and the parent may be killed before it kills the child
     for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGTERM, SIGINT, SIGHUP, SIGPIPE, SIGCHLD}) {
         ::signal(number, SIG_DFL);
     }
@@ -86,26 +87,26 @@ void become_a_child(int words) {
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
     const rlimit no_core{};
     ::setrlimit(RLIMIT_CORE, &no_core);
-    ::dup2(words, STDOUT_FILENO);
-    ::dup2(words, STDERR_FILENO);
+    ::dup2(output, STDOUT_FILENO);
+    ::dup2(output, STDERR_FILENO);
 }
 
-// In the child. Ends it without what a program does at its end, which is the parent's business.
-[[noreturn]] void try_and_end(const std::filesystem::path& file, const std::string& node, const std::string& config,
-                              int words, int report) {
-    become_a_child(words);
+// In the child. Ends it without exit handlers, which belong to the parent.
+[[noreturn]] void run_child(const std::filesystem::path& file, const std::string& node, const std::string& config,
+                            int output, int report) {
+    reset_process_state(output);
     char step = loading;
-    const auto at = [&](char next) {
+    const auto begin_step = [&](char next) {
         step = next;
         write_all(report, {&step, 1});
     };
     try {
-        at(loading);
-        // Never unloaded, as in the daemon: what it runs then is of no interest.
+        begin_step(loading);
+        // Never unloaded, as in the daemon.
         const auto* library = new boost::dll::shared_library{open_library("", file)};
-        at(describing);
+        begin_step(describing);
         const auto& described = describe_plugin("", *library);
-        at(checking);
+        begin_step(checking);
         plugin_jobs jobs;
         stop_notifier notifier;
         loaded_plugin plugin{detail::known_part(&described), node, jobs, notifier, {}};
@@ -113,34 +114,33 @@ void become_a_child(int words) {
             throw plugin_error("", why->why, why->setting);
         }
         ::_exit(usable);
-    } catch (const plugin_error& wrong) {
-        const std::string why{std::string_view{wrong.what()}.substr(2)}; // after the path, which is the parent's
-        write_all(report,
-                  (wrong.setting() ? blames_setting + *wrong.setting() : std::string{blames_plugin}) + "\n" + why);
+    } catch (const plugin_error& e) {
+        const std::string why{std::string_view{e.what()}.substr(2)}; // without the path, which the parent adds
+        write_all(report, (e.setting() ? blames_setting + *e.setting() : std::string{blames_plugin}) + "\n" + why);
     } catch (const std::exception& failed) {
-        const std::string what{words_for(step)};
+        const std::string what{step_name(step)};
         write_all(report, blames_plugin + ("\n" + what) + " threw: " + failed.what());
     }
     ::_exit(refused);
 }
 
-// Leaves the end of a text, no longer than `most_words`, from the beginning of a character.
-void keep_last_words(std::string& words) {
-    if (words.size() <= most_words) {
+// Keeps the last `max_output` bytes, from the beginning of a character.
+void trim_output(std::string& output) {
+    if (output.size() <= max_output) {
         return;
     }
-    auto begin = words.size() - most_words;
-    while (begin < words.size() && (static_cast<unsigned char>(words[begin]) & 0xC0U) == 0x80U) {
+    auto begin = output.size() - max_output;
+    while (begin < output.size() && (static_cast<unsigned char>(output[begin]) & 0xC0U) == 0x80U) {
         ++begin;
     }
-    words.erase(0, begin);
+    output.erase(0, begin);
 }
 
-// Takes what there is to read, but no more than a pipe holds: the child may write faster. False at the end of the
+// Reads what is available, but no more than a pipe holds, because the child may write faster. False at the end of the
 // stream.
-bool read_ready(int from, std::string& words) {
+bool read_ready(int from, std::string& output) {
     std::array<char, 4096> some{};
-    for (std::size_t taken = 0; taken < roomy_pipe; taken += some.size()) {
+    for (std::size_t taken = 0; taken < max_read; taken += some.size()) {
         const auto size = ::read(from, some.data(), some.size());
         if (size == 0) {
             return false;
@@ -148,8 +148,8 @@ bool read_ready(int from, std::string& words) {
         if (size < 0) {
             return errno == EAGAIN || errno == EINTR;
         }
-        words.append(some.data(), static_cast<std::size_t>(size));
-        keep_last_words(words);
+        output.append(some.data(), static_cast<std::size_t>(size));
+        trim_output(output);
     }
     return true;
 }
@@ -162,9 +162,10 @@ int open_process(pid_t process) {
     return fd;
 }
 
-// Reads what the child writes until it has ended, or the time is up. True: it has ended. The end of the stream says
-// nothing about the child: it may close its output and go on, and a process that it started may keep the output open.
-bool read_words(int from, int process, std::string& words, std::chrono::steady_clock::time_point end) {
+// Reads the child's output until the child ends or the time is up. Returns whether it ended. The end of the stream is
+// not the end of the child: it may close its output and continue, and a process that it started may keep the output
+// open.
+bool read_output(int from, int process, std::string& output, std::chrono::steady_clock::time_point end) {
     std::array<pollfd, 2> watched{
         {{.fd = process, .events = POLLIN, .revents = 0}, {.fd = from, .events = POLLIN, .revents = 0}}};
     auto& [ended, readable] = watched;
@@ -175,18 +176,18 @@ bool read_words(int from, int process, std::string& words, std::chrono::steady_c
             continue;
         }
         if (ready > 0 && ended.revents == 0) {
-            readable.fd = read_ready(from, words) ? from : -1;
+            readable.fd = read_ready(from, output) ? from : -1;
         }
         const bool over = left.count() <= 0 && ended.revents == 0;
         if (ready <= 0 || ended.revents != 0 || over) {
-            read_ready(from, words);
+            read_ready(from, output);
             return ready > 0 && ended.revents != 0;
         }
     }
 }
 
-// On one line, as it stands in a log.
-std::string on_one_line(std::string text) {
+// On one line, for a log.
+std::string single_line(std::string text) {
     while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) {
         text.pop_back();
     }
@@ -195,16 +196,16 @@ std::string on_one_line(std::string text) {
     return text;
 }
 
-std::string with_words(std::string text, const std::string& words) {
-    return words.empty() ? text : text + ": " + words;
+std::string with_output(std::string text, const std::string& output) {
+    return output.empty() ? text : text + ": " + output;
 }
 
-// Waits for the child, and ends it when the time is up, which is then told by `false`.
-bool wait_for_end(pid_t child, int from, std::string& words, std::chrono::steady_clock::time_point end, int& status) {
+// Waits for the child. When the time is up, kills it and returns false.
+bool wait_for_end(pid_t child, int from, std::string& output, std::chrono::steady_clock::time_point end, int& status) {
     bool ended = false;
     try {
         const descriptor process{open_process(child)};
-        ended = read_words(from, process.get(), words, end);
+        ended = read_output(from, process.get(), output, end);
     } catch (...) {
         ::kill(child, SIGKILL);
         ::waitpid(child, &status, 0);
@@ -215,37 +216,37 @@ bool wait_for_end(pid_t child, int from, std::string& words, std::chrono::steady
     }
     while (::waitpid(child, &status, 0) < 0) {
         if (errno != EINTR) {
-            throw std::system_error(errno, std::generic_category(), "cannot learn how a process ended");
+            throw std::system_error(errno, std::generic_category(), "cannot wait for a process");
         }
     }
     return ended;
 }
 
-// What is there, now that the child has ended.
+// The report is complete when the child has ended.
 std::string read_report(int from) {
-    std::array<char, 2 * longest_report> all{};
+    std::array<char, 2 * max_report> all{};
     const auto size = ::read(from, all.data(), all.size());
     return {all.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
 }
 
 [[noreturn]] void refuse(const std::string& path, std::string_view report) {
-    const auto begin = report.find_first_of(verdicts);
+    const auto begin = report.find_first_of(verdict_marks);
     const auto end = report.find('\n');
     if (begin == std::string_view::npos || end == std::string_view::npos || end < begin) {
-        throw plugin_error(path, "its trial failed without a word");
+        throw plugin_error(path, "its trial failed without a message");
     }
-    const auto why = on_one_line(std::string{report.substr(end + 1)});
+    const auto why = single_line(std::string{report.substr(end + 1)});
     if (report[begin] == blames_setting) {
-        throw plugin_error(path, why, on_one_line(std::string{report.substr(begin + 1, end - begin - 1)}));
+        throw plugin_error(path, why, single_line(std::string{report.substr(begin + 1, end - begin - 1)}));
     }
     throw plugin_error(path, why);
 }
 
 std::array<int, 2> make_pipe() {
     std::array<int, 2> ends{};
-    // Only the reader's end does not block: what the child writes while nobody reads must not be lost.
+    // Only the reader's end is non-blocking, so that no output of the child is lost.
     if (::pipe2(ends.data(), O_CLOEXEC) != 0 || ::fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) {
-        throw std::system_error(errno, std::generic_category(), "cannot make a pipe");
+        throw std::system_error(errno, std::generic_category(), "cannot create a pipe");
     }
     return ends;
 }
@@ -255,9 +256,9 @@ std::array<int, 2> make_pipe() {
 void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
                 const std::string& config, std::chrono::milliseconds limit) {
     const auto end = std::chrono::steady_clock::now() + limit;
-    const auto words_ends = make_pipe();
-    descriptor from{words_ends[0]};
-    descriptor into{words_ends[1]};
+    const auto output_ends = make_pipe();
+    descriptor from{output_ends[0]};
+    descriptor into{output_ends[1]};
     const auto report_ends = make_pipe();
     const descriptor report_from{report_ends[0]};
     descriptor report_into{report_ends[1]};
@@ -266,56 +267,49 @@ void try_plugin(const std::string& path, const std::filesystem::path& file, cons
         throw std::system_error(errno, std::generic_category(), "cannot start a process");
     }
     if (child == 0) {
-        try_and_end(file, node, config, into.get(), report_into.get());
+        run_child(file, node, config, into.get(), report_into.get());
     }
     into.close();
     report_into.close();
-    std::string words;
+    std::string output;
     int status = 0;
-    const bool ended = wait_for_end(child, from.get(), words, end, status);
-    words = on_one_line(std::move(words));
+    const bool ended = wait_for_end(child, from.get(), output, end, status);
+    output = single_line(std::move(output));
     const auto report = read_report(report_from.get());
-    const auto steps = report.substr(0, report.find_first_of(verdicts));
-    const std::string what{words_for(steps.empty() ? loading : steps.back())};
+    const auto steps = report.substr(0, report.find_first_of(verdict_marks));
+    const std::string what{step_name(steps.empty() ? loading : steps.back())};
     if (!ended) {
-        throw plugin_error(path, with_words(what + " does not end", words));
+        throw plugin_error(path, with_output(what + " does not end", output));
     }
     if (WIFSIGNALED(status)) {
-        throw plugin_error(path,
-                           with_words(what + " ends the process by signal " + std::to_string(WTERMSIG(status)), words));
+        throw plugin_error(
+            path, with_output(what + " ends the process by signal " + std::to_string(WTERMSIG(status)), output));
     }
     if (WEXITSTATUS(status) == refused) {
         refuse(path, report);
     }
     if (WEXITSTATUS(status) != usable) {
-        throw plugin_error(path, with_words(what + " ends the process", words));
+        throw plugin_error(path, with_output(what + " ends the process", output));
     }
 }
 
-namespace {
-
-// How long a plugin may take to be loaded and to look at its settings.
-constexpr std::chrono::seconds trial_limit{10};
-
-} // namespace
-
-std::string complaint_about(const config& setup, std::size_t plugin, const plugin_error& why) {
+std::string plugin_error_message(const config& setup, std::size_t plugin, const plugin_error& why) {
     const auto of = "plugins[" + std::to_string(plugin) + "]";
     const auto& setting = why.setting();
     const auto key = !setting ? of + ".path" : setting->empty() ? of + ".config" : of + ".config." + *setting;
-    return setup.place_of(key) + ": " + why.what();
+    return setup.location_of(key) + ": " + why.what();
 }
 
 void try_plugins(config& setup) {
     for (std::size_t i = 0; i < setup.plugins.size(); ++i) {
         auto& wanted = setup.plugins[i];
         try {
-            const auto path = plugin_file(setup, wanted);
-            try_plugin(path, find_plugin(path, plugin_folders(setup)), setup.node, wanted.config, trial_limit);
-        } catch (const plugin_error& wrong) {
-            wanted.unusable = complaint_about(setup, i, wrong);
+            const auto path = resolve_plugin_path(setup, wanted);
+            try_plugin(path, find_plugin(path, plugin_search_path(setup)), setup.node, wanted.config, trial_limit);
+        } catch (const plugin_error& e) {
+            wanted.trial_error = plugin_error_message(setup, i, e);
             if (wanted.required) {
-                throw config_error(wanted.unusable);
+                throw config_error(wanted.trial_error);
             }
         }
     }

@@ -25,8 +25,8 @@ config read(const std::string& text) {
 std::string refusal(const std::string& text) {
     try {
         read(text);
-    } catch (const config_error& wrong) {
-        return wrong.what();
+    } catch (const config_error& e) {
+        return e.what();
     }
     return "accepted";
 }
@@ -47,20 +47,20 @@ const mistake mistakes[] = {
     {"plugins:\n  - path: a.so\n  - path: b.so\n    args: {}\n", "clesd.yaml:4: plugins[1].args: ", "unknown key"},
     {"limits:\n\n  lines: 4096\n", "clesd.yaml:3: limits.lines: ", "unknown key"},
     // bad values, of each key
-    {"node: a b\n", "clesd.yaml:1: node: ", "'a b' is no node's name"},
+    {"node: a b\n", "clesd.yaml:1: node: ", "'a b' is not a valid node name"},
     {"node:\n", "clesd.yaml:1: node: ", "has no value"},
     {"node: [a]\n", "clesd.yaml:1: node: ", "has to be a single value"},
     {"listen: 127.0.0.1\n", "clesd.yaml:1: listen: ", ""},
     {"listen:\n  - tcp://127.0.0.1\n  - tcp://x:y\n", "clesd.yaml:3: listen[1]: ", ""},
     {"listen: {a: b}\n", "clesd.yaml:1: listen: ", "has to be a list"},
     {"insecure: maybe\n", "clesd.yaml:1: insecure: ", "'maybe' is neither true nor false"},
-    {"networks: [10.0.0.0]\n", "clesd.yaml:1: networks[0]: ", "is no network"},
-    {"pool: a b\n", "clesd.yaml:1: pool: ", "'a b' is not a pool's name"},
+    {"networks: [10.0.0.0]\n", "clesd.yaml:1: networks[0]: ", "is not a network"},
+    {"pool: a b\n", "clesd.yaml:1: pool: ", "'a b' is not a valid pool name"},
     {"multicast: lo,1.2.3.4\n", "clesd.yaml:1: multicast: ", "multicast group"},
     {"multicast: [[lo]]\n", "clesd.yaml:1: multicast[0]: ", "has to be a single value"},
-    {"multicast: []\n", "clesd.yaml:1: multicast: ", "is no interface"},
-    {"multicast: [lo,\n  '']\n", "clesd.yaml:2: multicast[1]: ", "is no interface"},
-    {"multicast: [lo, off]\n", "clesd.yaml:1: multicast[1]: ", "is no interface"},
+    {"multicast: []\n", "clesd.yaml:1: multicast: ", "is not an interface"},
+    {"multicast: [lo,\n  '']\n", "clesd.yaml:2: multicast[1]: ", "is not an interface"},
+    {"multicast: [lo, off]\n", "clesd.yaml:1: multicast[1]: ", "is not an interface"},
     {"multicast: lo,\n", "clesd.yaml:1: multicast: ", "has an empty name of an interface"},
     {"multicast:\n  interface: [lo, eth0, lo]\n", "clesd.yaml:2: multicast.interface: ", "names 'lo' twice"},
     {"multicast: {interface: \"lo,auto\"}\n",
@@ -68,28 +68,28 @@ const mistake mistakes[] = {
     {"multicast: [a, b, c, d, e, f, g, h, i]\n", "clesd.yaml:1: multicast: ", "at most 8"},
     {"multicast: {group: 10.1.1.1}\n", "clesd.yaml:1: multicast.group: ", "multicast group"},
     {"multicast:\n  port: 70000\n", "clesd.yaml:2: multicast.port: ", "'70000' is not a number from 1 to 65535"},
-    {"multicast: {interface: off}\n", "clesd.yaml:1: multicast.interface: ", "is no interface"},
+    {"multicast: {interface: off}\n", "clesd.yaml:1: multicast.interface: ", "is not an interface"},
     {"multicast: {required: 1}\n", "clesd.yaml:1: multicast.required: ", "neither true nor false"},
     {"seeds:\n- tcp://a\n- mqtt://b\n", "clesd.yaml:3: seeds[1]: ", ""},
     {"peers:\n  recon: there\n", "clesd.yaml:2: peers.recon: ", ""},
-    {"peers: {any: tcp://127.0.0.1}\n", "clesd.yaml:1: peers.any: ", "is no node's name"},
-    {"peers: []\n", "clesd.yaml:1: peers: ", "has to have keys of its own"},
+    {"peers: {any: tcp://127.0.0.1}\n", "clesd.yaml:1: peers.any: ", "is not a valid node name"},
+    {"peers: []\n", "clesd.yaml:1: peers: ", "has to be a map"},
     {"workers: 0\n", "clesd.yaml:1: workers: ", "'0' is not a number from 1 to 1024"},
     {"queue: many\n", "clesd.yaml:1: queue: ", "'many' is not a number from 1 to 1000000"},
-    {"stuck_after: 5\n", "clesd.yaml:1: stuck_after: ", "is no time"},
+    {"stuck_after: 5\n", "clesd.yaml:1: stuck_after: ", "is not a duration"},
     {"replacements: -1\n", "clesd.yaml:1: replacements: ", "is not a number"},
-    {"drain: forever\n", "clesd.yaml:1: drain: ", "is no time"},
+    {"drain: forever\n", "clesd.yaml:1: drain: ", "is not a duration"},
     {"plugins: a.so\n", "clesd.yaml:1: plugins: ", "has to be a list"},
     {"plugins:\n  - config: {}\n", "clesd.yaml:2: plugins[0]: ", "has no 'path'"},
     {"plugins: [{path: ''}]\n", "clesd.yaml:1: plugins[0].path: ", "is empty"},
-    {"plugins:\n  - path: a.so\n    config: 7\n", "clesd.yaml:3: plugins[0].config: ", "keys of its own"},
+    {"plugins:\n  - path: a.so\n    config: 7\n", "clesd.yaml:3: plugins[0].config: ", "has to be a map or a list"},
     {"plugins: [{path: a.so, required: often}]\n", "clesd.yaml:1: plugins[0].required: ", "neither true nor false"},
     {"plugin_path: {}\n", "clesd.yaml:1: plugin_path: ", "has to be a list"},
-    {"log: loud\n", "clesd.yaml:1: log: ", "is not what to log"},
-    {"log: {level: loud}\n", "clesd.yaml:1: log.level: ", "is none of debug"},
+    {"log: loud\n", "clesd.yaml:1: log: ", "is not a log setting"},
+    {"log: {level: loud}\n", "clesd.yaml:1: log.level: ", "is not one of debug"},
     {"log: {format: xml}\n", "clesd.yaml:1: log.format: ", "is neither text nor json"},
     {"limits: {links: 0}\n", "clesd.yaml:1: limits.links: ", "is not a number from 1 to 20000"},
-    {"limits: {line: 1KB}\n", "clesd.yaml:1: limits.line: ", "is no size"},
+    {"limits: {line: 1KB}\n", "clesd.yaml:1: limits.line: ", "is not a size"},
     {"limits: {stall: 0}\n", "clesd.yaml:1: limits.stall: ", "too short"},
     {"limits: {line: 255}\n", "clesd.yaml:1: limits.line: ", "is not a number from 256 to 67108864"},
     {"limits: {line: 17179869184GiB}\n", "clesd.yaml:1: limits.line: ", "is not a number from 256 to"},
@@ -98,18 +98,18 @@ const mistake mistakes[] = {
     {"limits: {lease: 61s}\n", "clesd.yaml:1: limits.lease: ", "is too long: 1min at most"},
     {"limits: {lease: 19ms}\n", "clesd.yaml:1: limits.lease: ", "is too short: 20ms at least"},
     {"limits: {memory: 1KiB}\n", "clesd.yaml:1: limits.memory: ", "is not a number from 65536 to"},
-    {"busy_poll: 50\n", "clesd.yaml:1: busy_poll: ", "is no time"},
-    {"wake_within: 7\n", "clesd.yaml:1: wake_within: ", "is no time"},
+    {"busy_poll: 50\n", "clesd.yaml:1: busy_poll: ", "is not a duration"},
+    {"wake_within: 7\n", "clesd.yaml:1: wake_within: ", "is not a duration"},
     {"wake_within: 0\n", "clesd.yaml:1: wake_within: ", "write off, or 0us"},
     {"real_time: 100\n", "clesd.yaml:1: real_time: ", "is not a number from 0 to 99"},
     // what is no such file at all
-    {"node: a\nworkers: 1\nnode: b\n", "clesd.yaml:3: node: ", "is there already, in line 1"},
-    {"- node\n", "clesd.yaml:1: ", "has to have keys of its own"},
-    {"just words\n", "clesd.yaml:1: ", "has to have keys of its own"},
-    {"node: a\n\tworkers: 2\n", "clesd.yaml:2: ", "is no YAML"},
-    {"node: [a\n", "clesd.yaml:2: ", "is no YAML"},
-    {"node: a\n---\nnode: b\n", "clesd.yaml: ", "holds 2 documents"},
-    {"? [a, b]\n: c\n", "clesd.yaml:1: ", "a key has to be a word"},
+    {"node: a\nworkers: 1\nnode: b\n", "clesd.yaml:3: node: ", "is a duplicate of the key in line 1"},
+    {"- node\n", "clesd.yaml:1: ", "has to be a map"},
+    {"just words\n", "clesd.yaml:1: ", "has to be a map"},
+    {"node: a\n\tworkers: 2\n", "clesd.yaml:2: ", "is not valid YAML"},
+    {"node: [a\n", "clesd.yaml:2: ", "is not valid YAML"},
+    {"node: a\n---\nnode: b\n", "clesd.yaml: ", "contains 2 documents"},
+    {"? [a, b]\n: c\n", "clesd.yaml:1: ", "keys have to be scalars"},
 };
 
 } // namespace
@@ -214,9 +214,9 @@ BOOST_AUTO_TEST_CASE(each_value_knows_its_line) {
     const auto c = read("node: sat1\n\nmulticast:\n  port: 4000\nplugins:\n  - path: a.so\n  - b.so\n");
     BOOST_TEST(c.origins.at("node") == "clesd.yaml:1");
     BOOST_TEST(c.origins.at("multicast.port") == "clesd.yaml:4");
-    BOOST_TEST(c.place_of("plugins[0].path") == "clesd.yaml:6: plugins[0].path");
-    BOOST_TEST(c.place_of("plugins[1].path") == "clesd.yaml:7: plugins[1].path");
-    BOOST_TEST(c.place_of("workers") == "workers");
+    BOOST_TEST(c.location_of("plugins[0].path") == "clesd.yaml:6: plugins[0].path");
+    BOOST_TEST(c.location_of("plugins[1].path") == "clesd.yaml:7: plugins[1].path");
+    BOOST_TEST(c.location_of("workers") == "workers");
 }
 
 BOOST_DATA_TEST_CASE(a_mistake_is_named_with_file_line_and_key, boost::unit_test::data::make(mistakes), wrong) {

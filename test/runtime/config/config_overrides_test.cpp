@@ -24,8 +24,8 @@ std::string refusal(const std::map<std::string, std::string>& variables) {
     auto c = default_config("host", 1);
     try {
         apply(of(variables), c);
-    } catch (const config_error& wrong) {
-        return wrong.what();
+    } catch (const config_error& e) {
+        return e.what();
     }
     return "accepted";
 }
@@ -50,7 +50,7 @@ BOOST_AUTO_TEST_CASE(every_variable) {
                boost::test_tools::per_element());
     BOOST_TEST(!c.multicast.is_on());
     BOOST_TEST((c.log == log_config{cles::log_level::debug, log_format::json}));
-    BOOST_TEST(c.place_of("listen[1]") == "CLES_LISTEN: listen[1]");
+    BOOST_TEST(c.location_of("listen[1]") == "CLES_LISTEN: listen[1]");
 }
 
 BOOST_AUTO_TEST_CASE(an_empty_variable_says_nothing) {
@@ -60,11 +60,11 @@ BOOST_AUTO_TEST_CASE(an_empty_variable_says_nothing) {
 }
 
 BOOST_AUTO_TEST_CASE(a_mistake_names_its_variable) {
-    BOOST_TEST(refusal({{"CLES_NODE", "self"}}).starts_with("CLES_NODE: 'self' is no node's name"));
+    BOOST_TEST(refusal({{"CLES_NODE", "self"}}).starts_with("CLES_NODE: 'self' is not a valid node name"));
     BOOST_TEST(refusal({{"CLES_LISTEN", "tcp://127.0.0.1:1,there"}}).starts_with("CLES_LISTEN: "));
     BOOST_TEST(refusal({{"CLES_SEEDS", "there"}}).starts_with("CLES_SEEDS: "));
     BOOST_TEST(refusal({{"CLES_MULTICAST", "lo,1.1.1.1"}}).starts_with("CLES_MULTICAST: "));
-    BOOST_TEST(refusal({{"CLES_LOG", "loud"}}).starts_with("CLES_LOG: 'loud' is not what to log"));
+    BOOST_TEST(refusal({{"CLES_LOG", "loud"}}).starts_with("CLES_LOG: 'loud' is not a log setting"));
 }
 
 BOOST_AUTO_TEST_CASE(what_is_overridden_comes_from_the_file_no_more) {

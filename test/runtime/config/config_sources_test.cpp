@@ -79,11 +79,11 @@ BOOST_AUTO_TEST_CASE(a_file_that_is_named_has_to_be_there) {
 BOOST_AUTO_TEST_CASE(the_usual_places_in_their_order) {
     variables["HOME"] = "/home/u";
     BOOST_TEST(
-        usual_places(sources.variable) ==
+        default_locations(sources.variable) ==
             (std::vector<std::string>{"./clesd.yaml", "/home/u/.config/cles/clesd.yaml", "/etc/cles/clesd.yaml"}),
         boost::test_tools::per_element());
     variables["XDG_CONFIG_HOME"] = "/x";
-    BOOST_TEST(usual_places(sources.variable).at(1) == "/x/cles/clesd.yaml");
+    BOOST_TEST(default_locations(sources.variable).at(1) == "/x/cles/clesd.yaml");
 }
 
 BOOST_AUTO_TEST_CASE(the_first_place_that_has_one_is_taken) {

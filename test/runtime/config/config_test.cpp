@@ -12,8 +12,8 @@ namespace {
 std::string refusal(const config& whole) {
     try {
         check(whole);
-    } catch (const config_error& wrong) {
-        return wrong.what();
+    } catch (const config_error& e) {
+        return e.what();
     }
     return "accepted";
 }
@@ -42,7 +42,7 @@ BOOST_AUTO_TEST_CASE(listening_beyond_this_host_has_to_be_meant) {
     auto c = default_config("host", 1);
     c.listen = {"tcp://127.0.0.1", "tcp://0.0.0.0"};
     c.origins["listen[1]"] = "clesd.yaml:3";
-    BOOST_TEST(refusal(c) == "clesd.yaml:3: listen[1]: 'tcp://0.0.0.0' can be reached from other hosts, which takes "
+    BOOST_TEST(refusal(c) == "clesd.yaml:3: listen[1]: 'tcp://0.0.0.0' can be reached from other hosts, which requires "
                              "'insecure: true'");
     c.insecure = true;
     BOOST_TEST(refusal(c) == "accepted");
@@ -52,10 +52,10 @@ BOOST_AUTO_TEST_CASE(multicast_beyond_this_host_has_to_be_meant) {
     auto c = default_config("host", 1);
     c.multicast.interface = "eth0";
     c.origins["multicast"] = "CLES_MULTICAST";
-    BOOST_TEST(refusal(c).starts_with("CLES_MULTICAST: multicast: on 'eth0' other hosts take part"));
+    BOOST_TEST(refusal(c).starts_with("CLES_MULTICAST: multicast: 'eth0' can be reached from other hosts"));
     for (const auto* several : {"lo,eth0", "auto"}) {
         c.multicast.interface = several;
-        BOOST_TEST(refusal(c).find("other hosts take part") != std::string::npos);
+        BOOST_TEST(refusal(c).find("can be reached from other hosts") != std::string::npos);
     }
     c.insecure = true;
     BOOST_TEST(refusal(c) == "accepted");
@@ -72,16 +72,16 @@ BOOST_AUTO_TEST_CASE(a_plugin_is_loaded_once) {
     auto c = default_config("host", 1);
     c.plugins = {{.path = "a.so"}, {.path = "b.so"}, {.path = "a.so"}};
     c.origins["plugins[2]"] = "clesd.yaml:9";
-    BOOST_TEST(refusal(c) == "clesd.yaml:9: plugins[2].path: 'a.so' is loaded already");
+    BOOST_TEST(refusal(c) == "clesd.yaml:9: plugins[2].path: 'a.so' is listed twice");
 }
 
 BOOST_AUTO_TEST_CASE(a_place_is_that_of_what_holds_it_where_it_has_none) {
     auto c = default_config("host", 1);
     c.origins["listen"] = "clesd.yaml:3";
-    BOOST_TEST(c.place_of("listen[1]") == "clesd.yaml:3: listen[1]");
-    BOOST_TEST(c.place_of("listen") == "clesd.yaml:3: listen");
-    BOOST_TEST(c.place_of("log.level") == "log.level");
-    BOOST_TEST(c.place_of("queue") == "queue");
+    BOOST_TEST(c.location_of("listen[1]") == "clesd.yaml:3: listen[1]");
+    BOOST_TEST(c.location_of("listen") == "clesd.yaml:3: listen");
+    BOOST_TEST(c.location_of("log.level") == "log.level");
+    BOOST_TEST(c.location_of("queue") == "queue");
 }
 
 BOOST_AUTO_TEST_SUITE_END()

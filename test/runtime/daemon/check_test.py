@@ -96,9 +96,9 @@ class Check(unittest.TestCase):
                             ("exits_when_loaded", "ends the process"),
                             ("wrong_major", "this host has 1.1"),
                             ("newer_minor", "this host has 1.1"),
-                            ("no_entry", "it is no plugin"),
+                            ("no_entry", "it is not a plugin"),
                             ("undefined_symbol", "cannot be loaded"),
-                            ("crashes_in_check", "its check of its settings ends the process by signal 6")):
+                            ("crashes_in_check", "its settings check ends the process by signal 6")):
             with self.subTest(name):
                 self.refused(f"node: a\nplugins:\n  - path: {FAULTY}/{name}.so\n", 3, "plugins[0].path", words)
 

@@ -55,13 +55,13 @@ class Clash(unittest.TestCase):
             code, _ = second.stop()
             self.assertGreater(time.monotonic() - signalled, 2)
         self.assertEqual(code, 3)
-        second.wait_for_entry("SIGTERM: it is stopping already")
+        second.wait_for_entry("SIGTERM: already stopping")
         self.assertNotIn("on a second signal", second.log())
 
     def test_a_second_signal_ends_it_also_while_it_gives_way(self):
         with self.giving_way_with_a_job("10min") as second:
             second.send_signal(signal.SIGTERM)
-            second.wait_for_entry("SIGTERM: it is stopping already")
+            second.wait_for_entry("SIGTERM: already stopping")
             self.assertEqual(second.stop()[0], 3)
 
     def test_it_goes_on_where_it_is_told_to(self):

@@ -116,7 +116,7 @@ class Readiness(unittest.TestCase):
 
     def test_a_manager_that_is_not_there_keeps_nobody_from_running(self):
         with Daemon(env=clean_environment(NOTIFY_SOCKET="@nobody-is-there")) as d:
-            d.wait_for_entry("service manager could not be told")
+            d.wait_for_entry("service manager could not be notified")
             self.assertEqual(d.stop()[0], 0)
 
 
@@ -197,7 +197,7 @@ class Reload(unittest.TestCase):
             self.assertEqual(d.entries(), [])
             d.write(DEFAULTS + "seeds: [tcp://127.0.0.1:1, tcp://127.0.0.1:2]\n")
             d.send_signal(signal.SIGHUP)
-            self.assertIn("2 seeds, log debug", d.wait_for_entry("read the configuration again")["message"])
+            self.assertIn("2 seeds, log debug", d.wait_for_entry("reloaded the configuration")["message"])
             d.stop()
             d.wait_for_entry("stopping on SIGTERM")  # which a log of warnings does not hold
 
@@ -214,7 +214,7 @@ class Reload(unittest.TestCase):
         with Daemon() as d:
             d.write(DEFAULTS + "seeds: there\n")
             d.send_signal(signal.SIGHUP)
-            entry = d.wait_for_entry("all stays as it was")
+            entry = d.wait_for_entry("kept the old configuration")
             self.assertIn(f"{d.config}:6: seeds: ", entry["message"])
             self.assertEqual(entry["level"], "error")
             self.assertEqual(json.loads(d.ask("PULL self:cles"))["node"], "sat1")
@@ -224,7 +224,7 @@ class Reload(unittest.TestCase):
         with Daemon() as d:
             d.write(DEFAULTS + "queue: 7\n")
             d.send_signal(signal.SIGHUP)
-            d.wait_for_entry("takes effect at the next start")
+            d.wait_for_entry("take effect at the next start")
 
     def test_the_service_manager_is_told(self):
         with Manager() as m, Daemon(env=clean_environment(NOTIFY_SOCKET=m.name)) as d:

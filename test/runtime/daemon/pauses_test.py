@@ -83,7 +83,7 @@ class Pauses(unittest.TestCase):
                 self.assertEqual(self.errors(links), ["cancelled"] * 10)
                 self.serves(first + 99)
             self.assertEqual([n - first for n in self.begun() if n >= first], [99])
-        self.daemon.wait_for_entry("is read before a job begins")
+        self.daemon.wait_for_entry("until the input that arrived since has been read")
 
     def test_a_job_that_is_still_wanted_begins(self):
         with self.daemon.connect() as link:

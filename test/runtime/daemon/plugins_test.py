@@ -17,9 +17,9 @@ from support import wait_until
 FAULTS = {
     "bad_tasks": "",
     "crashes_in_entry": "by signal 11",
-    "describes_nothing": "describes nothing",
+    "describes_nothing": "returns no description",
     "exits_when_loaded": "",
-    "lacks_start": "lacks what",
+    "lacks_start": "lacks members",
     "newer_minor": "of the plugin ABI",
     "no_entry": "it has no function 'cles_plugin_v1'",
     "other_version": "of the plugin ABI",
@@ -46,7 +46,7 @@ class Unusable(unittest.TestCase):
             self.assertIn(path, said)
             self.assertIn(words, said)
         with Daemon(f"plugins:\n  - path: {STUBBORN}\n  - path: {path}\n    required: false\n") as d:
-            entry = d.wait_for_entry("goes on without it")
+            entry = d.wait_for_entry("continuing without it")
             self.assertEqual(entry["level"], "warning")
             self.assertIn(f"{d.config}:8: plugins[1].path: ", entry["message"])
             self.assertIn(words, entry["message"])

@@ -95,7 +95,7 @@ class Stops(unittest.TestCase):
         code, took = self.daemon.stop()
         self.assertEqual(code, 0)
         self.assertLess(took, 5)
-        entry = self.daemon.wait_for_entry("threads left behind in on_stop callbacks that do not return: 1")
+        entry = self.daemon.wait_for_entry("threads abandoned in on_stop callbacks that do not return: 1")
         self.assertEqual(entry["level"], "error")
 
     def test_a_job_that_is_stopped_by_the_end_of_the_drain_may_end(self):

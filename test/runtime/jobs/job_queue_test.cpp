@@ -86,8 +86,8 @@ BOOST_FIXTURE_TEST_CASE(what_has_begun_goes_before_the_new_ones_of_its_requester
     for (int i = 0; i < 8; ++i) {
         push("a" + std::to_string(i), 1);
     }
-    queue.push_begun(make("begun", 1));
-    queue.push_begun(make("other", 2));
+    queue.push_resumed(make("begun", 1));
+    queue.push_resumed(make("other", 2));
     BOOST_TEST(queue.size() == 10U);
     BOOST_TEST(!push("late", 1));
     BOOST_TEST(pop() == "begun");
@@ -157,7 +157,7 @@ BOOST_AUTO_TEST_CASE(it_does_the_same_as_lists_of_lists) {
                         continue;
                     }
                 } else {
-                    queue.push_begun(job);
+                    queue.push_resumed(job);
                 }
                 auto& own = of[job.requester];
                 if (own.empty()) {

@@ -34,14 +34,14 @@ bool happens(const std::atomic<int>& counter, int at_least) {
 
 // The executor may have dealt with the pause before the worker puts its job back: only a `wake` is left to come.
 BOOST_AUTO_TEST_CASE(a_worker_that_puts_its_job_back_goes_on_when_it_is_woken) {
-    cles::runtime::job_records records;
-    auto& job = records.take({});
-    cles::runtime::result_box box{[] {}};
+    cles::runtime::job_record_pool records;
+    auto& job = records.acquire({});
+    cles::runtime::completion_queue box{[] {}};
     const auto workers = std::make_shared<worker_pool>(cles::runtime::pool_options{.workers = 1}, box);
     std::atomic<int> missed{0};
     workers->start(workers, [&] { ++missed; });
-    workers->expect_executor(cles::time_point::clock::now() - 1s);
-    BOOST_TEST((workers->push(job) == worker_pool::admission::wants_workers));
+    workers->set_executor_due(cles::time_point::clock::now() - 1s);
+    BOOST_TEST((workers->push(job) == worker_pool::admission::needs_wake));
     for (int i = 1; i <= 3; ++i) {
         workers->wake();
         BOOST_REQUIRE(happens(missed, i));
@@ -49,7 +49,7 @@ BOOST_AUTO_TEST_CASE(a_worker_that_puts_its_job_back_goes_on_when_it_is_woken) {
             std::this_thread::yield();
         }
     }
-    BOOST_TEST(workers->take_back(job));
+    BOOST_TEST(workers->withdraw(job));
     workers->close([](cles::runtime::job_record&) {});
     BOOST_TEST(workers->join(patience) == 0U);
     records.recycle(job);
@@ -57,7 +57,7 @@ BOOST_AUTO_TEST_CASE(a_worker_that_puts_its_job_back_goes_on_when_it_is_woken) {
 
 // An executor whose every tick comes late: what a short pause does now and then, all the time.
 BOOST_AUTO_TEST_CASE(all_jobs_are_done_however_often_the_executor_is_late) {
-    pooled_node node{{.workers = 16, .grace = 4ms, .look_in = 1ms, .late_executor = 0ms}};
+    pooled_node node{{.workers = 16, .grace = 4ms, .check_interval = 1ms, .executor_lateness = 0ms}};
     node.tasks->on_delegate("quick", [] { return 1; });
     auto client = node.peer();
     constexpr int burst = 64;

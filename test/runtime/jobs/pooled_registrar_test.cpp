@@ -55,7 +55,7 @@ BOOST_FIXTURE_TEST_CASE(what_is_marked_as_quick_and_is_not_is_told_of, fixture) 
     const auto figures = pool->figures();
     BOOST_TEST(figures.inline_slow == 1U);
     BOOST_TEST(figures.inline_worst_us >= 2000U);
-    BOOST_TEST(log.has("the task 'slow' held up everything else for "));
+    BOOST_TEST(log.has("the task 'slow' blocked the node for "));
 }
 
 boost::asio::awaitable<std::string> tell(const fixture& node) { co_return node.here(); }

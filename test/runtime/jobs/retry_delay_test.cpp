@@ -9,8 +9,8 @@
 
 BOOST_AUTO_TEST_SUITE(retry_delay)
 
-using cles::runtime::longest_retry;
-using cles::runtime::shortest_retry;
+using cles::runtime::max_retry;
+using cles::runtime::min_retry;
 using namespace std::chrono_literals;
 
 BOOST_AUTO_TEST_CASE(it_is_what_the_workers_need_for_half_of_the_queue) {
@@ -20,11 +20,11 @@ BOOST_AUTO_TEST_CASE(it_is_what_the_workers_need_for_half_of_the_queue) {
 }
 
 BOOST_AUTO_TEST_CASE(nobody_comes_back_at_once_or_never) {
-    BOOST_TEST((cles::runtime::retry_delay(0, 2, 10ms) == shortest_retry));
-    BOOST_TEST((cles::runtime::retry_delay(1024, 2, 0ms) == shortest_retry));
-    BOOST_TEST((cles::runtime::retry_delay(1024, 1, 1h) == longest_retry));
+    BOOST_TEST((cles::runtime::retry_delay(0, 2, 10ms) == min_retry));
+    BOOST_TEST((cles::runtime::retry_delay(1024, 2, 0ms) == min_retry));
+    BOOST_TEST((cles::runtime::retry_delay(1024, 1, 1h) == max_retry));
     BOOST_TEST((cles::runtime::retry_delay(std::numeric_limits<std::size_t>::max(), 1,
-                                           std::chrono::nanoseconds::max()) == longest_retry));
+                                           std::chrono::nanoseconds::max()) == max_retry));
 }
 
 BOOST_AUTO_TEST_CASE(no_worker_counts_as_one) { BOOST_TEST((cles::runtime::retry_delay(100, 0, 10ms) == 500ms)); }

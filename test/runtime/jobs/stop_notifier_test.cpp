@@ -60,12 +60,12 @@ BOOST_AUTO_TEST_CASE(jobs_are_told_one_after_another_on_one_other_thread) {
     wait_until([&] { return told == 10; });
     BOOST_TEST(in_order);
     BOOST_TEST(!here);
-    BOOST_TEST(stops.end(1min) == 0U);
+    BOOST_TEST(stops.close(1min) == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(where_nobody_was_told_there_is_nothing_to_end) {
     notifier stops;
-    BOOST_TEST(stops.end(0ms) == 0U);
+    BOOST_TEST(stops.close(0ms) == 0U);
     BOOST_TEST(!stops.notify({.callback = [] {}}));
 }
 
@@ -75,7 +75,7 @@ BOOST_AUTO_TEST_CASE(all_are_told_before_the_end_also_where_the_thread_has_hardl
         notifier stops;
         stops.notify({.callback = [&] { ++told; }});
         stops.notify({.callback = [&] { ++told; }});
-        BOOST_TEST(stops.end(i % 2 == 0 ? 1min : 0ms) == 0U);
+        BOOST_TEST(stops.close(i % 2 == 0 ? 1min : 0ms) == 0U);
         BOOST_TEST(told == 2);
     }
 }
@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(one_that_blocks_is_reported_and_delays_no_other) {
     wait_until([&] { return held->passed() == 5; });
     stops.notify({.callback = [&] { ++told; }});
     wait_until([&] { return told == 6; });
-    BOOST_TEST(stops.end(1min) == 0U);
+    BOOST_TEST(stops.close(1min) == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(there_are_so_many_threads_and_no_more_which_is_reported_once) {
@@ -106,18 +106,18 @@ BOOST_AUTO_TEST_CASE(there_are_so_many_threads_and_no_more_which_is_reported_onc
     const auto held = std::make_shared<gate>();
     std::atomic<int> told{0};
     notifier stops{1ms};
-    for (std::size_t i = 0; i < notifier::most_threads + 4; ++i) {
+    for (std::size_t i = 0; i < notifier::max_threads + 4; ++i) {
         stops.notify({.callback = [held] { held->pass(); },
                       .log = [log](log_level level, const std::string& text) { log->add(level, text); }});
     }
     stops.notify({.callback = [&] { ++told; }});
-    wait_until([&] { return held->arrived() == static_cast<int>(notifier::most_threads); });
+    wait_until([&] { return held->arrived() == static_cast<int>(notifier::max_threads); });
     wait_until([&] { return log->count("error: ") == 1; });
     BOOST_TEST(told == 0);
     held->open();
     wait_until([&] { return told == 1; });
-    wait_until([&] { return held->passed() == static_cast<int>(notifier::most_threads) + 4; });
-    BOOST_TEST(stops.end(1min) == 0U);
+    wait_until([&] { return held->passed() == static_cast<int>(notifier::max_threads) + 4; });
+    BOOST_TEST(stops.close(1min) == 0U);
     BOOST_TEST(log->count("error: ") == 1U);
 }
 
@@ -126,7 +126,7 @@ BOOST_AUTO_TEST_CASE(one_that_throws_is_reported) {
     notifier stops;
     stops.notify({.callback = [] { throw std::runtime_error{"no"}; },
                   .log = [log](log_level level, const std::string& text) { log->add(level, text); }});
-    BOOST_TEST(stops.end(1min) == 0U);
+    BOOST_TEST(stops.close(1min) == 0U);
     BOOST_TEST(log->count("warning: a job threw when it was told to stop") == 1U);
 }
 
@@ -135,17 +135,17 @@ BOOST_AUTO_TEST_CASE(who_has_not_been_told_at_the_end_is_let_go_of) {
     const auto token = std::make_shared<int>(0);
     {
         notifier stops{1ms};
-        for (std::size_t i = 0; i < notifier::most_threads; ++i) {
+        for (std::size_t i = 0; i < notifier::max_threads; ++i) {
             stops.notify({.callback = [held] { held->pass(); }});
         }
-        wait_until([&] { return held->arrived() == static_cast<int>(notifier::most_threads); });
+        wait_until([&] { return held->arrived() == static_cast<int>(notifier::max_threads); });
         stops.notify({.callback = [token] {}});
         BOOST_TEST(token.use_count() == 2);
-        BOOST_TEST(stops.end(0ms) == notifier::most_threads);
+        BOOST_TEST(stops.close(0ms) == notifier::max_threads);
         BOOST_TEST(token.use_count() == 1);
     }
     held->open();
-    wait_until([&] { return held->passed() == static_cast<int>(notifier::most_threads); });
+    wait_until([&] { return held->passed() == static_cast<int>(notifier::max_threads); });
 }
 
 BOOST_AUTO_TEST_CASE(a_job_that_does_not_return_from_it_is_left_behind) {
@@ -154,7 +154,7 @@ BOOST_AUTO_TEST_CASE(a_job_that_does_not_return_from_it_is_left_behind) {
         notifier stops;
         stops.notify({.callback = [held] { held->pass(); }});
         wait_until([&] { return held->arrived() == 1; });
-        BOOST_TEST(stops.end(0ms) == 1U);
+        BOOST_TEST(stops.close(0ms) == 1U);
     }
     held->open();
     wait_until([&] { return held->passed() == 1; }); // it still finds what it needs

@@ -21,7 +21,7 @@ using cles::runtime::job_context;
 using cles::runtime::pool_options;
 
 struct fixture : pooled_node {
-    explicit fixture(pool_options options = {.workers = 1, .replacements = 1, .grace = 20ms, .patience = 20ms})
+    explicit fixture(pool_options options = {.workers = 1, .replacements = 1, .grace = 20ms, .close_timeout = 20ms})
         : pooled_node(std::move(options)), client(peer()) {
         add_held();
         tasks->on_delegate("quick", [] { return 1; });
@@ -51,7 +51,7 @@ BOOST_FIXTURE_TEST_CASE(a_stuck_worker_is_reported_and_replaced, fixture) {
     get_stuck(1);
     BOOST_TEST(client.ask("DELEGATE self:quick id=2") == R"(id=2 {"value":1})");
     BOOST_TEST(log.has("worker 1 is stuck in DELEGATE 'held'"));
-    BOOST_TEST(log.has("another takes its place"));
+    BOOST_TEST(log.has("replaced by another"));
     const auto figures = pool->figures();
     BOOST_TEST(figures.stuck == 1U);
     BOOST_TEST(figures.replaced == 1U);
@@ -68,7 +68,7 @@ BOOST_FIXTURE_TEST_CASE(past_the_last_replacement_new_jobs_are_refused, fixture)
     get_stuck(1);
     get_stuck(2);
     wait_for([&] { return pool->load().workers == 0; });
-    BOOST_TEST(log.has("there is nobody to take its place"));
+    BOOST_TEST(log.has("no replacement is left"));
     const auto reply = client.ask("DELEGATE self:quick id=3");
     BOOST_TEST(reply.starts_with(R"(id=3 {"error":"busy","message":"car1: all its workers are stuck")"), reply);
     hold.open();
@@ -85,7 +85,7 @@ BOOST_FIXTURE_TEST_CASE(a_stuck_job_does_not_hold_up_the_end, fixture) {
     tasks.reset();
     pool.reset();
     BOOST_TEST((std::chrono::steady_clock::now() - before < patience));
-    BOOST_TEST(log.has("workers left behind in jobs that do not end: 1"));
+    BOOST_TEST(log.has("workers abandoned in jobs that do not end: 1"));
     BOOST_TEST(hold.passed() == 0);
     hold.open();
     while (hold.passed() == 0) { // it still finds what it needs
@@ -116,7 +116,7 @@ BOOST_AUTO_TEST_CASE(a_drain_of_nothing_ends_at_once) {
 }
 
 BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_what_is_left_is_answered) {
-    fixture node{{.workers = 1, .patience = 20ms}};
+    fixture node{{.workers = 1, .close_timeout = 20ms}};
     node.client.send("DELEGATE self:held id=1\nDELEGATE self:quick id=2\n");
     node.wait_for([&] { return node.hold.arrived() == 1 && node.pool->load().queued == 1; });
     const auto report = node.drain(10ms);
@@ -132,7 +132,7 @@ BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_what_is_left_is_answered) {
 BOOST_AUTO_TEST_CASE(a_job_that_minds_being_told_ends_with_the_pool) {
     notes told;
     {
-        fixture node{{.workers = 1, .patience = patience}};
+        fixture node{{.workers = 1, .close_timeout = patience}};
         node.tasks->add_work(cles::verb::delegate, "polite", {}, [&](const job_context& job) {
             told.add("begun");
             while (!job.stopped()) {

@@ -6,18 +6,18 @@
 
 #include <string>
 
-using cles::runtime::bad_value;
-using cles::runtime::json_of;
+using cles::runtime::invalid_value;
+using cles::runtime::yaml_to_json;
 
-namespace config_json {
+namespace yaml_value {
 namespace {
 
-std::string json(const std::string& text) { return json_of(YAML::Load(text)); }
+std::string json(const std::string& text) { return yaml_to_json(YAML::Load(text)); }
 
 } // namespace
-} // namespace config_json
+} // namespace yaml_value
 
-BOOST_AUTO_TEST_SUITE(config_json)
+BOOST_AUTO_TEST_SUITE(yaml_value)
 
 BOOST_AUTO_TEST_CASE(what_reads_as_json_is_that_and_the_rest_is_text) {
     BOOST_TEST(json("{limit: 100000, ratio: -1.5e3, on: true, off: false, none: null, tilde: ~, gap: }") ==
@@ -44,13 +44,13 @@ BOOST_AUTO_TEST_CASE(json_is_yaml_and_stays_as_it_is) {
 BOOST_AUTO_TEST_CASE(nothing_is_an_empty_object) { BOOST_TEST(json("~") == "{}"); }
 
 BOOST_AUTO_TEST_CASE(a_single_value_is_refused) {
-    BOOST_CHECK_THROW(json("7"), bad_value);
-    BOOST_CHECK_THROW(json("'{}'"), bad_value);
+    BOOST_CHECK_THROW(json("7"), invalid_value);
+    BOOST_CHECK_THROW(json("'{}'"), invalid_value);
 }
 
 BOOST_AUTO_TEST_CASE(depth_is_bounded) {
     BOOST_TEST(json(std::string(32, '[') + std::string(32, ']')).size() == 64U);
-    BOOST_CHECK_THROW(json(std::string(33, '[') + std::string(33, ']')), bad_value);
+    BOOST_CHECK_THROW(json(std::string(33, '[') + std::string(33, ']')), invalid_value);
 }
 
 BOOST_AUTO_TEST_CASE(anchors_may_not_multiply_without_bound) {
@@ -63,7 +63,7 @@ BOOST_AUTO_TEST_CASE(anchors_may_not_multiply_without_bound) {
         }
         text += "a" + std::to_string(i) + ": &a" + std::to_string(i) + " [" + items + "]\n";
     }
-    BOOST_CHECK_THROW(json(text), bad_value);
+    BOOST_CHECK_THROW(json(text), invalid_value);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -6,11 +6,11 @@
 #include <set>
 #include <vector>
 
-BOOST_AUTO_TEST_SUITE(job_records)
+BOOST_AUTO_TEST_SUITE(job_record_pool)
 
 using cles::runtime::job_record;
 
-std::set<const job_record*> all_of(const cles::runtime::job_records& records) {
+std::set<const job_record*> all_of(const cles::runtime::job_record_pool& records) {
     std::set<const job_record*> all;
     for (std::size_t i = 0; i < records.size(); ++i) {
         all.insert(&records[i]);
@@ -19,10 +19,10 @@ std::set<const job_record*> all_of(const cles::runtime::job_records& records) {
 }
 
 BOOST_AUTO_TEST_CASE(those_in_use_are_found_whatever_goes_between_them) {
-    cles::runtime::job_records records;
+    cles::runtime::job_record_pool records;
     std::vector<job_record*> taken;
     for (int i = 0; i < 5; ++i) {
-        taken.push_back(&records.take({}));
+        taken.push_back(&records.acquire({}));
     }
     records.recycle(*taken[1]);
     records.recycle(*taken[4]);
@@ -34,15 +34,15 @@ BOOST_AUTO_TEST_CASE(those_in_use_are_found_whatever_goes_between_them) {
 }
 
 BOOST_AUTO_TEST_CASE(a_record_is_used_again_and_knows_nothing_of_its_last_job) {
-    cles::runtime::job_records records;
-    auto& first = records.take({});
-    first.result_text() = "left over";
-    first.begun = true;
+    cles::runtime::job_record_pool records;
+    auto& first = records.acquire({});
+    first.result_buffer() = "left over";
+    first.started = true;
     records.recycle(first);
-    auto& second = records.take({});
+    auto& second = records.acquire({});
     BOOST_TEST(&second == &first);
-    BOOST_TEST(second.result_text().empty());
-    BOOST_TEST(!second.begun);
+    BOOST_TEST(second.result_buffer().empty());
+    BOOST_TEST(!second.started);
     BOOST_TEST(!second.stopped());
     records.recycle(second);
 }

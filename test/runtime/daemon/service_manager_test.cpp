@@ -13,18 +13,17 @@
 #include <unistd.h>
 
 using boost::asio::local::datagram_protocol;
-using cles::runtime::notifier;
 
-namespace notify {
+namespace service_manager {
 namespace {
 
-// A service manager: the socket, and what came to it.
-struct manager {
-    explicit manager(const std::string& name) : socket(io, datagram_protocol::endpoint{name}) {}
+// The socket of a service manager, and what it has received.
+struct fake_manager {
+    explicit fake_manager(const std::string& name) : socket(io, datagram_protocol::endpoint{name}) {}
 
-    std::string hear() {
+    std::string receive() {
         std::array<char, 256> buffer{};
-        socket.non_blocking(true); // what was told is there already
+        socket.non_blocking(true); // the datagram has arrived already
         boost::system::error_code code;
         const auto size = socket.receive(boost::asio::buffer(buffer), 0, code);
         return code ? code.message() : std::string{buffer.data(), size};
@@ -40,33 +39,35 @@ std::string fresh_name() {
 }
 
 } // namespace
-} // namespace notify
+} // namespace service_manager
 
-BOOST_AUTO_TEST_SUITE(notify)
+BOOST_AUTO_TEST_SUITE(service_manager)
+
+using notifier = cles::runtime::service_manager;
 
 BOOST_AUTO_TEST_CASE(one_datagram_to_a_path) {
     const auto path = (std::filesystem::temp_directory_path() / fresh_name()).string();
-    manager m{path};
+    fake_manager m{path};
     BOOST_TEST(notifier{path}.ready());
-    BOOST_TEST(m.hear() == "READY=1");
-    BOOST_TEST(m.hear() != "READY=1");
+    BOOST_TEST(m.receive() == "READY=1");
+    BOOST_TEST(m.receive() != "READY=1");
     BOOST_TEST(notifier{path}.stopping());
-    BOOST_TEST(m.hear() == "STOPPING=1");
+    BOOST_TEST(m.receive() == "STOPPING=1");
     std::filesystem::remove(path);
 }
 
 BOOST_AUTO_TEST_CASE(one_datagram_to_an_abstract_socket) {
     const auto name = fresh_name();
-    manager m{std::string{'\0'} + name};
+    fake_manager m{std::string{'\0'} + name};
     BOOST_TEST(notifier{"@" + name}.ready());
-    BOOST_TEST(m.hear() == "READY=1");
+    BOOST_TEST(m.receive() == "READY=1");
 }
 
 BOOST_AUTO_TEST_CASE(a_reload_says_when_it_began) {
     const auto name = fresh_name();
-    manager m{std::string{'\0'} + name};
+    fake_manager m{std::string{'\0'} + name};
     BOOST_TEST(notifier{"@" + name}.reloading(std::chrono::steady_clock::time_point{std::chrono::milliseconds{5}}));
-    BOOST_TEST(m.hear() == "RELOADING=1\nMONOTONIC_USEC=5000");
+    BOOST_TEST(m.receive() == "RELOADING=1\nMONOTONIC_USEC=5000");
 }
 
 BOOST_AUTO_TEST_CASE(nobody_to_tell_is_no_failure) { BOOST_TEST(notifier{""}.ready()); }

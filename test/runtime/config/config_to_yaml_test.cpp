@@ -7,7 +7,7 @@
 
 using namespace cles::runtime;
 
-namespace config_text {
+namespace config_to_yaml {
 namespace {
 
 config all_set() {
@@ -36,9 +36,9 @@ std::string without_comments(std::string text) {
 }
 
 } // namespace
-} // namespace config_text
+} // namespace config_to_yaml
 
-BOOST_AUTO_TEST_SUITE(config_text)
+BOOST_AUTO_TEST_SUITE(config_to_yaml)
 
 BOOST_AUTO_TEST_CASE(what_is_printed_reads_as_the_same) {
     for (const auto& before : {all_set(), default_config("host", 4)}) {

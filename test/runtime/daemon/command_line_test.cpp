@@ -11,21 +11,21 @@
 
 using namespace cles::runtime;
 
-namespace options {
+namespace command_line {
 namespace {
 
-std::variant<cles::runtime::options, std::string> parse(std::vector<const char*> words) {
+std::variant<cles::runtime::command_line_options, std::string> parse(std::vector<const char*> words) {
     words.insert(words.begin(), "clesd");
-    return parse_options(static_cast<int>(words.size()), words.data());
+    return parse_command_line(static_cast<int>(words.size()), words.data());
 }
 
 } // namespace
-} // namespace options
+} // namespace command_line
 
-BOOST_AUTO_TEST_SUITE(options)
+BOOST_AUTO_TEST_SUITE(command_line)
 
 BOOST_AUTO_TEST_CASE(nothing_is_asked_for_without_flags) {
-    const auto wanted = std::get<cles::runtime::options>(parse({}));
+    const auto wanted = std::get<cles::runtime::command_line_options>(parse({}));
     BOOST_TEST(!wanted.config);
     BOOST_TEST(!wanted.check);
     BOOST_TEST(!wanted.print_config);
@@ -34,17 +34,17 @@ BOOST_AUTO_TEST_CASE(nothing_is_asked_for_without_flags) {
 }
 
 BOOST_AUTO_TEST_CASE(every_flag) {
-    const auto wanted = std::get<cles::runtime::options>(
+    const auto wanted = std::get<cles::runtime::command_line_options>(
         parse({"--config", "a.yaml", "--check", "--print-config", "--node", "sat1", "--listen", "tcp://127.0.0.1:1",
                "-l", "udp://127.0.0.1:1", "--seed", "tcp://127.0.0.1:2", "--multicast", "off", "--log", "debug,json"}));
     BOOST_TEST(wanted.config.value() == "a.yaml");
     BOOST_TEST(wanted.check);
     BOOST_TEST(wanted.print_config);
     BOOST_TEST(wanted.flags.node->value == "sat1");
-    BOOST_TEST(wanted.flags.node->by == "--node");
+    BOOST_TEST(wanted.flags.node->source == "--node");
     BOOST_TEST(wanted.flags.listen->value == (std::vector<std::string>{"tcp://127.0.0.1:1", "udp://127.0.0.1:1"}),
                boost::test_tools::per_element());
-    BOOST_TEST(wanted.flags.seeds->by == "--seed");
+    BOOST_TEST(wanted.flags.seeds->source == "--seed");
     BOOST_TEST(wanted.flags.multicast->value == "off");
     BOOST_TEST(wanted.flags.log->value == "debug,json");
 }

@@ -6,7 +6,7 @@
 #include <list>
 #include <string>
 
-BOOST_AUTO_TEST_SUITE(kept_peers)
+BOOST_AUTO_TEST_SUITE(identity_cache)
 
 using cles::identity;
 
@@ -14,7 +14,7 @@ const identity somebody{
     .transport = "tcp", .address = "tcp://127.0.0.1:1", .name = "", .uid = std::nullopt, .local = true};
 
 BOOST_AUTO_TEST_CASE(all_jobs_of_a_link_share_one_copy) {
-    cles::runtime::kept_peers peers;
+    cles::runtime::identity_cache peers;
     const auto first = peers.copy_of(somebody);
     BOOST_TEST(first.get() != &somebody);
     BOOST_TEST(first->address == somebody.address);
@@ -22,7 +22,7 @@ BOOST_AUTO_TEST_CASE(all_jobs_of_a_link_share_one_copy) {
 }
 
 BOOST_AUTO_TEST_CASE(another_link_in_the_same_place_has_its_own) {
-    cles::runtime::kept_peers peers;
+    cles::runtime::identity_cache peers;
     auto place = somebody;
     const auto first = peers.copy_of(place);
     place.address = "tcp://127.0.0.1:2";
@@ -34,7 +34,7 @@ BOOST_AUTO_TEST_CASE(another_link_in_the_same_place_has_its_own) {
 }
 
 BOOST_AUTO_TEST_CASE(links_without_end_take_no_memory_without_end) {
-    cles::runtime::kept_peers peers;
+    cles::runtime::identity_cache peers;
     const std::weak_ptr<const identity> first = peers.copy_of(somebody);
     std::list<identity> others(2000, somebody);
     for (const auto& each : others) {

@@ -8,7 +8,7 @@
 #include <chrono>
 #include <cstddef>
 
-BOOST_AUTO_TEST_SUITE(draining)
+BOOST_AUTO_TEST_SUITE(drain_operation)
 
 using namespace std::chrono_literals;
 using cles::runtime::drain_report;
@@ -19,7 +19,7 @@ struct fixture {
             limit,
             [this] {
                 ++limits;
-                drain.end({.stuck = 1});
+                drain.complete({.stuck = 1});
             },
             [this](const drain_report& how) {
                 ++ends;
@@ -28,18 +28,18 @@ struct fixture {
     }
 
     boost::asio::io_context io;
-    cles::runtime::draining drain{io.get_executor()};
+    cles::runtime::drain_operation drain{io.get_executor()};
     int limits = 0;
     int ends = 0;
     std::size_t stuck = 0;
 };
 
 BOOST_FIXTURE_TEST_CASE(it_ends_with_the_last_job_and_then_has_no_limit, fixture) {
-    BOOST_TEST(!drain.under_way());
+    BOOST_TEST(!drain.is_pending());
     begin(1h);
-    BOOST_TEST(drain.under_way());
-    drain.end({});
-    BOOST_TEST(!drain.under_way());
+    BOOST_TEST(drain.is_pending());
+    drain.complete({});
+    BOOST_TEST(!drain.is_pending());
     io.run(); // returns: nothing waits for the hour
     BOOST_TEST(ends == 1);
     BOOST_TEST(limits == 0);
@@ -51,14 +51,14 @@ BOOST_FIXTURE_TEST_CASE(it_ends_at_its_limit, fixture) {
     BOOST_TEST(limits == 1);
     BOOST_TEST(ends == 1);
     BOOST_TEST(stuck == 1U);
-    BOOST_TEST(!drain.under_way());
+    BOOST_TEST(!drain.is_pending());
 }
 
 BOOST_FIXTURE_TEST_CASE(what_is_forgotten_tells_nobody, fixture) {
     begin(1h);
-    drain.forget();
+    drain.cancel();
     io.run();
-    BOOST_TEST(!drain.under_way());
+    BOOST_TEST(!drain.is_pending());
     BOOST_TEST(ends + limits == 0);
 }
 

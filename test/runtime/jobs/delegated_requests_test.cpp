@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-BOOST_AUTO_TEST_SUITE(onward_jobs)
+BOOST_AUTO_TEST_SUITE(delegated_requests)
 
 using namespace cles::test;
 using namespace std::chrono_literals;

@@ -8,52 +8,52 @@
 #include <thread>
 #include <vector>
 
-BOOST_AUTO_TEST_SUITE(result_box)
+BOOST_AUTO_TEST_SUITE(completion_queue)
 
 using cles::runtime::job_record;
-using box = cles::runtime::result_box;
+using box = cles::runtime::completion_queue;
 
 // Never looked at by the box.
 job_record* some_record(std::uintptr_t number) { return reinterpret_cast<job_record*>(number); }
 
 struct fixture {
-    std::vector<box::item> take() {
-        items.clear();
-        errands.clear();
-        results.take(items, errands);
-        return items;
+    std::vector<box::entry> take() {
+        entries.clear();
+        functions.clear();
+        results.take(entries, functions);
+        return entries;
     }
 
     std::atomic<int> woken{0};
     box results{[this] { ++woken; }};
-    std::vector<box::item> items;
-    std::vector<box::errand> errands;
+    std::vector<box::entry> entries;
+    std::vector<box::function> functions;
 };
 
 BOOST_FIXTURE_TEST_CASE(the_first_thing_wakes_and_the_others_come_along, fixture) {
-    BOOST_TEST(results.put({some_record(8), box::news::ended}));
-    BOOST_TEST(results.put({some_record(16), box::news::progress}));
-    BOOST_TEST(results.put([] {}));
+    BOOST_TEST(results.push({some_record(8), box::event::answered}));
+    BOOST_TEST(results.push({some_record(16), box::event::progress}));
+    BOOST_TEST(results.post([] {}));
     BOOST_TEST(woken == 1);
     const auto got = take();
     BOOST_TEST_REQUIRE(got.size() == 2U);
     BOOST_TEST(got[0].record == some_record(8));
     BOOST_TEST(got[1].record == some_record(16));
-    BOOST_TEST(errands.size() == 1U);
+    BOOST_TEST(functions.size() == 1U);
     BOOST_TEST(take().empty());
 }
 
 BOOST_FIXTURE_TEST_CASE(what_comes_after_a_visit_wakes_again, fixture) {
-    BOOST_TEST(results.put({some_record(8), box::news::ended}));
+    BOOST_TEST(results.push({some_record(8), box::event::answered}));
     take();
-    BOOST_TEST(results.put({some_record(8), box::news::ended}));
+    BOOST_TEST(results.push({some_record(8), box::event::answered}));
     BOOST_TEST(woken == 2);
 }
 
 BOOST_FIXTURE_TEST_CASE(what_has_time_wakes_nobody, fixture) {
-    BOOST_TEST(results.put({some_record(8), box::news::gone}, true));
+    BOOST_TEST(results.push({some_record(8), box::event::released}, true));
     BOOST_TEST(woken == 0);
-    BOOST_TEST(results.put({some_record(16), box::news::ended}));
+    BOOST_TEST(results.push({some_record(16), box::event::answered}));
     BOOST_TEST(woken == 1);
     BOOST_TEST(take().size() == 2U);
 }
@@ -61,7 +61,7 @@ BOOST_FIXTURE_TEST_CASE(what_has_time_wakes_nobody, fixture) {
 BOOST_FIXTURE_TEST_CASE(what_had_time_can_be_hurried, fixture) {
     results.flush(); // there is nothing
     BOOST_TEST(woken == 0);
-    BOOST_TEST(results.put({some_record(8), box::news::ended}, true));
+    BOOST_TEST(results.push({some_record(8), box::event::answered}, true));
     results.flush();
     results.flush();
     BOOST_TEST(woken == 1);
@@ -70,21 +70,21 @@ BOOST_FIXTURE_TEST_CASE(what_had_time_can_be_hurried, fixture) {
 
 BOOST_FIXTURE_TEST_CASE(errands_are_bounded, fixture) {
     int taken = 0;
-    while (results.put([] {})) {
+    while (results.post([] {})) {
         BOOST_TEST_REQUIRE(++taken < 100'000);
     }
     BOOST_TEST(taken >= 1000);
-    BOOST_TEST(results.put({some_record(8), box::news::ended})); // results are not refused
+    BOOST_TEST(results.push({some_record(8), box::event::answered})); // results are not refused
     take();
-    BOOST_TEST(results.put([] {}));
+    BOOST_TEST(results.post([] {}));
 }
 
 BOOST_FIXTURE_TEST_CASE(once_closed_it_takes_nothing, fixture) {
-    BOOST_TEST(results.put({some_record(8), box::news::ended}));
-    results.close(items, errands);
-    BOOST_TEST(items.size() == 1U);
-    BOOST_TEST(!results.put({some_record(8), box::news::ended}));
-    BOOST_TEST(!results.put([] {}));
+    BOOST_TEST(results.push({some_record(8), box::event::answered}));
+    results.close(entries, functions);
+    BOOST_TEST(entries.size() == 1U);
+    BOOST_TEST(!results.push({some_record(8), box::event::answered}));
+    BOOST_TEST(!results.post([] {}));
     BOOST_TEST(woken == 1);
 }
 
@@ -96,18 +96,18 @@ BOOST_AUTO_TEST_CASE(nobody_wakes_once_close_has_returned) {
         std::atomic<bool> begun{false};
         std::thread other{[&] {
             begun = true;
-            while (results.put({some_record(8), box::news::ended})) {
-                std::vector<box::item> items;
-                std::vector<box::errand> errands;
-                results.take(items, errands);
+            while (results.push({some_record(8), box::event::answered})) {
+                std::vector<box::entry> entries;
+                std::vector<box::function> functions;
+                results.take(entries, functions);
             }
         }};
         while (!begun) {
             std::this_thread::yield();
         }
-        std::vector<box::item> items;
-        std::vector<box::errand> errands;
-        results.close(items, errands);
+        std::vector<box::entry> entries;
+        std::vector<box::function> functions;
+        results.close(entries, functions);
         closed = true;
         other.join();
         BOOST_TEST_REQUIRE(!too_late);

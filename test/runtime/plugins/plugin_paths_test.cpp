@@ -7,7 +7,7 @@
 
 using namespace cles::runtime;
 
-namespace plugin_places {
+namespace plugin_paths {
 namespace {
 
 cles::runtime::config from_file(const std::string& file) {
@@ -17,13 +17,13 @@ cles::runtime::config from_file(const std::string& file) {
 }
 
 std::string file_of(const std::string& file, const std::string& path) {
-    return plugin_file(from_file(file), {.path = path});
+    return resolve_plugin_path(from_file(file), {.path = path});
 }
 
 } // namespace
-} // namespace plugin_places
+} // namespace plugin_paths
 
-BOOST_AUTO_TEST_SUITE(plugin_places)
+BOOST_AUTO_TEST_SUITE(plugin_paths)
 
 BOOST_AUTO_TEST_CASE(a_bare_name_stays_one) { BOOST_TEST(file_of("/etc/cles/clesd.yaml", "libx.so") == "libx.so"); }
 
@@ -47,7 +47,7 @@ BOOST_AUTO_TEST_CASE(a_path_stays_a_path) {
 BOOST_AUTO_TEST_CASE(folders_that_are_named_come_first) {
     auto setup = from_file("/etc/cles/clesd.yaml");
     setup.plugin_path = {"/opt/plugins", "mine"};
-    const auto folders = plugin_folders(setup);
+    const auto folders = plugin_search_path(setup);
     BOOST_REQUIRE_GT(folders.size(), 2U);
     BOOST_TEST(folders[0].string() == "/opt/plugins");
     BOOST_TEST(folders[1].string() == "/etc/cles/mine");

@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-BOOST_AUTO_TEST_SUITE(kept_request)
+BOOST_AUTO_TEST_SUITE(owned_request)
 
 using namespace std::chrono_literals;
 
@@ -24,12 +24,12 @@ struct fixture {
                                               .body = body,
                                               .peer = &from,
                                               .deadline = cles::time_point{5s}};
-        kept.keep(cles::request{data}, peer);
+        kept.assign(cles::request{data}, peer);
     } // all that it was made from is gone now
 
     std::shared_ptr<const cles::identity> peer =
         std::make_shared<cles::identity>(cles::identity{.transport = "tcp", .address = "tcp://127.0.0.1:9"});
-    cles::runtime::kept_request kept;
+    cles::runtime::owned_request kept;
 };
 
 BOOST_FIXTURE_TEST_CASE(it_holds_all_that_was_asked, fixture) {

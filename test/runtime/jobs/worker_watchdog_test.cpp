@@ -6,25 +6,25 @@
 #include <chrono>
 #include <vector>
 
-BOOST_AUTO_TEST_SUITE(worker_watch)
+BOOST_AUTO_TEST_SUITE(worker_watchdog)
 
 using namespace std::chrono_literals;
 using cles::time_point;
 
 // Two workers, one replacement, a grace of 2 s.
 struct fixture {
-    using finding = cles::runtime::worker_watch::finding;
+    using stuck_worker = cles::runtime::worker_watchdog::stuck_worker;
 
-    std::vector<finding> check(std::chrono::nanoseconds after) {
-        std::vector<finding> found;
-        watch.check(start + after, [&](const finding& each) { found.push_back(each); });
+    std::vector<stuck_worker> check(std::chrono::nanoseconds after) {
+        std::vector<stuck_worker> found;
+        watch.check(start + after, [&](const stuck_worker& each) { found.push_back(each); });
         return found;
     }
-    void begin(std::size_t place, const int& job, std::chrono::nanoseconds deadline) {
-        watch.begin(place, &job, start, start + deadline);
+    void begin(std::size_t slot, const int& job, std::chrono::nanoseconds deadline) {
+        watch.begin(slot, &job, start, start + deadline);
     }
 
-    cles::runtime::worker_watch watch{2, 1, 2s};
+    cles::runtime::worker_watchdog watch{2, 1, 2s};
     time_point start{1h};
     int a = 0;
     int b = 0;
@@ -42,12 +42,12 @@ BOOST_FIXTURE_TEST_CASE(each_worker_has_a_place_of_its_own, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_past_its_deadline_and_the_grace_is_found_once, fixture) {
-    const auto place = watch.enter();
-    begin(place, a, 5s);
+    const auto slot = watch.enter();
+    begin(slot, a, 5s);
     BOOST_TEST(check(7s).empty());
     const auto found = check(7s + 1ns);
     BOOST_TEST_REQUIRE(found.size() == 1U);
-    BOOST_TEST(found[0].place == place);
+    BOOST_TEST(found[0].slot == slot);
     BOOST_TEST(found[0].job == &a);
     BOOST_TEST((found[0].busy_for == 7s + 1ns));
     BOOST_TEST(found[0].replaced);
@@ -58,33 +58,33 @@ BOOST_FIXTURE_TEST_CASE(a_job_past_its_deadline_and_the_grace_is_found_once, fix
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_that_was_told_to_stop_has_the_grace_from_then, fixture) {
-    const auto place = watch.enter();
-    begin(place, a, 1h);
-    watch.stop(place, &a, start + 1s);
+    const auto slot = watch.enter();
+    begin(slot, a, 1h);
+    watch.stop(slot, &a, start + 1s);
     BOOST_TEST(check(3s).empty());
     BOOST_TEST(check(3s + 1ns).size() == 1U);
 }
 
 BOOST_FIXTURE_TEST_CASE(being_told_late_gains_nothing, fixture) {
-    const auto place = watch.enter();
-    begin(place, a, 1s);
-    watch.stop(place, &a, start + 2s);
+    const auto slot = watch.enter();
+    begin(slot, a, 1s);
+    watch.stop(slot, &a, start + 2s);
     BOOST_TEST(check(3s + 1ns).size() == 1U);
 }
 
 BOOST_FIXTURE_TEST_CASE(telling_a_job_that_has_ended_does_not_hurry_the_next, fixture) {
-    const auto place = watch.enter();
-    begin(place, a, 1h);
-    watch.end(place);
-    begin(place, b, 1h);
-    watch.stop(place, &a, start);
+    const auto slot = watch.enter();
+    begin(slot, a, 1h);
+    watch.end(slot);
+    begin(slot, b, 1h);
+    watch.stop(slot, &a, start);
     BOOST_TEST(check(10s).empty());
 }
 
 BOOST_FIXTURE_TEST_CASE(who_is_idle_is_not_stuck, fixture) {
-    const auto place = watch.enter();
-    begin(place, a, 1s);
-    BOOST_TEST(!watch.end(place));
+    const auto slot = watch.enter();
+    begin(slot, a, 1s);
+    BOOST_TEST(!watch.end(slot));
     BOOST_TEST(check(1h).empty());
 }
 
@@ -103,15 +103,15 @@ BOOST_FIXTURE_TEST_CASE(there_are_as_many_replacements_as_there_are, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(who_comes_back_makes_its_replacement_one_too_many, fixture) {
-    const auto place = watch.enter();
-    begin(place, a, 1s);
+    const auto slot = watch.enter();
+    begin(slot, a, 1s);
     check(1min);
     BOOST_TEST(watch.allowed() == 3U);
-    BOOST_TEST(watch.end(place));
+    BOOST_TEST(watch.end(slot));
     BOOST_TEST(watch.allowed() == 2U);
     BOOST_TEST(watch.usable() == 2U);
     BOOST_TEST(watch.stuck() == 0U);
-    begin(place, b, 1s); // and can be found again
+    begin(slot, b, 1s); // and can be found again
     BOOST_TEST(check(1min).size() == 1U);
 }
 
