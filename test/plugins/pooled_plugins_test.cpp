@@ -111,6 +111,12 @@ BOOST_AUTO_TEST_CASE(a_job_may_refuse_by_the_bare_entry_point_from_any_thread_an
     wait_for([&] { return host.figures().answered_twice == 1; }); // the second try may still be on its way
 }
 
+BOOST_AUTO_TEST_CASE(an_answer_that_is_not_json_is_not_passed_on) {
+    load("rough.so");
+    BOOST_TEST(peer().ask("DELEGATE self:no_json") ==
+               R"({"error":"failed","message":"car1: the plugin's answer is not JSON"})");
+}
+
 BOOST_AUTO_TEST_CASE(a_job_that_waits_for_others_is_told_once_that_the_node_stops) {
     cles::service other{io, listening("other")};
     std::vector<cles::responder> kept;

@@ -1,23 +1,21 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_context.hpp"
 
-#include "jobs/job_dispatcher.hpp"
 #include "jobs/job_record.hpp"
 
 #include <memory>
 
 namespace cles::runtime {
-namespace {
 
-/// Connects a responder to a job.
-class job_control final : public detail::call_control {
+/// Connects a responder to a job. Results and details of progress come from `to_json`, so that they have been checked.
+class job_context::control final : public detail::call_control {
   public:
-    explicit job_control(job_context job) noexcept : job_(std::move(job)) {}
+    explicit control(job_context job) noexcept : job_(std::move(job)) {}
 
-    void done(std::string_view json) override { job_.done(json); }
+    void done(std::string_view json) override { job_.record_->done(json); }
     void fail(errc code, std::string_view message) override { job_.fail(code, message); }
     void refuse(std::string_view message, std::chrono::milliseconds retry) override { job_.refuse(message, retry); }
-    bool progress(double fraction, std::string_view json) override { return job_.progress(fraction, json); }
+    bool progress(double fraction, std::string_view json) override { return job_.record_->progress(fraction, json); }
     void on_stop(std::function<void()> callback) override { job_.on_stop(std::move(callback)); }
     [[nodiscard]] bool stopped() const noexcept override { return job_.stopped(); }
     void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
@@ -30,6 +28,16 @@ class job_control final : public detail::call_control {
   private:
     job_context job_;
 };
+
+namespace {
+
+// \throws cles::error if the text is not JSON
+std::string compact(std::string_view json) {
+    std::string text;
+    json_writer writer{text};
+    detail::write_text(writer, json);
+    return text;
+}
 
 } // namespace
 
@@ -45,7 +53,16 @@ const cles::request& job_context::request() const noexcept { return record_->req
 
 bool job_context::stopped() const noexcept { return record_->stopped(); }
 
-void job_context::done(std::string_view json) const { record_->done(json); }
+void job_context::done(std::string_view json) const {
+    std::string result;
+    try {
+        result = json.empty() ? "" : compact(json);
+    } catch (const error& e) {
+        fail(errc::failed, e.message());
+        return;
+    }
+    record_->done(result);
+}
 
 void job_context::fail(errc code, std::string_view message) const { record_->fail(code, message); }
 
@@ -55,11 +72,13 @@ void job_context::refuse(std::string_view message, std::chrono::milliseconds ret
 
 // The exception becomes text on this thread, because it belongs to the code that threw it.
 void job_context::fail(const std::exception_ptr& thrown) const {
-    job_control control{*this};
-    detail::fail_with(control, thrown);
+    control call{*this};
+    detail::fail_with(call, thrown);
 }
 
-bool job_context::progress(double fraction, std::string_view json) const { return record_->progress(fraction, json); }
+bool job_context::progress(double fraction, std::string_view json) const {
+    return record_->wants_progress() && record_->progress(fraction, compact(json.empty() ? "{}" : json));
+}
 
 void job_context::on_stop(std::function<void()> callback) const { record_->on_stop(std::move(callback)); }
 
@@ -69,7 +88,7 @@ void job_context::delegate(std::string_view command, const call_options& options
 
 void job_context::log(log_level level, std::string_view text) const { record_->log(level, text); }
 
-responder job_context::as_responder() const { return responder{std::make_shared<job_control>(*this)}; }
+responder job_context::as_responder() const { return responder{std::make_shared<control>(*this)}; }
 
 std::string& job_context::result_buffer() const { return record_->result_buffer(); }
 

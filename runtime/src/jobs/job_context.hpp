@@ -93,6 +93,7 @@ class job_context {
     friend job_record;
     friend delegated_requests;
     friend job_dispatcher;
+    class control;
 
     [[nodiscard]] std::string& result_buffer() const;
     void set_result_written() const;

@@ -115,15 +115,7 @@ void job_record::done(std::string_view json) {
     if (!claim_answer()) {
         return;
     }
-    try {
-        if (!json.empty()) {
-            json_writer writer{result_};
-            detail::write_text(writer, json);
-        }
-    } catch (const error& e) {
-        result_ = e.message();
-        failure_ = errc::failed;
-    }
+    result_ = json;
     post_answer();
 }
 
@@ -151,23 +143,25 @@ void job_record::fail(const std::exception_ptr& thrown) {
     job_context{*this}.fail(thrown);
 }
 
+bool job_record::wants_progress() const noexcept {
+    return !stopped() && !answered_.load(std::memory_order_relaxed) &&
+           !progress_unwanted_.load(std::memory_order_relaxed);
+}
+
 bool job_record::progress(double fraction, std::string_view json) {
-    if (stopped() || answered_.load(std::memory_order_relaxed) || progress_unwanted_.load(std::memory_order_relaxed)) {
+    if (!wants_progress()) {
         return false;
     }
-    std::string details;
-    json_writer writer{details};
-    detail::write_text(writer, json.empty() ? "{}" : json);
     if (std::isnan(fraction)) {
         fraction = 0;
     }
     {
         const std::lock_guard lock{mutex_};
         if (reports_.size() >= max_reports) {
-            reports_.back() = {fraction, std::move(details)};
+            reports_.back() = {fraction, std::string{json}};
             return true;
         }
-        reports_.push_back({fraction, std::move(details)});
+        reports_.push_back({fraction, std::string{json}});
         if (reports_.size() != 1) {
             return true; // an earlier one is being delivered
         }

@@ -41,10 +41,13 @@ class job_record final : public job_queue::item {
     /// The last release answers the job if it has not been answered, and returns the record.
     void release() noexcept;
 
+    /// \param json compact, or empty; not checked again
     void done(std::string_view json);
     void fail(errc code, std::string_view message);
     void refuse(std::string_view message, std::chrono::milliseconds retry);
+    /// \param json compact; not checked again
     bool progress(double fraction, std::string_view json);
+    [[nodiscard]] bool wants_progress() const noexcept;
     void on_stop(std::function<void()> callback);
     void delegate(std::string_view command, const call_options& options, answer_callback answered);
     void log(log_level level, std::string_view text);

@@ -28,7 +28,9 @@ void send_answer(const responder& to, std::string_view json) {
         return;
     }
     try {
-        const auto checked = to_json(json_text{std::string{json}});
+        std::string checked; // the only check of a result: what follows trusts it
+        json_writer writer{checked};
+        detail::write_text(writer, json);
         to.done(compact_json{checked});
     } catch (...) {
         to.fail(errc::failed, "the plugin's answer is not JSON");

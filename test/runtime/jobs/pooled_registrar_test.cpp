@@ -10,6 +10,20 @@
 #include <string>
 #include <thread>
 
+namespace pooled_registrar {
+namespace {
+
+// Written by its converter with white space, which only a further check would remove.
+struct spaced {};
+
+} // namespace
+} // namespace pooled_registrar
+
+template <>
+struct cles::converter<pooled_registrar::spaced> {
+    static void write(json_writer& w, const pooled_registrar::spaced&) { w.raw(R"({"a": [1, 2]})"); }
+};
+
 BOOST_AUTO_TEST_SUITE(pooled_registrar)
 
 using namespace cles::test;
@@ -119,6 +133,23 @@ BOOST_FIXTURE_TEST_CASE(a_body_that_does_not_fit_never_runs, fixture) {
     tasks->on_push("speed", [&](int) { ++ran; });
     BOOST_TEST(ask("PUSH self:speed {\"value\":\"x\"}").starts_with(R"({"error":"bad_request")"));
     BOOST_TEST(ran == 0);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_result_is_checked_where_it_is_written_and_not_again, fixture) {
+    const auto answer_spaced = [](const cles::request&, cles::responder answer) { answer.done(spaced{}); };
+    tasks->on_delegate("inline", answer_spaced, {.inline_ok = true});
+    tasks->on_delegate("pooled", answer_spaced);
+    tasks->on_delegate(
+        "text", [](const cles::request&, cles::responder answer) { answer.done(cles::json_text{R"({"a": [1, 2]})"}); });
+    tasks->on_delegate("reports", [](const cles::request&, cles::responder answer) {
+        answer.progress(0.5, spaced{});
+        answer.done();
+    });
+    BOOST_TEST(ask("DELEGATE self:inline") == R"({"a": [1, 2]})");
+    BOOST_TEST(ask("DELEGATE self:pooled") == R"({"a": [1, 2]})");
+    BOOST_TEST(ask("DELEGATE self:text") == R"({"a":[1,2]})");
+    const auto report = ask("DELEGATE self:reports id=1 progress=yes");
+    BOOST_TEST(report.ends_with(R"({"a": [1, 2]})"), report);
 }
 
 BOOST_FIXTURE_TEST_CASE(a_name_is_taken_once, fixture) {
