@@ -117,7 +117,7 @@ const mistake mistakes[] = {
 
 BOOST_AUTO_TEST_SUITE(config_file)
 
-BOOST_AUTO_TEST_CASE(every_key_of_the_page) {
+BOOST_AUTO_TEST_CASE(every_key) {
     const auto c = read("node: sat1\n"
                         "pool: north\n"
                         "allow_clash: true\n"
@@ -179,7 +179,7 @@ BOOST_AUTO_TEST_CASE(every_key_of_the_page) {
     check(c);
 }
 
-BOOST_AUTO_TEST_CASE(what_is_not_said_stays_as_it_is) {
+BOOST_AUTO_TEST_CASE(missing_keys_keep_their_values) {
     const auto c = read("# nothing\n");
     const auto d = default_config("host", 4);
     BOOST_TEST(c.node == "host");
@@ -191,7 +191,7 @@ BOOST_AUTO_TEST_CASE(what_is_not_said_stays_as_it_is) {
     BOOST_TEST(read("").node == "host");
 }
 
-BOOST_AUTO_TEST_CASE(multicast_is_turned_off_or_named_in_a_word) {
+BOOST_AUTO_TEST_CASE(multicast_as_a_scalar) {
     BOOST_TEST(!read("multicast: off\n").multicast.is_on());
     BOOST_TEST(read("multicast: \"off\"\n").multicast.is_on() == false);
     BOOST_TEST(read("multicast: eth0\n").multicast.interface == "eth0");
@@ -202,7 +202,7 @@ BOOST_AUTO_TEST_CASE(multicast_is_turned_off_or_named_in_a_word) {
     BOOST_TEST(read("multicast: {interface: auto}\n").multicast.interface == "auto");
 }
 
-BOOST_AUTO_TEST_CASE(a_limit_is_rounded_up_since_0_turns_some_off) {
+BOOST_AUTO_TEST_CASE(a_duration_limit_is_rounded_up) {
     BOOST_TEST((read("limits: {first_line: 500us}\n").limits.first_line == 1ms));
     BOOST_TEST((read("limits: {first_line: 0.1us}\n").limits.first_line == 1ms));
     BOOST_TEST((read("limits: {first_line: 1500us}\n").limits.first_line == 2ms));
@@ -210,7 +210,7 @@ BOOST_AUTO_TEST_CASE(a_limit_is_rounded_up_since_0_turns_some_off) {
     BOOST_TEST(refusal("limits: {lease: 60000001us}\n").find("is too long") != std::string::npos);
 }
 
-BOOST_AUTO_TEST_CASE(each_value_knows_its_line) {
+BOOST_AUTO_TEST_CASE(each_value_has_its_line) {
     const auto c = read("node: sat1\n\nmulticast:\n  port: 4000\nplugins:\n  - path: a.so\n  - b.so\n");
     BOOST_TEST(c.origins.at("node") == "clesd.yaml:1");
     BOOST_TEST(c.origins.at("multicast.port") == "clesd.yaml:4");
@@ -219,13 +219,13 @@ BOOST_AUTO_TEST_CASE(each_value_knows_its_line) {
     BOOST_TEST(c.location_of("workers") == "workers");
 }
 
-BOOST_DATA_TEST_CASE(a_mistake_is_named_with_file_line_and_key, boost::unit_test::data::make(mistakes), wrong) {
+BOOST_DATA_TEST_CASE(an_error_names_file_line_and_key, boost::unit_test::data::make(mistakes), wrong) {
     const auto said = refusal(wrong.text);
     BOOST_TEST(said.starts_with(wrong.place), said);
     BOOST_TEST(said.find(wrong.why) != std::string::npos, said);
 }
 
-BOOST_AUTO_TEST_CASE(a_file_that_cannot_be_read_is_said_so) {
+BOOST_AUTO_TEST_CASE(an_unreadable_file_is_an_error) {
     config c;
     BOOST_CHECK_EXCEPTION(read_config_file("/nowhere/clesd.yaml", c), config_error, [](const config_error& e) {
         return std::string{e.what()} == "/nowhere/clesd.yaml: cannot be read: No such file or directory";

@@ -53,13 +53,13 @@ BOOST_AUTO_TEST_CASE(every_variable) {
     BOOST_TEST(c.location_of("listen[1]") == "CLES_LISTEN: listen[1]");
 }
 
-BOOST_AUTO_TEST_CASE(an_empty_variable_says_nothing) {
+BOOST_AUTO_TEST_CASE(empty_variables_are_ignored) {
     const auto none = of({{"CLES_NODE", ""}, {"CLES_SEEDS", ""}});
     BOOST_TEST(!none.node);
     BOOST_TEST(!none.seeds);
 }
 
-BOOST_AUTO_TEST_CASE(a_mistake_names_its_variable) {
+BOOST_AUTO_TEST_CASE(an_error_names_the_variable) {
     BOOST_TEST(refusal({{"CLES_NODE", "self"}}).starts_with("CLES_NODE: 'self' is not a valid node name"));
     BOOST_TEST(refusal({{"CLES_LISTEN", "tcp://127.0.0.1:1,there"}}).starts_with("CLES_LISTEN: "));
     BOOST_TEST(refusal({{"CLES_SEEDS", "there"}}).starts_with("CLES_SEEDS: "));
@@ -67,7 +67,7 @@ BOOST_AUTO_TEST_CASE(a_mistake_names_its_variable) {
     BOOST_TEST(refusal({{"CLES_LOG", "loud"}}).starts_with("CLES_LOG: 'loud' is not a log setting"));
 }
 
-BOOST_AUTO_TEST_CASE(what_is_overridden_comes_from_the_file_no_more) {
+BOOST_AUTO_TEST_CASE(an_override_replaces_the_origin) {
     auto c = default_config("host", 1);
     c.origins = {{"listen", "f:1"}, {"listen[0]", "f:2"}, {"listen[1]", "f:3"}, {"listeners", "f:4"}};
     apply({.listen = overrides::given<std::vector<std::string>>{{"tcp://127.0.0.1:1"}, "--listen"}}, c);

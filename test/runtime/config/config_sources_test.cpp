@@ -49,7 +49,7 @@ struct scratch {
 
 BOOST_FIXTURE_TEST_SUITE(config_sources, scratch)
 
-BOOST_AUTO_TEST_CASE(a_flag_goes_before_the_environment_that_before_the_file_and_that_before_the_default) {
+BOOST_AUTO_TEST_CASE(flags_override_the_environment_the_file_and_the_defaults) {
     variables["CLES_CONFIG"] = write("all.yaml", "node: from_file\nqueue: 7\nlog: debug\n");
     BOOST_TEST(load(sources).node == "from_file");
     variables["CLES_NODE"] = "from_environment";
@@ -63,7 +63,7 @@ BOOST_AUTO_TEST_CASE(a_flag_goes_before_the_environment_that_before_the_file_and
     BOOST_TEST(all.origins.at("node") == "--node");
 }
 
-BOOST_AUTO_TEST_CASE(a_file_named_by_flag_goes_before_one_named_in_the_environment) {
+BOOST_AUTO_TEST_CASE(a_file_named_by_flag_overrides_one_named_in_the_environment) {
     BOOST_TEST(load(sources).node == "named");
     sources.file = write("flag.yaml", "node: flagged\n");
     const auto made = load(sources);
@@ -71,12 +71,12 @@ BOOST_AUTO_TEST_CASE(a_file_named_by_flag_goes_before_one_named_in_the_environme
     BOOST_TEST(made.file == *sources.file);
 }
 
-BOOST_AUTO_TEST_CASE(a_file_that_is_named_has_to_be_there) {
+BOOST_AUTO_TEST_CASE(a_named_file_has_to_exist) {
     variables["CLES_CONFIG"] = (folder / "missing.yaml").string();
     BOOST_CHECK_THROW(load(sources), config_error);
 }
 
-BOOST_AUTO_TEST_CASE(the_usual_places_in_their_order) {
+BOOST_AUTO_TEST_CASE(the_default_locations_in_order) {
     variables["HOME"] = "/home/u";
     BOOST_TEST(
         default_locations(sources.variable) ==
@@ -86,14 +86,14 @@ BOOST_AUTO_TEST_CASE(the_usual_places_in_their_order) {
     BOOST_TEST(default_locations(sources.variable).at(1) == "/x/cles/clesd.yaml");
 }
 
-BOOST_AUTO_TEST_CASE(the_first_place_that_has_one_is_taken) {
+BOOST_AUTO_TEST_CASE(the_first_location_with_a_file_is_used) {
     variables.erase("CLES_CONFIG");
     variables["XDG_CONFIG_HOME"] = folder.string();
     write("cles/clesd.yaml", "node: mine\n");
     BOOST_TEST(load(sources).node == "mine");
 }
 
-BOOST_AUTO_TEST_CASE(what_only_shows_in_the_whole_is_refused_too) {
+BOOST_AUTO_TEST_CASE(values_are_checked_together) {
     variables["CLES_LISTEN"] = "tcp://0.0.0.0:1";
     BOOST_CHECK_EXCEPTION(load(sources), config_error, [](const config_error& e) {
         return std::string{e.what()}.starts_with("CLES_LISTEN: listen[0]: 'tcp://0.0.0.0:1' can be reached");

@@ -22,7 +22,7 @@ std::string refusal(const config& whole) {
 
 BOOST_AUTO_TEST_SUITE(config)
 
-BOOST_AUTO_TEST_CASE(the_defaults_can_be_used) {
+BOOST_AUTO_TEST_CASE(the_defaults_are_valid) {
     const auto c = default_config("host", 0);
     BOOST_TEST(refusal(c) == "accepted");
     BOOST_TEST(c.workers == 1U);
@@ -30,7 +30,7 @@ BOOST_AUTO_TEST_CASE(the_defaults_can_be_used) {
     BOOST_TEST(!c.multicast.required);
 }
 
-BOOST_AUTO_TEST_CASE(a_node_is_called_as_its_machine_as_far_as_it_may) {
+BOOST_AUTO_TEST_CASE(the_node_name_defaults_to_the_host_name) {
     BOOST_TEST(default_config("sat1.example.org", 1).node == "sat1");
     BOOST_TEST(default_config("my host", 1).node == "my-host");
     BOOST_TEST(default_config("", 1).node == "node");
@@ -38,7 +38,7 @@ BOOST_AUTO_TEST_CASE(a_node_is_called_as_its_machine_as_far_as_it_may) {
     BOOST_TEST(default_config(std::string(100, 'x'), 1).node.size() == 64U);
 }
 
-BOOST_AUTO_TEST_CASE(listening_beyond_this_host_has_to_be_meant) {
+BOOST_AUTO_TEST_CASE(listening_for_other_hosts_requires_insecure) {
     auto c = default_config("host", 1);
     c.listen = {"tcp://127.0.0.1", "tcp://0.0.0.0"};
     c.origins["listen[1]"] = "clesd.yaml:3";
@@ -48,7 +48,7 @@ BOOST_AUTO_TEST_CASE(listening_beyond_this_host_has_to_be_meant) {
     BOOST_TEST(refusal(c) == "accepted");
 }
 
-BOOST_AUTO_TEST_CASE(multicast_beyond_this_host_has_to_be_meant) {
+BOOST_AUTO_TEST_CASE(multicast_to_other_hosts_requires_insecure) {
     auto c = default_config("host", 1);
     c.multicast.interface = "eth0";
     c.origins["multicast"] = "CLES_MULTICAST";
@@ -61,21 +61,21 @@ BOOST_AUTO_TEST_CASE(multicast_beyond_this_host_has_to_be_meant) {
     BOOST_TEST(refusal(c) == "accepted");
 }
 
-BOOST_AUTO_TEST_CASE(a_peer_may_not_bear_the_nodes_own_name) {
+BOOST_AUTO_TEST_CASE(a_peer_may_not_have_the_nodes_name) {
     auto c = default_config("host", 1);
     c.peers["host"] = "tcp://127.0.0.1:1";
     c.origins["peers.host"] = "clesd.yaml:4";
     BOOST_TEST(refusal(c) == "clesd.yaml:4: peers.host: is this node's own name");
 }
 
-BOOST_AUTO_TEST_CASE(a_plugin_is_loaded_once) {
+BOOST_AUTO_TEST_CASE(a_plugin_is_listed_once) {
     auto c = default_config("host", 1);
     c.plugins = {{.path = "a.so"}, {.path = "b.so"}, {.path = "a.so"}};
     c.origins["plugins[2]"] = "clesd.yaml:9";
     BOOST_TEST(refusal(c) == "clesd.yaml:9: plugins[2].path: 'a.so' is listed twice");
 }
 
-BOOST_AUTO_TEST_CASE(a_place_is_that_of_what_holds_it_where_it_has_none) {
+BOOST_AUTO_TEST_CASE(a_location_falls_back_to_the_containing_value) {
     auto c = default_config("host", 1);
     c.origins["listen"] = "clesd.yaml:3";
     BOOST_TEST(c.location_of("listen[1]") == "clesd.yaml:3: listen[1]");

@@ -40,7 +40,7 @@ std::string without_comments(std::string text) {
 
 BOOST_AUTO_TEST_SUITE(config_to_yaml)
 
-BOOST_AUTO_TEST_CASE(what_is_printed_reads_as_the_same) {
+BOOST_AUTO_TEST_CASE(printed_configuration_reads_back) {
     for (const auto& before : {all_set(), default_config("host", 4)}) {
         auto after = default_config("other", 1);
         const auto text = to_yaml(before);
@@ -54,7 +54,7 @@ BOOST_AUTO_TEST_CASE(what_is_printed_reads_as_the_same) {
     }
 }
 
-BOOST_AUTO_TEST_CASE(several_interfaces_stay_several) {
+BOOST_AUTO_TEST_CASE(several_interfaces_read_back) {
     auto c = default_config("host", 1);
     c.multicast.interface = "lo,eth0";
     auto after = default_config("host", 1);
@@ -62,7 +62,7 @@ BOOST_AUTO_TEST_CASE(several_interfaces_stay_several) {
     BOOST_TEST((after.multicast == c.multicast));
 }
 
-BOOST_AUTO_TEST_CASE(multicast_that_is_off_stays_off) {
+BOOST_AUTO_TEST_CASE(disabled_multicast_reads_back) {
     auto c = default_config("host", 4);
     c.multicast.interface.clear();
     auto after = default_config("other", 1);
@@ -70,7 +70,7 @@ BOOST_AUTO_TEST_CASE(multicast_that_is_off_stays_off) {
     BOOST_TEST(!after.multicast.is_on());
 }
 
-BOOST_AUTO_TEST_CASE(each_value_says_where_it_comes_from) {
+BOOST_AUTO_TEST_CASE(each_value_has_its_origin) {
     const auto text = to_yaml(all_set());
     BOOST_TEST(text.find("node: \"007\"  # clesd.yaml:1\n") != std::string::npos, text);
     BOOST_TEST(text.find("drain: 2min  # clesd.yaml:14\n") != std::string::npos, text);

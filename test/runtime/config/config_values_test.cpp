@@ -29,7 +29,7 @@ std::string refusal(const std::function<void()>& read) {
 
 BOOST_AUTO_TEST_SUITE(config_values)
 
-BOOST_AUTO_TEST_CASE(switches) {
+BOOST_AUTO_TEST_CASE(booleans) {
     for (const auto* text : {"true", "on", "yes"}) {
         BOOST_TEST(to_bool(text));
     }
@@ -41,7 +41,7 @@ BOOST_AUTO_TEST_CASE(switches) {
     }
 }
 
-BOOST_AUTO_TEST_CASE(counts_keep_to_their_bounds) {
+BOOST_AUTO_TEST_CASE(counts_are_bounded) {
     BOOST_TEST(to_count("1", 1, 99) == 1U);
     BOOST_TEST(to_count("99", 1, 99) == 99U);
     for (const auto* text : {"0", "100", "-1", "+1", "1.0", "1e1", "", "0x10", " 1", "99999999999999999999"}) {
@@ -79,7 +79,7 @@ BOOST_AUTO_TEST_CASE(durations_have_units) {
     BOOST_TEST(refusal([] { to_duration("25h"); }) == "'25h' is more than a day");
 }
 
-BOOST_AUTO_TEST_CASE(a_duration_is_written_as_it_is_read) {
+BOOST_AUTO_TEST_CASE(durations_read_back) {
     for (const auto* text : {"0", "1us", "250ms", "1500ms", "90s", "2min", "1h", "24h"}) {
         BOOST_TEST(to_string(to_duration(text)) == text);
     }
@@ -96,7 +96,7 @@ BOOST_AUTO_TEST_CASE(node_names) {
     }
 }
 
-BOOST_AUTO_TEST_CASE(urls_of_links_that_others_can_reach) {
+BOOST_AUTO_TEST_CASE(urls_that_others_can_reach) {
     for (const auto* text : {"tcp://127.0.0.1:25370", "udp://[::1]", "unix:///run/x", "unix://@x"}) {
         BOOST_TEST(to_url(text) == text);
     }
@@ -122,7 +122,7 @@ BOOST_AUTO_TEST_CASE(multicast) {
     BOOST_TEST(refusal([] { to_multicast("eth0,10.0.0.1"); }).find("multicast group") != std::string::npos);
 }
 
-BOOST_AUTO_TEST_CASE(what_to_log_and_how) {
+BOOST_AUTO_TEST_CASE(log_settings) {
     const log_config before{.level = cles::log_level::warning, .format = log_format::json};
     BOOST_TEST((to_log_config("debug", before) == log_config{cles::log_level::debug, log_format::json}));
     BOOST_TEST((to_log_config("text", before) == log_config{cles::log_level::warning, log_format::text}));

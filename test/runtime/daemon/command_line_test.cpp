@@ -24,7 +24,7 @@ std::variant<cles::runtime::command_line_options, std::string> parse(std::vector
 
 BOOST_AUTO_TEST_SUITE(command_line)
 
-BOOST_AUTO_TEST_CASE(nothing_is_asked_for_without_flags) {
+BOOST_AUTO_TEST_CASE(without_flags_nothing_is_set) {
     const auto wanted = std::get<cles::runtime::command_line_options>(parse({}));
     BOOST_TEST(!wanted.config);
     BOOST_TEST(!wanted.check);
@@ -54,7 +54,7 @@ BOOST_AUTO_TEST_CASE(help_and_version_are_printed) {
     BOOST_TEST(std::get<std::string>(parse({"--help"})).find("--print-config") != std::string::npos);
 }
 
-BOOST_AUTO_TEST_CASE(what_is_not_understood_is_refused) {
+BOOST_AUTO_TEST_CASE(invalid_command_lines_are_refused) {
     BOOST_CHECK_THROW(parse({"--verbose"}), usage_error);
     BOOST_CHECK_THROW(parse({"start"}), usage_error);
     BOOST_CHECK_THROW(parse({"--node"}), usage_error);

@@ -63,16 +63,16 @@ BOOST_AUTO_TEST_CASE(one_datagram_to_an_abstract_socket) {
     BOOST_TEST(m.receive() == "READY=1");
 }
 
-BOOST_AUTO_TEST_CASE(a_reload_says_when_it_began) {
+BOOST_AUTO_TEST_CASE(a_reload_has_a_timestamp) {
     const auto name = fresh_name();
     fake_manager m{std::string{'\0'} + name};
     BOOST_TEST(notifier{"@" + name}.reloading(std::chrono::steady_clock::time_point{std::chrono::milliseconds{5}}));
     BOOST_TEST(m.receive() == "RELOADING=1\nMONOTONIC_USEC=5000");
 }
 
-BOOST_AUTO_TEST_CASE(nobody_to_tell_is_no_failure) { BOOST_TEST(notifier{""}.ready()); }
+BOOST_AUTO_TEST_CASE(without_a_service_manager_nothing_fails) { BOOST_TEST(notifier{""}.ready()); }
 
-BOOST_AUTO_TEST_CASE(who_cannot_be_told_is_one) {
+BOOST_AUTO_TEST_CASE(an_unreachable_service_manager_is_a_failure) {
     BOOST_TEST(!notifier{"@" + fresh_name()}.ready());
     BOOST_TEST(!notifier{"/nowhere/at/all"}.ready());
     BOOST_TEST(!notifier{"relative"}.ready());

@@ -21,26 +21,26 @@ struct fixture {
     int b = 0;
 };
 
-BOOST_FIXTURE_TEST_CASE(the_first_of_a_task_is_sent_at_once, fixture) {
+BOOST_FIXTURE_TEST_CASE(the_first_result_of_a_task_is_sent_at_once, fixture) {
     BOOST_TEST(!begin(a));
     BOOST_TEST(begin(a));
     BOOST_TEST(!begin(b));
     BOOST_TEST(!begin(a));
 }
 
-BOOST_FIXTURE_TEST_CASE(the_last_that_waits_is_sent_at_once, fixture) {
+BOOST_FIXTURE_TEST_CASE(the_result_of_the_last_queued_job_is_sent_at_once, fixture) {
     begin(a);
     BOOST_TEST(!begin(a, false));
     BOOST_TEST(!worker.may_defer_before(&a));
 }
 
-BOOST_FIXTURE_TEST_CASE(long_jobs_keep_nothing_back, fixture) {
+BOOST_FIXTURE_TEST_CASE(long_jobs_are_not_deferred, fixture) {
     begin(a);
     BOOST_TEST(begin(a, true, limits::small_job - 1ns));
     BOOST_TEST(!begin(a, true, limits::small_job));
 }
 
-BOOST_FIXTURE_TEST_CASE(before_a_job_of_another_task_or_none_all_are_sent, fixture) {
+BOOST_FIXTURE_TEST_CASE(results_are_sent_before_a_job_of_another_task, fixture) {
     begin(a);
     begin(a);
     BOOST_TEST(worker.may_defer_before(&a));
@@ -48,7 +48,7 @@ BOOST_FIXTURE_TEST_CASE(before_a_job_of_another_task_or_none_all_are_sent, fixtu
     BOOST_TEST(!worker.may_defer_before(nullptr));
 }
 
-BOOST_FIXTURE_TEST_CASE(nothing_is_kept_for_long, fixture) {
+BOOST_FIXTURE_TEST_CASE(results_are_deferred_briefly, fixture) {
     begin(a);
     begin(a);
     worker.deferred(now);
@@ -62,7 +62,7 @@ BOOST_FIXTURE_TEST_CASE(nothing_is_kept_for_long, fixture) {
     BOOST_TEST(begin(a));
 }
 
-BOOST_FIXTURE_TEST_CASE(not_many_are_kept, fixture) {
+BOOST_FIXTURE_TEST_CASE(few_results_are_deferred, fixture) {
     begin(a);
     for (unsigned i = 0; i < limits::max_deferred; ++i) {
         BOOST_TEST(begin(a));

@@ -30,7 +30,7 @@ struct fixture {
     std::vector<box::function> functions;
 };
 
-BOOST_FIXTURE_TEST_CASE(the_first_thing_wakes_and_the_others_come_along, fixture) {
+BOOST_FIXTURE_TEST_CASE(the_first_entry_wakes_the_executor, fixture) {
     BOOST_TEST(results.push({some_record(8), box::event::answered}));
     BOOST_TEST(results.push({some_record(16), box::event::progress}));
     BOOST_TEST(results.post([] {}));
@@ -43,14 +43,14 @@ BOOST_FIXTURE_TEST_CASE(the_first_thing_wakes_and_the_others_come_along, fixture
     BOOST_TEST(take().empty());
 }
 
-BOOST_FIXTURE_TEST_CASE(what_comes_after_a_visit_wakes_again, fixture) {
+BOOST_FIXTURE_TEST_CASE(an_entry_after_take_wakes_again, fixture) {
     BOOST_TEST(results.push({some_record(8), box::event::answered}));
     take();
     BOOST_TEST(results.push({some_record(8), box::event::answered}));
     BOOST_TEST(woken == 2);
 }
 
-BOOST_FIXTURE_TEST_CASE(what_has_time_wakes_nobody, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_deferred_entry_does_not_wake, fixture) {
     BOOST_TEST(results.push({some_record(8), box::event::released}, true));
     BOOST_TEST(woken == 0);
     BOOST_TEST(results.push({some_record(16), box::event::answered}));
@@ -58,7 +58,7 @@ BOOST_FIXTURE_TEST_CASE(what_has_time_wakes_nobody, fixture) {
     BOOST_TEST(take().size() == 2U);
 }
 
-BOOST_FIXTURE_TEST_CASE(what_had_time_can_be_hurried, fixture) {
+BOOST_FIXTURE_TEST_CASE(flush_wakes_for_deferred_entries, fixture) {
     results.flush(); // there is nothing
     BOOST_TEST(woken == 0);
     BOOST_TEST(results.push({some_record(8), box::event::answered}, true));
@@ -68,7 +68,7 @@ BOOST_FIXTURE_TEST_CASE(what_had_time_can_be_hurried, fixture) {
     BOOST_TEST(take().size() == 1U);
 }
 
-BOOST_FIXTURE_TEST_CASE(errands_are_bounded, fixture) {
+BOOST_FIXTURE_TEST_CASE(posted_functions_are_bounded, fixture) {
     int taken = 0;
     while (results.post([] {})) {
         BOOST_TEST_REQUIRE(++taken < 100'000);
@@ -79,7 +79,7 @@ BOOST_FIXTURE_TEST_CASE(errands_are_bounded, fixture) {
     BOOST_TEST(results.post([] {}));
 }
 
-BOOST_FIXTURE_TEST_CASE(once_closed_it_takes_nothing, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_closed_queue_accepts_nothing, fixture) {
     BOOST_TEST(results.push({some_record(8), box::event::answered}));
     results.close(entries, functions);
     BOOST_TEST(entries.size() == 1U);
@@ -88,7 +88,7 @@ BOOST_FIXTURE_TEST_CASE(once_closed_it_takes_nothing, fixture) {
     BOOST_TEST(woken == 1);
 }
 
-BOOST_AUTO_TEST_CASE(nobody_wakes_once_close_has_returned) {
+BOOST_AUTO_TEST_CASE(no_wake_after_close_has_returned) {
     for (int round = 0; round < 200; ++round) {
         std::atomic<bool> closed{false};
         std::atomic<bool> too_late{false};

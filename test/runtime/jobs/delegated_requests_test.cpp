@@ -96,7 +96,7 @@ BOOST_FIXTURE_TEST_CASE(a_callback_runs_on_a_worker_and_not_beside_its_job, fixt
     BOOST_TEST(!on_io);
 }
 
-BOOST_FIXTURE_TEST_CASE(what_a_callback_throws_is_the_answer, fixture) {
+BOOST_FIXTURE_TEST_CASE(an_exception_from_a_callback_is_the_answer, fixture) {
     left.tasks->add_work(cles::verb::delegate, "asking", {}, [](const job_context& job) {
         job.delegate("PULL right:nothing", {}, [job](boost::system::error_code code, auto, auto why) {
             throw cles::error(code, std::string{why});
@@ -106,7 +106,7 @@ BOOST_FIXTURE_TEST_CASE(what_a_callback_throws_is_the_answer, fixture) {
                R"({"error":"no_task","message":"car1: right has no PULL 'nothing'"})");
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_whose_callback_forgets_it_has_failed, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_job_whose_callback_does_not_answer_fails, fixture) {
     left.tasks->add_work(cles::verb::delegate, "asking", {}, [](const job_context& job) {
         job.delegate("PULL right:nothing", {}, [](auto, auto, auto) {});
     });
@@ -114,7 +114,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_whose_callback_forgets_it_has_failed, fixture) {
                R"({"error":"failed","message":"car1: the job ended without an answer"})");
 }
 
-BOOST_FIXTURE_TEST_CASE(what_a_withdrawn_job_asked_is_withdrawn_too, fixture) {
+BOOST_FIXTURE_TEST_CASE(requests_of_a_withdrawn_job_are_withdrawn, fixture) {
     std::vector<cles::responder> kept;
     right.on_delegate("never", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
     notes told;
@@ -133,7 +133,7 @@ BOOST_FIXTURE_TEST_CASE(what_a_withdrawn_job_asked_is_withdrawn_too, fixture) {
     left.wait_for([&] { return left.pool->load().running == 0; });
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_that_nobody_waits_for_asks_in_vain, fixture) {
+BOOST_FIXTURE_TEST_CASE(requests_of_a_stopped_job_are_cancelled, fixture) {
     notes told;
     left.tasks->add_work(cles::verb::delegate, "late", {}, [&](const job_context& job) {
         while (!job.stopped()) {
@@ -149,7 +149,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_that_nobody_waits_for_asks_in_vain, fixture) {
     BOOST_TEST(told.joined() == "cancelled");
 }
 
-BOOST_FIXTURE_TEST_CASE(progress_of_what_was_asked_comes_to_the_job, fixture) {
+BOOST_FIXTURE_TEST_CASE(progress_of_a_request_reaches_the_job, fixture) {
     right_tasks->add_work(cles::verb::delegate, "slow", {}, [](const job_context& job) {
         job.progress(0.5);
         job.done();
@@ -191,7 +191,7 @@ struct ending : fixture {
     notes told;
 };
 
-BOOST_FIXTURE_TEST_CASE(a_pool_that_ends_tells_jobs_that_wait_for_others, ending) {
+BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_open_requests, ending) {
     auto client = left.peer();
     client.send("DELEGATE self:asking id=1\n");
     left.wait_for([&] { return kept.size() == 1; });
@@ -202,7 +202,7 @@ BOOST_FIXTURE_TEST_CASE(a_pool_that_ends_tells_jobs_that_wait_for_others, ending
     BOOST_TEST(told.joined() == "unavailable"); // and once
 }
 
-BOOST_FIXTURE_TEST_CASE(what_was_not_sent_when_the_pool_ends_is_answered_too, ending) {
+BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_unsent_requests, ending) {
     auto client = left.peer();
     client.send("DELEGATE self:asking id=1\n");
     left.wait_for([&] { return left.pool->figures().admitted == 1; });
@@ -215,7 +215,7 @@ BOOST_FIXTURE_TEST_CASE(what_was_not_sent_when_the_pool_ends_is_answered_too, en
     BOOST_TEST(kept.empty());
 }
 
-BOOST_FIXTURE_TEST_CASE(at_the_limit_of_a_drain_free_workers_tell_jobs_that_wait, ending) {
+BOOST_FIXTURE_TEST_CASE(at_the_limit_of_a_drain_free_workers_run_callbacks, ending) {
     auto client = left.peer();
     client.send("DELEGATE self:asking id=1\n");
     left.wait_for([&] { return kept.size() == 1; });
@@ -227,7 +227,7 @@ BOOST_FIXTURE_TEST_CASE(at_the_limit_of_a_drain_free_workers_tell_jobs_that_wait
     BOOST_TEST(!told.has("in line"));
 }
 
-BOOST_FIXTURE_TEST_CASE(a_callback_waits_for_its_job_and_comes_when_that_returns_after_the_end, ending) {
+BOOST_FIXTURE_TEST_CASE(a_callback_runs_when_its_job_returns_after_the_end, ending) {
     const auto hold = left.held_;
     const auto late = std::make_shared<notes>();
     left.tasks->add_work(cles::verb::delegate, "holding", {}, [hold, late](const job_context& job) {

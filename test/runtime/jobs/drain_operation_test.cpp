@@ -34,7 +34,7 @@ struct fixture {
     std::size_t stuck = 0;
 };
 
-BOOST_FIXTURE_TEST_CASE(it_ends_with_the_last_job_and_then_has_no_limit, fixture) {
+BOOST_FIXTURE_TEST_CASE(it_completes_with_the_last_job_and_cancels_its_timer, fixture) {
     BOOST_TEST(!drain.is_pending());
     begin(1h);
     BOOST_TEST(drain.is_pending());
@@ -45,7 +45,7 @@ BOOST_FIXTURE_TEST_CASE(it_ends_with_the_last_job_and_then_has_no_limit, fixture
     BOOST_TEST(limits == 0);
 }
 
-BOOST_FIXTURE_TEST_CASE(it_ends_at_its_limit, fixture) {
+BOOST_FIXTURE_TEST_CASE(it_completes_at_its_limit, fixture) {
     begin(0ms);
     io.run();
     BOOST_TEST(limits == 1);
@@ -54,7 +54,7 @@ BOOST_FIXTURE_TEST_CASE(it_ends_at_its_limit, fixture) {
     BOOST_TEST(!drain.is_pending());
 }
 
-BOOST_FIXTURE_TEST_CASE(what_is_forgotten_tells_nobody, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_cancelled_drain_calls_nothing, fixture) {
     begin(1h);
     drain.cancel();
     io.run();

@@ -21,7 +21,7 @@ BOOST_AUTO_TEST_CASE(all_jobs_of_a_link_share_one_copy) {
     BOOST_TEST(peers.copy_of(somebody) == first);
 }
 
-BOOST_AUTO_TEST_CASE(another_link_in_the_same_place_has_its_own) {
+BOOST_AUTO_TEST_CASE(another_link_at_the_same_address_has_its_own_copy) {
     cles::runtime::identity_cache peers;
     auto place = somebody;
     const auto first = peers.copy_of(place);
@@ -33,7 +33,7 @@ BOOST_AUTO_TEST_CASE(another_link_in_the_same_place_has_its_own) {
     BOOST_TEST(peers.copy_of(place) != second);
 }
 
-BOOST_AUTO_TEST_CASE(links_without_end_take_no_memory_without_end) {
+BOOST_AUTO_TEST_CASE(memory_is_bounded_with_many_links) {
     cles::runtime::identity_cache peers;
     const std::weak_ptr<const identity> first = peers.copy_of(somebody);
     std::list<identity> others(2000, somebody);

@@ -36,7 +36,7 @@ struct fixture : pooled_node {
     scripted_peer client;
 };
 
-BOOST_FIXTURE_TEST_CASE(a_full_queue_is_busy_and_says_when_to_come_again, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_full_queue_is_busy_with_a_retry_delay, fixture) {
     occupy();
     for (int i = 2; i < 6; ++i) {
         queue(client, "x", i);
@@ -96,7 +96,7 @@ BOOST_FIXTURE_TEST_CASE(the_jobs_of_a_lost_link_leave_the_queue, fixture) {
     BOOST_TEST(pool->figures().withdrawn == 2U);
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_whose_time_is_over_leaves_the_queue, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_job_past_its_deadline_leaves_the_queue, fixture) {
     occupy();
     client.send("DELEGATE self:note/late id=2 deadline=20\n");
     BOOST_TEST(client.line().starts_with(R"(id=2 {"error":"deadline")"));
@@ -143,13 +143,13 @@ BOOST_FIXTURE_TEST_CASE(a_running_job_is_told_that_its_link_was_lost, told) {
     check();
 }
 
-BOOST_FIXTURE_TEST_CASE(a_running_job_is_told_that_its_time_is_over, told) {
+BOOST_FIXTURE_TEST_CASE(a_running_job_is_told_of_its_deadline, told) {
     begin(client, " deadline=20");
     BOOST_TEST(client.line().starts_with(R"(id=2 {"error":"deadline")"));
     check();
 }
 
-BOOST_FIXTURE_TEST_CASE(who_asks_to_be_told_too_late_is_told_at_once, fixture) {
+BOOST_FIXTURE_TEST_CASE(on_stop_of_a_stopped_job_calls_at_once, fixture) {
     tasks->add_work(cles::verb::delegate, "late", {}, [this](const job_context& job) {
         while (!job.stopped()) {
             std::this_thread::sleep_for(1ms);

@@ -35,7 +35,7 @@ struct fixture : pooled_node {
     scripted_peer client;
 };
 
-BOOST_FIXTURE_TEST_CASE(a_job_runs_on_a_worker_and_sees_what_was_asked, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_job_runs_on_a_worker_with_its_request, fixture) {
     notes seen;
     std::atomic<std::thread::id> where{};
     add("route", [&](const job_context& job) {
@@ -53,7 +53,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_runs_on_a_worker_and_sees_what_was_asked, fixture)
     BOOST_TEST(pool->figures().answered == 1U);
 }
 
-BOOST_FIXTURE_TEST_CASE(results_become_what_they_are_anywhere_else, fixture) {
+BOOST_FIXTURE_TEST_CASE(results_are_the_same_as_inline, fixture) {
     add("nothing", [](const job_context& job) { job.done(); });
     add("scalar", [](const job_context& job) { job.done("42"); });
     add("spaced", [](const job_context& job) { job.done("{ \"a\" : [ 1,\n2 ] }"); });
@@ -68,7 +68,7 @@ BOOST_FIXTURE_TEST_CASE(results_become_what_they_are_anywhere_else, fixture) {
     BOOST_TEST(ask("DELEGATE self:refusing") == R"({"error":"denied","message":"car1: not you"})");
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_and_say_when_to_ask_again, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_with_a_retry_delay, fixture) {
     add("full", [](const job_context& job) { job.refuse("no room in the dock", 250ms); });
     tasks->on_delegate("full_too", [](const cles::request&, const cles::responder& answer) {
         answer.refuse("no room here either", 7s);
@@ -80,7 +80,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_and_say_when_to_ask_again, fixture) {
     BOOST_TEST(ask("DELEGATE self:good").find("retry_ms\":7000") == std::string::npos); // nothing is left over
 }
 
-BOOST_FIXTURE_TEST_CASE(what_a_job_throws_becomes_the_answer_and_harms_nobody, fixture) {
+BOOST_FIXTURE_TEST_CASE(an_exception_from_a_job_becomes_the_answer, fixture) {
     add("own", [](const job_context&) { throw cles::error(errc::bad_request, "no such place"); });
     add("standard", [](const job_context&) { throw std::runtime_error("cannot open /etc/secret/key.pem"); });
     add("number", [](const job_context&) { throw 7; });
@@ -94,7 +94,7 @@ BOOST_FIXTURE_TEST_CASE(what_a_job_throws_becomes_the_answer_and_harms_nobody, f
     BOOST_TEST(pool->figures().threw == 3U);
 }
 
-BOOST_FIXTURE_TEST_CASE(the_first_answer_counts_and_others_are_counted, fixture) {
+BOOST_FIXTURE_TEST_CASE(the_first_answer_is_sent_and_others_are_counted, fixture) {
     add("twice", [](const job_context& job) {
         job.done("1");
         job.done("2");
@@ -105,7 +105,7 @@ BOOST_FIXTURE_TEST_CASE(the_first_answer_counts_and_others_are_counted, fixture)
     wait_for([&] { return pool->figures().answered_twice == 3; });
 }
 
-BOOST_FIXTURE_TEST_CASE(of_many_threads_that_answer_at_once_one_does, fixture) {
+BOOST_FIXTURE_TEST_CASE(concurrent_answers_send_one, fixture) {
     add("race", [](const job_context& job) {
         std::vector<std::thread> racers;
         for (int i = 0; i < 4; ++i) {
@@ -121,7 +121,7 @@ BOOST_FIXTURE_TEST_CASE(of_many_threads_that_answer_at_once_one_does, fixture) {
     wait_for([&] { return pool->figures().answered_twice == 60; }); // those who came last may still be on their way
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_that_nobody_holds_any_more_has_failed, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_released_job_without_an_answer_fails, fixture) {
     add("forgotten", [](const job_context&) {});
     BOOST_TEST(ask("DELEGATE self:forgotten") ==
                R"({"error":"failed","message":"car1: the job ended without an answer"})");
@@ -165,7 +165,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_that_waits_holds_no_worker, fixture) {
     wait_for([&] { return pool->load().running == 0; });
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_may_be_answered_after_the_pool_has_gone, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_job_may_answer_after_the_pool_is_destroyed, fixture) {
     std::optional<job_context> kept;
     std::promise<void> handed_over;
     add("later", [&](const job_context& job) {
@@ -191,7 +191,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_may_be_answered_after_the_pool_has_gone, fixture) 
     run_ready(io);
 }
 
-BOOST_AUTO_TEST_CASE(a_job_may_be_answered_after_all_else_has_gone) {
+BOOST_AUTO_TEST_CASE(a_job_may_answer_after_the_service_is_destroyed) {
     std::optional<job_context> kept;
     {
         fixture node;
@@ -217,7 +217,7 @@ BOOST_FIXTURE_TEST_CASE(progress_comes_in_order_before_the_result, fixture) {
     BOOST_TEST(client.line() == "id=7 []");
 }
 
-BOOST_FIXTURE_TEST_CASE(where_nobody_listens_a_job_is_told_so, fixture) {
+BOOST_FIXTURE_TEST_CASE(progress_reports_whether_it_is_wanted, fixture) {
     add("slow", [](const job_context& job) {
         while (job.progress(0.5)) {
             std::this_thread::yield();
@@ -227,7 +227,7 @@ BOOST_FIXTURE_TEST_CASE(where_nobody_listens_a_job_is_told_so, fixture) {
     BOOST_TEST(ask("DELEGATE self:slow id=7") == "id=7 {}");
 }
 
-BOOST_FIXTURE_TEST_CASE(reports_without_end_take_no_memory_without_end, fixture) {
+BOOST_FIXTURE_TEST_CASE(memory_of_progress_reports_is_bounded, fixture) {
     add("talkative", [](const job_context& job) {
         for (int i = 0; i < 10'000; ++i) {
             job.progress(i / 10'000.0);
@@ -245,7 +245,7 @@ BOOST_FIXTURE_TEST_CASE(reports_without_end_take_no_memory_without_end, fixture)
     BOOST_TEST(reports <= 10'000);
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_tells_the_log, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_job_writes_to_the_log, fixture) {
     add("chatty", [](const job_context& job) {
         job.log(cles::log_level::info, "on my way");
         job.done();
@@ -254,7 +254,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_tells_the_log, fixture) {
     wait_for([&] { return log.has("on my way"); });
 }
 
-BOOST_FIXTURE_TEST_CASE(a_hung_pull_holds_up_no_other, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_hung_pull_delays_no_other, fixture) {
     tasks->on_pull("hung", [&] {
         hold.pass();
         return 0;
@@ -309,7 +309,7 @@ BOOST_FIXTURE_TEST_CASE(many_jobs_of_many_links_are_all_answered, fixture) {
     BOOST_TEST(pool->load().workers == 2U);
 }
 
-BOOST_FIXTURE_TEST_CASE(its_load_tells_how_long_a_job_takes, fixture) {
+BOOST_FIXTURE_TEST_CASE(load_contains_the_service_time, fixture) {
     add("slow", [](const job_context& job) {
         std::this_thread::sleep_for(5ms);
         job.done("1");
@@ -320,7 +320,7 @@ BOOST_FIXTURE_TEST_CASE(its_load_tells_how_long_a_job_takes, fixture) {
     BOOST_TEST(pool->load().service_us >= 5'000U);
 }
 
-BOOST_FIXTURE_TEST_CASE(its_load_tells_that_no_worker_comes_free, fixture) {
+BOOST_FIXTURE_TEST_CASE(load_grows_while_no_worker_is_free, fixture) {
     cles::test::gate open;
     add("quick", [](const job_context& job) { job.done("1"); });
     add("waits", [&open](const job_context& job) {

@@ -38,7 +38,7 @@ struct fixture {
     std::deque<named> made;
 };
 
-BOOST_FIXTURE_TEST_CASE(what_is_empty_has_no_next, fixture) {
+BOOST_FIXTURE_TEST_CASE(an_empty_queue_has_no_next_job, fixture) {
     BOOST_TEST(queue.empty());
     BOOST_TEST(queue.pop() == nullptr);
 }
@@ -62,7 +62,7 @@ BOOST_FIXTURE_TEST_CASE(requesters_take_turns, fixture) {
     BOOST_TEST(pop_all() == "a1 b1 c1 a2 b2 a3 a4");
 }
 
-BOOST_FIXTURE_TEST_CASE(who_comes_later_waits_for_one_turn_of_each, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_later_requester_waits_for_one_turn_of_each, fixture) {
     for (const auto* name : {"a1", "a2", "a3"}) {
         push(name, 1);
     }
@@ -71,7 +71,7 @@ BOOST_FIXTURE_TEST_CASE(who_comes_later_waits_for_one_turn_of_each, fixture) {
     BOOST_TEST(pop_all() == "a2 b1 a3");
 }
 
-BOOST_FIXTURE_TEST_CASE(past_its_capacity_it_refuses, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_full_queue_refuses, fixture) {
     for (int i = 0; i < 8; ++i) {
         BOOST_TEST(push("a", 1));
     }
@@ -82,7 +82,7 @@ BOOST_FIXTURE_TEST_CASE(past_its_capacity_it_refuses, fixture) {
     BOOST_TEST(push("b", 2));
 }
 
-BOOST_FIXTURE_TEST_CASE(what_has_begun_goes_before_the_new_ones_of_its_requester_and_always_finds_room, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_resumed_job_goes_first_and_ignores_the_capacity, fixture) {
     for (int i = 0; i < 8; ++i) {
         push("a" + std::to_string(i), 1);
     }
@@ -95,7 +95,7 @@ BOOST_FIXTURE_TEST_CASE(what_has_begun_goes_before_the_new_ones_of_its_requester
     BOOST_TEST(pop() == "a0");
 }
 
-BOOST_FIXTURE_TEST_CASE(what_is_removed_is_not_popped, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_removed_job_is_not_popped, fixture) {
     auto& first = make("a1", 1);
     auto& middle = make("a2", 1);
     auto& last = make("a3", 1);
@@ -116,7 +116,7 @@ BOOST_FIXTURE_TEST_CASE(what_is_removed_is_not_popped, fixture) {
     BOOST_TEST(queue.pop() == nullptr);
 }
 
-BOOST_FIXTURE_TEST_CASE(very_many_requesters_are_forgotten_and_served_alike, fixture) {
+BOOST_FIXTURE_TEST_CASE(many_requesters_are_served_alike, fixture) {
     for (std::uint64_t who = 0; who < 10'000; ++who) {
         named job{"x", who};
         BOOST_TEST_REQUIRE(queue.push(job));
@@ -129,7 +129,7 @@ BOOST_FIXTURE_TEST_CASE(very_many_requesters_are_forgotten_and_served_alike, fix
 }
 
 // The same as a model that is too simple to be wrong: turns in a list, the jobs of each in a list.
-BOOST_AUTO_TEST_CASE(it_does_the_same_as_lists_of_lists) {
+BOOST_AUTO_TEST_CASE(it_behaves_like_a_simple_model) {
     std::mt19937 chance{7};
     for (int round = 0; round < 50; ++round) {
         constexpr std::size_t capacity = 20;

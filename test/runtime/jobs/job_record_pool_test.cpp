@@ -18,7 +18,7 @@ std::set<const job_record*> all_of(const cles::runtime::job_record_pool& records
     return all;
 }
 
-BOOST_AUTO_TEST_CASE(those_in_use_are_found_whatever_goes_between_them) {
+BOOST_AUTO_TEST_CASE(records_in_use_are_found_after_others_are_recycled) {
     cles::runtime::job_record_pool records;
     std::vector<job_record*> taken;
     for (int i = 0; i < 5; ++i) {
@@ -33,7 +33,7 @@ BOOST_AUTO_TEST_CASE(those_in_use_are_found_whatever_goes_between_them) {
     BOOST_TEST(records.size() == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(a_record_is_used_again_and_knows_nothing_of_its_last_job) {
+BOOST_AUTO_TEST_CASE(a_recycled_record_is_cleared) {
     cles::runtime::job_record_pool records;
     auto& first = records.acquire({});
     first.result_buffer() = "left over";

@@ -33,7 +33,7 @@ bool happens(const std::atomic<int>& counter, int at_least) {
 } // namespace
 
 // The executor may have dealt with the pause before the worker puts its job back: only a `wake` is left to come.
-BOOST_AUTO_TEST_CASE(a_worker_that_puts_its_job_back_goes_on_when_it_is_woken) {
+BOOST_AUTO_TEST_CASE(a_worker_that_requeues_its_job_continues_when_woken) {
     cles::runtime::job_record_pool records;
     auto& job = records.acquire({});
     cles::runtime::completion_queue box{[] {}};
@@ -56,7 +56,7 @@ BOOST_AUTO_TEST_CASE(a_worker_that_puts_its_job_back_goes_on_when_it_is_woken) {
 }
 
 // An executor whose every tick comes late: what a short pause does now and then, all the time.
-BOOST_AUTO_TEST_CASE(all_jobs_are_done_however_often_the_executor_is_late) {
+BOOST_AUTO_TEST_CASE(all_jobs_complete_although_the_executor_is_often_late) {
     pooled_node node{{.workers = 16, .grace = 4ms, .check_interval = 1ms, .executor_lateness = 0ms}};
     node.tasks->on_delegate("quick", [] { return 1; });
     auto client = node.peer();

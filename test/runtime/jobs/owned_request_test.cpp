@@ -32,7 +32,7 @@ struct fixture {
     cles::runtime::owned_request kept;
 };
 
-BOOST_FIXTURE_TEST_CASE(it_holds_all_that_was_asked, fixture) {
+BOOST_FIXTURE_TEST_CASE(it_copies_the_whole_request, fixture) {
     keep("car1", "route", "a parameter that is too long for a short string", R"({"to":"Berlin"})");
     const auto& r = kept.get();
     BOOST_TEST((r.verb() == cles::verb::delegate));

@@ -48,7 +48,7 @@ BOOST_FIXTURE_TEST_CASE(every_kind_of_handler_runs_on_a_worker, fixture) {
     BOOST_TEST(ask("DELEGATE self:later") == R"({"value":"on a worker"})");
 }
 
-BOOST_FIXTURE_TEST_CASE(what_is_marked_as_quick_runs_in_line_and_is_counted, fixture) {
+BOOST_FIXTURE_TEST_CASE(inline_handlers_run_inline_and_are_counted, fixture) {
     tasks->on_pull("plain", [this] { return here(); }, {.inline_ok = true});
     tasks->on_pull("later", [this](const cles::request&, cles::responder answer) { answer.done(here()); },
                    {.inline_ok = true});
@@ -58,7 +58,7 @@ BOOST_FIXTURE_TEST_CASE(what_is_marked_as_quick_runs_in_line_and_is_counted, fix
     BOOST_TEST(pool->figures().admitted == 0U);
 }
 
-BOOST_FIXTURE_TEST_CASE(what_is_marked_as_quick_and_is_not_is_told_of, fixture) {
+BOOST_FIXTURE_TEST_CASE(slow_inline_handlers_are_logged, fixture) {
     tasks->on_pull("slow",
                    [] {
                        std::this_thread::sleep_for(2ms);
@@ -79,7 +79,7 @@ BOOST_FIXTURE_TEST_CASE(a_coroutine_runs_on_the_services_executor, fixture) {
     BOOST_TEST(ask("PULL self:coroutine") == R"({"value":"in line"})");
 }
 
-BOOST_FIXTURE_TEST_CASE(a_bind_is_decided_on_a_worker_unless_its_handler_is_quick, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_bind_handler_runs_on_a_worker_unless_inline, fixture) {
     notes where;
     const auto decide = [&](const cles::request& r) {
         where.add(here());
@@ -98,7 +98,7 @@ BOOST_FIXTURE_TEST_CASE(a_bind_is_decided_on_a_worker_unless_its_handler_is_quic
     BOOST_TEST(where.joined() == "on a worker on a worker in line in line");
 }
 
-BOOST_FIXTURE_TEST_CASE(a_bind_whose_handler_hangs_holds_up_nobody, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_hanging_bind_handler_delays_no_other, fixture) {
     tasks->on_bind("slow", [gate = held_](const cles::request&) { gate->pass(); });
     tasks->on_pull("quick", [] { return 1; });
     client.send("BIND self:slow id=1\nPULL self:quick id=2\n");
@@ -128,7 +128,7 @@ BOOST_FIXTURE_TEST_CASE(a_request_to_publish_is_published_after_its_handler, fix
     BOOST_TEST(both.find(R"({"text":1})") != std::string::npos, both);
 }
 
-BOOST_FIXTURE_TEST_CASE(a_body_that_does_not_fit_never_runs, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_handler_does_not_run_with_an_invalid_body, fixture) {
     std::atomic<int> ran{0};
     tasks->on_push("speed", [&](int) { ++ran; });
     BOOST_TEST(ask("PUSH self:speed {\"value\":\"x\"}").starts_with(R"({"error":"bad_request")"));
@@ -152,7 +152,7 @@ BOOST_FIXTURE_TEST_CASE(a_result_is_checked_where_it_is_written_and_not_again, f
     BOOST_TEST(report.ends_with(R"({"a": [1, 2]})"), report);
 }
 
-BOOST_FIXTURE_TEST_CASE(a_name_is_taken_once, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_task_is_registered_once, fixture) {
     tasks->on_pull("speed", [] { return 1; });
     BOOST_CHECK_EXCEPTION(tasks->on_pull("speed", [] { return 2; }), cles::error,
                           [](const cles::error& e) { return e.code() == errc::already_registered; });

@@ -9,15 +9,15 @@ BOOST_AUTO_TEST_SUITE(service_time)
 
 using namespace std::chrono_literals;
 
-BOOST_AUTO_TEST_CASE(nothing_is_known_at_first) { BOOST_TEST(cles::runtime::service_time{}.value().count() == 0); }
+BOOST_AUTO_TEST_CASE(it_is_zero_at_first) { BOOST_TEST(cles::runtime::service_time{}.value().count() == 0); }
 
-BOOST_AUTO_TEST_CASE(the_first_job_says_it_all) {
+BOOST_AUTO_TEST_CASE(the_first_value_is_taken) {
     cles::runtime::service_time smoothed;
     smoothed.add(8ms);
     BOOST_TEST((smoothed.value() == 8ms));
 }
 
-BOOST_AUTO_TEST_CASE(each_further_one_counts_an_eighth) {
+BOOST_AUTO_TEST_CASE(each_further_value_weighs_an_eighth) {
     cles::runtime::service_time smoothed;
     smoothed.add(8ms);
     smoothed.add(16ms);
@@ -26,7 +26,7 @@ BOOST_AUTO_TEST_CASE(each_further_one_counts_an_eighth) {
     BOOST_TEST((smoothed.value() == 8ms));
 }
 
-BOOST_AUTO_TEST_CASE(it_follows_what_stays) {
+BOOST_AUTO_TEST_CASE(it_converges) {
     cles::runtime::service_time smoothed;
     smoothed.add(1s);
     for (int i = 0; i < 100; ++i) {
@@ -36,7 +36,7 @@ BOOST_AUTO_TEST_CASE(it_follows_what_stays) {
     BOOST_TEST((smoothed.value() >= 1ms));
 }
 
-BOOST_AUTO_TEST_CASE(a_clock_that_goes_back_counts_as_nothing) {
+BOOST_AUTO_TEST_CASE(a_negative_duration_counts_as_zero) {
     cles::runtime::service_time smoothed;
     smoothed.add(-1s);
     BOOST_TEST(smoothed.value().count() == 0);

@@ -45,7 +45,7 @@ struct journal {
     std::vector<std::string> lines;
 };
 
-BOOST_AUTO_TEST_CASE(jobs_are_told_one_after_another_on_one_other_thread) {
+BOOST_AUTO_TEST_CASE(callbacks_run_in_order_on_one_other_thread) {
     notifier stops{1min};
     std::atomic<int> told{0};
     std::atomic<bool> in_order{true};
@@ -63,13 +63,13 @@ BOOST_AUTO_TEST_CASE(jobs_are_told_one_after_another_on_one_other_thread) {
     BOOST_TEST(stops.close(1min) == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(where_nobody_was_told_there_is_nothing_to_end) {
+BOOST_AUTO_TEST_CASE(closing_without_calls_returns_at_once) {
     notifier stops;
     BOOST_TEST(stops.close(0ms) == 0U);
     BOOST_TEST(!stops.notify({.callback = [] {}}));
 }
 
-BOOST_AUTO_TEST_CASE(all_are_told_before_the_end_also_where_the_thread_has_hardly_begun) {
+BOOST_AUTO_TEST_CASE(all_callbacks_run_before_close_returns) {
     for (int i = 0; i < 50; ++i) {
         std::atomic<int> told{0};
         notifier stops;
@@ -80,7 +80,7 @@ BOOST_AUTO_TEST_CASE(all_are_told_before_the_end_also_where_the_thread_has_hardl
     }
 }
 
-BOOST_AUTO_TEST_CASE(one_that_blocks_is_reported_and_delays_no_other) {
+BOOST_AUTO_TEST_CASE(a_blocking_callback_is_reported_and_delays_no_other) {
     const auto log = std::make_shared<journal>();
     const auto held = std::make_shared<gate>();
     std::atomic<int> told{0};
@@ -101,7 +101,7 @@ BOOST_AUTO_TEST_CASE(one_that_blocks_is_reported_and_delays_no_other) {
     BOOST_TEST(stops.close(1min) == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(there_are_so_many_threads_and_no_more_which_is_reported_once) {
+BOOST_AUTO_TEST_CASE(threads_are_bounded_and_exhaustion_is_reported_once) {
     const auto log = std::make_shared<journal>();
     const auto held = std::make_shared<gate>();
     std::atomic<int> told{0};
@@ -121,7 +121,7 @@ BOOST_AUTO_TEST_CASE(there_are_so_many_threads_and_no_more_which_is_reported_onc
     BOOST_TEST(log->count("error: ") == 1U);
 }
 
-BOOST_AUTO_TEST_CASE(one_that_throws_is_reported) {
+BOOST_AUTO_TEST_CASE(a_throwing_callback_is_reported) {
     const auto log = std::make_shared<journal>();
     notifier stops;
     stops.notify({.callback = [] { throw std::runtime_error{"no"}; },
@@ -130,7 +130,7 @@ BOOST_AUTO_TEST_CASE(one_that_throws_is_reported) {
     BOOST_TEST(log->count("warning: a job threw when it was told to stop") == 1U);
 }
 
-BOOST_AUTO_TEST_CASE(who_has_not_been_told_at_the_end_is_let_go_of) {
+BOOST_AUTO_TEST_CASE(calls_not_made_before_close_are_dropped) {
     const auto held = std::make_shared<gate>();
     const auto token = std::make_shared<int>(0);
     {
@@ -148,7 +148,7 @@ BOOST_AUTO_TEST_CASE(who_has_not_been_told_at_the_end_is_let_go_of) {
     wait_until([&] { return held->passed() == static_cast<int>(notifier::max_threads); });
 }
 
-BOOST_AUTO_TEST_CASE(a_job_that_does_not_return_from_it_is_left_behind) {
+BOOST_AUTO_TEST_CASE(a_callback_that_does_not_return_is_abandoned) {
     const auto held = std::make_shared<gate>();
     {
         notifier stops;

@@ -64,7 +64,7 @@ BOOST_FIXTURE_TEST_CASE(a_stuck_worker_is_reported_and_replaced, fixture) {
     BOOST_TEST(client.ask("DELEGATE self:quick id=3") == R"(id=3 {"value":1})");
 }
 
-BOOST_FIXTURE_TEST_CASE(past_the_last_replacement_new_jobs_are_refused, fixture) {
+BOOST_FIXTURE_TEST_CASE(without_replacements_new_jobs_are_refused, fixture) {
     get_stuck(1);
     get_stuck(2);
     wait_for([&] { return pool->load().workers == 0; });
@@ -76,7 +76,7 @@ BOOST_FIXTURE_TEST_CASE(past_the_last_replacement_new_jobs_are_refused, fixture)
     BOOST_TEST(client.ask("DELEGATE self:quick id=4") == R"(id=4 {"value":1})");
 }
 
-BOOST_FIXTURE_TEST_CASE(a_stuck_job_does_not_hold_up_the_end, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_stuck_job_does_not_delay_shutdown, fixture) {
     get_stuck(1);
     const auto report = drain(30ms);
     BOOST_TEST(report.refused == 0U);
@@ -93,7 +93,7 @@ BOOST_FIXTURE_TEST_CASE(a_stuck_job_does_not_hold_up_the_end, fixture) {
     }
 }
 
-BOOST_AUTO_TEST_CASE(a_drain_waits_for_what_runs_and_what_is_queued) {
+BOOST_AUTO_TEST_CASE(a_drain_waits_for_running_and_queued_jobs) {
     fixture node{{.workers = 1}};
     node.client.send("DELEGATE self:held id=1\nDELEGATE self:quick id=2\n");
     node.wait_for([&] { return node.hold.arrived() == 1 && node.pool->load().queued == 1; });
@@ -115,7 +115,7 @@ BOOST_AUTO_TEST_CASE(a_drain_of_nothing_ends_at_once) {
     BOOST_TEST(report.refused + report.abandoned + report.stuck == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_what_is_left_is_answered) {
+BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_open_jobs_are_answered) {
     fixture node{{.workers = 1, .close_timeout = 20ms}};
     node.client.send("DELEGATE self:held id=1\nDELEGATE self:quick id=2\n");
     node.wait_for([&] { return node.hold.arrived() == 1 && node.pool->load().queued == 1; });
@@ -129,7 +129,7 @@ BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_what_is_left_is_answered) {
     BOOST_TEST((first + second).find(R"(id=2 {"error":"busy")") != std::string::npos);
 }
 
-BOOST_AUTO_TEST_CASE(a_job_that_minds_being_told_ends_with_the_pool) {
+BOOST_AUTO_TEST_CASE(a_job_that_stops_when_told_ends_with_the_pool) {
     notes told;
     {
         fixture node{{.workers = 1, .close_timeout = patience}};

@@ -28,7 +28,7 @@ std::future<void> occupy(threads& on, std::shared_future<void> gate) {
     return entered->get_future();
 }
 
-BOOST_AUTO_TEST_CASE(what_is_posted_runs_there) {
+BOOST_AUTO_TEST_CASE(posted_functions_run_on_the_threads) {
     threads two{2};
     std::promise<std::thread::id> where;
     boost::asio::post(two.get_executor(), [&] { where.set_value(std::this_thread::get_id()); });
@@ -36,7 +36,7 @@ BOOST_AUTO_TEST_CASE(what_is_posted_runs_there) {
     BOOST_TEST(two.stop(patience) == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(it_runs_as_much_at_once_as_it_has_threads_and_one_more_can_be_added) {
+BOOST_AUTO_TEST_CASE(threads_run_concurrently_and_can_be_added) {
     std::promise<void> opener;
     const auto gate = as_gate(opener);
     threads one{1};
@@ -49,7 +49,7 @@ BOOST_AUTO_TEST_CASE(it_runs_as_much_at_once_as_it_has_threads_and_one_more_can_
     BOOST_TEST(one.stop(patience) == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(who_does_not_come_back_is_left_behind_and_may_still_come) {
+BOOST_AUTO_TEST_CASE(a_thread_that_does_not_return_is_abandoned) {
     std::promise<void> opener;
     const auto gate = as_gate(opener);
     const auto over = std::make_shared<std::promise<void>>();
@@ -69,7 +69,7 @@ BOOST_AUTO_TEST_CASE(who_does_not_come_back_is_left_behind_and_may_still_come) {
     BOOST_TEST((over->get_future().wait_for(patience) == std::future_status::ready));
 }
 
-BOOST_AUTO_TEST_CASE(what_has_not_begun_at_the_end_never_does) {
+BOOST_AUTO_TEST_CASE(functions_not_started_before_stop_never_run) {
     std::promise<void> opener;
     const auto gate = as_gate(opener);
     threads one{1};

@@ -31,7 +31,7 @@ struct fixture {
     int c = 0;
 };
 
-BOOST_FIXTURE_TEST_CASE(each_worker_has_a_place_of_its_own, fixture) {
+BOOST_FIXTURE_TEST_CASE(each_worker_has_its_own_slot, fixture) {
     const auto first = watch.enter();
     const auto second = watch.enter();
     BOOST_TEST(first != second);
@@ -57,7 +57,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_past_its_deadline_and_the_grace_is_found_once, fix
     BOOST_TEST(watch.usable() == 2U);
 }
 
-BOOST_FIXTURE_TEST_CASE(a_job_that_was_told_to_stop_has_the_grace_from_then, fixture) {
+BOOST_FIXTURE_TEST_CASE(grace_begins_when_the_job_is_told_to_stop, fixture) {
     const auto slot = watch.enter();
     begin(slot, a, 1h);
     watch.stop(slot, &a, start + 1s);
@@ -65,14 +65,14 @@ BOOST_FIXTURE_TEST_CASE(a_job_that_was_told_to_stop_has_the_grace_from_then, fix
     BOOST_TEST(check(3s + 1ns).size() == 1U);
 }
 
-BOOST_FIXTURE_TEST_CASE(being_told_late_gains_nothing, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_late_stop_does_not_extend_the_grace, fixture) {
     const auto slot = watch.enter();
     begin(slot, a, 1s);
     watch.stop(slot, &a, start + 2s);
     BOOST_TEST(check(3s + 1ns).size() == 1U);
 }
 
-BOOST_FIXTURE_TEST_CASE(telling_a_job_that_has_ended_does_not_hurry_the_next, fixture) {
+BOOST_FIXTURE_TEST_CASE(stopping_an_ended_job_does_not_affect_the_next, fixture) {
     const auto slot = watch.enter();
     begin(slot, a, 1h);
     watch.end(slot);
@@ -81,14 +81,14 @@ BOOST_FIXTURE_TEST_CASE(telling_a_job_that_has_ended_does_not_hurry_the_next, fi
     BOOST_TEST(check(10s).empty());
 }
 
-BOOST_FIXTURE_TEST_CASE(who_is_idle_is_not_stuck, fixture) {
+BOOST_FIXTURE_TEST_CASE(an_idle_worker_is_not_stuck, fixture) {
     const auto slot = watch.enter();
     begin(slot, a, 1s);
     BOOST_TEST(!watch.end(slot));
     BOOST_TEST(check(1h).empty());
 }
 
-BOOST_FIXTURE_TEST_CASE(there_are_as_many_replacements_as_there_are, fixture) {
+BOOST_FIXTURE_TEST_CASE(replacements_are_limited, fixture) {
     begin(watch.enter(), a, 1s);
     begin(watch.enter(), b, 2s);
     BOOST_TEST(check(3500ms).at(0).replaced);
@@ -102,7 +102,7 @@ BOOST_FIXTURE_TEST_CASE(there_are_as_many_replacements_as_there_are, fixture) {
     BOOST_TEST(watch.allowed() == 3U);
 }
 
-BOOST_FIXTURE_TEST_CASE(who_comes_back_makes_its_replacement_one_too_many, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_worker_that_returns_makes_its_replacement_surplus, fixture) {
     const auto slot = watch.enter();
     begin(slot, a, 1s);
     check(1min);

@@ -31,7 +31,7 @@ BOOST_AUTO_TEST_CASE(an_absolute_path_stays_as_it_is) {
     BOOST_TEST(file_of("/etc/cles/clesd.yaml", "/opt/x/libx.so") == "/opt/x/libx.so");
 }
 
-BOOST_AUTO_TEST_CASE(a_path_begins_where_the_configuration_is) {
+BOOST_AUTO_TEST_CASE(a_relative_path_begins_at_the_configuration_file) {
     BOOST_TEST(file_of("/etc/cles/clesd.yaml", "./libx.so") == "/etc/cles/libx.so");
     BOOST_TEST(file_of("/etc/cles/clesd.yaml", "../x/libx.so") == "/etc/x/libx.so");
     BOOST_TEST(file_of("conf/clesd.yaml", "x/libx.so") == "conf/x/libx.so");
@@ -44,7 +44,7 @@ BOOST_AUTO_TEST_CASE(a_path_stays_a_path) {
     BOOST_TEST(file_of("", "x/libx.so") == "x/libx.so");
 }
 
-BOOST_AUTO_TEST_CASE(folders_that_are_named_come_first) {
+BOOST_AUTO_TEST_CASE(configured_folders_come_first) {
     auto setup = from_file("/etc/cles/clesd.yaml");
     setup.plugin_path = {"/opt/plugins", "mine"};
     const auto folders = plugin_search_path(setup);
