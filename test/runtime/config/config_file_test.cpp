@@ -33,7 +33,7 @@ std::string refusal(const std::string& text) {
 
 struct mistake {
     const char* text;
-    const char* place; // up to the key
+    const char* place; // with the key
     const char* why;
 };
 
@@ -46,7 +46,7 @@ const mistake mistakes[] = {
     {"log: {colour: red}\n", "clesd.yaml:1: log.colour: ", "unknown key; known here: format, level"},
     {"plugins:\n  - path: a.so\n  - path: b.so\n    args: {}\n", "clesd.yaml:4: plugins[1].args: ", "unknown key"},
     {"limits:\n\n  lines: 4096\n", "clesd.yaml:3: limits.lines: ", "unknown key"},
-    // bad values, of each key
+    // invalid values of each key
     {"node: a b\n", "clesd.yaml:1: node: ", "'a b' is not a valid node name"},
     {"node:\n", "clesd.yaml:1: node: ", "has no value"},
     {"node: [a]\n", "clesd.yaml:1: node: ", "has to be a single value"},
@@ -102,7 +102,7 @@ const mistake mistakes[] = {
     {"wake_within: 7\n", "clesd.yaml:1: wake_within: ", "is not a duration"},
     {"wake_within: 0\n", "clesd.yaml:1: wake_within: ", "write off, or 0us"},
     {"real_time: 100\n", "clesd.yaml:1: real_time: ", "is not a number from 0 to 99"},
-    // what is no such file at all
+    // other invalid files
     {"node: a\nworkers: 1\nnode: b\n", "clesd.yaml:3: node: ", "is a duplicate of the key in line 1"},
     {"- node\n", "clesd.yaml:1: ", "has to be a map"},
     {"just words\n", "clesd.yaml:1: ", "has to be a map"},

@@ -28,7 +28,7 @@ struct scratch {
             const auto found = variables.find(name);
             return found == variables.end() ? nullptr : found->second.c_str();
         };
-        // None of the machine's own is to be found.
+        // So that no file of this machine is found.
         variables["CLES_CONFIG"] = write("named.yaml", "node: named\n");
     }
     ~scratch() { fs::remove_all(folder); }

@@ -72,7 +72,7 @@ BOOST_AUTO_TEST_CASE(durations_have_units) {
     BOOST_TEST((to_duration("24h") == 24h));
     BOOST_TEST((to_duration("0") == 0us));
     BOOST_TEST((to_duration("0us") == 0us));
-    BOOST_TEST((to_duration("0.4us") == 1us)); // 0 has a meaning of its own
+    BOOST_TEST((to_duration("0.4us") == 1us)); // 0 has a special meaning
     for (const auto* text : {"250", "ms", "", "1 s", "-1s", "1S", "nans", "infs", "1e999s", "s1"}) {
         BOOST_TEST(refusal([&] { to_duration(text); }).find("is not a duration") != std::string::npos, text);
     }

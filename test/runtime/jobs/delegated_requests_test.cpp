@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Jobs that ask others and hold no worker meanwhile.
+// Jobs that send requests to other nodes, and hold no worker while they wait.
 
 #include "jobs/job_pool.hpp"
 #include "pooled_node.hpp"
@@ -34,7 +34,7 @@ struct fixture {
     std::unique_ptr<cles::runtime::pooled_registrar> right_tasks;
 };
 
-// Counts down by asking the other node for one less, and adds one to its answer.
+// Asks the other node for one less, and adds one to its answer.
 void count_down(const cles::request& r, cles::responder answer, const std::string& other) {
     const auto n = r.parameter<int>(0);
     if (n == 0) {
@@ -87,7 +87,7 @@ BOOST_FIXTURE_TEST_CASE(a_callback_runs_on_a_worker_and_not_beside_its_job, fixt
                 }
             });
         }
-        std::this_thread::sleep_for(20ms); // long enough for the answers to come
+        std::this_thread::sleep_for(20ms); // long enough for the answers to arrive
         order.add("begun");
         --*inside;
     });
@@ -167,7 +167,7 @@ BOOST_FIXTURE_TEST_CASE(progress_of_a_request_reaches_the_job, fixture) {
     BOOST_TEST(told.joined() == "half done");
 }
 
-// What the callbacks of jobs were told, and where.
+// What the callbacks of jobs received, and where.
 struct ending : fixture {
     ending() {
         right.on_delegate("never", [this](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
@@ -199,14 +199,14 @@ BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_open_requests, ending) {
     BOOST_TEST(told.joined() == "unavailable");
     BOOST_TEST(client.line().starts_with(R"(id=1 {"error":"unavailable")"));
     run_ready(left.io);
-    BOOST_TEST(told.joined() == "unavailable"); // and once
+    BOOST_TEST(told.joined() == "unavailable"); // once
 }
 
 BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_unsent_requests, ending) {
     auto client = left.peer();
     client.send("DELEGATE self:asking id=1\n");
     left.wait_for([&] { return left.pool->figures().admitted == 1; });
-    while (asked.size() == 0) { // the executor does not come by
+    while (asked.size() == 0) { // the executor does not run
         std::this_thread::yield();
     }
     end_pool();
@@ -223,7 +223,7 @@ BOOST_FIXTURE_TEST_CASE(at_the_limit_of_a_drain_free_workers_run_callbacks, endi
     left.pool->drain(1ms, [&](const cles::runtime::drain_report& how) { drained = how.abandoned == 1; });
     left.wait_for([&] { return drained; });
     end_pool();
-    BOOST_TEST(told.size() == 1U); // by the end, or by what it asked being withdrawn
+    BOOST_TEST(told.size() == 1U); // by the end, or because its request was withdrawn
     BOOST_TEST(!told.has("in line"));
 }
 

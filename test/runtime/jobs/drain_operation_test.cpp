@@ -40,7 +40,7 @@ BOOST_FIXTURE_TEST_CASE(it_completes_with_the_last_job_and_cancels_its_timer, fi
     BOOST_TEST(drain.is_pending());
     drain.complete({});
     BOOST_TEST(!drain.is_pending());
-    io.run(); // returns: nothing waits for the hour
+    io.run(); // returns, because the timer has been cancelled
     BOOST_TEST(ends == 1);
     BOOST_TEST(limits == 0);
 }

@@ -27,7 +27,7 @@ BOOST_AUTO_TEST_CASE(another_link_at_the_same_address_has_its_own_copy) {
     const auto first = peers.copy_of(place);
     place.address = "tcp://127.0.0.1:2";
     const auto second = peers.copy_of(place);
-    BOOST_TEST(first->address == "tcp://127.0.0.1:1"); // whose job may still run
+    BOOST_TEST(first->address == "tcp://127.0.0.1:1"); // its jobs may still run
     BOOST_TEST(second->address == "tcp://127.0.0.1:2");
     place.uid = 7;
     BOOST_TEST(peers.copy_of(place) != second);

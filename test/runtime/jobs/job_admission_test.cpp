@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Who gets in, whose turn it is, and who is taken out again.
+// Which jobs are admitted, in which order they run, and which are removed.
 
 #include "jobs/job_pool.hpp"
 #include "pooled_node.hpp"
@@ -106,7 +106,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_past_its_deadline_leaves_the_queue, fixture) {
     BOOST_TEST(ran.size() == 0U);
 }
 
-// A job that runs until it is told to stop, and how it learned of it.
+// A job that runs until it is told to stop, and records how it was told.
 struct told : fixture {
     told() : fixture({.workers = 2}) {
         tasks->add_work(cles::verb::delegate, "watchful", {}, [this](const job_context& job) {
@@ -116,7 +116,7 @@ struct told : fixture {
                 std::this_thread::sleep_for(1ms);
             }
             ran.add("stopped");
-            job.done("1"); // of interest to nobody
+            job.done("1"); // ignored
         });
     }
     void begin(scripted_peer& by, const std::string& adverbs) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Jobs on real threads: how they end.
+// Jobs on real threads, and how they end.
 
 #include "jobs/job_pool.hpp"
 #include "pooled_node.hpp"
@@ -77,7 +77,8 @@ BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_with_a_retry_delay, fixture) {
     BOOST_TEST(ask("DELEGATE self:full_too") ==
                R"({"error":"busy","message":"car1: no room here either","retry_ms":7000})");
     add("good", [](const job_context& job) { job.fail(errc::busy, "in its own words"); });
-    BOOST_TEST(ask("DELEGATE self:good").find("retry_ms\":7000") == std::string::npos); // nothing is left over
+    BOOST_TEST(ask("DELEGATE self:good").find("retry_ms\":7000") ==
+               std::string::npos); // nothing is left of the earlier one
 }
 
 BOOST_FIXTURE_TEST_CASE(an_exception_from_a_job_becomes_the_answer, fixture) {
@@ -118,7 +119,7 @@ BOOST_FIXTURE_TEST_CASE(concurrent_answers_send_one, fixture) {
     for (int i = 0; i < 20; ++i) {
         BOOST_TEST(ask("DELEGATE self:race").starts_with(R"({"value":)"));
     }
-    wait_for([&] { return pool->figures().answered_twice == 60; }); // those who came last may still be on their way
+    wait_for([&] { return pool->figures().answered_twice == 60; }); // the last ones may not have arrived
 }
 
 BOOST_FIXTURE_TEST_CASE(a_released_job_without_an_answer_fails, fixture) {
@@ -136,7 +137,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_may_be_answered_later_by_a_thread_of_its_own, fixt
         own.emplace_back([job] { job.done("[5]"); });
     });
     BOOST_TEST(ask("DELEGATE self:later") == "[5]");
-    wait_for([&] { return pool->load().running == 0; }); // its worker has put it into the list
+    wait_for([&] { return pool->load().running == 0; }); // its worker has released it
     const std::lock_guard lock{guard};
     own.front().join();
 }
@@ -207,7 +208,7 @@ BOOST_FIXTURE_TEST_CASE(progress_comes_in_order_before_the_result, fixture) {
     add("slow", [](const job_context& job) {
         job.progress(0.25, R"({"at":1})");
         job.progress(0.5);
-        job.progress(0.1); // never falls
+        job.progress(0.1); // progress does not decrease
         job.done("[]");
     });
     client.send("DELEGATE self:slow id=7 progress=yes\n");
@@ -314,7 +315,7 @@ BOOST_FIXTURE_TEST_CASE(load_contains_the_service_time, fixture) {
         std::this_thread::sleep_for(5ms);
         job.done("1");
     });
-    BOOST_TEST(pool->load().service_us == 0U); // nobody knows yet
+    BOOST_TEST(pool->load().service_us == 0U); // not known yet
     BOOST_TEST(ask("DELEGATE self:slow") == R"({"value":1})");
     wait_for([&] { return pool->load().running == 0; });
     BOOST_TEST(pool->load().service_us >= 5'000U);
@@ -340,7 +341,7 @@ BOOST_FIXTURE_TEST_CASE(load_grows_while_no_worker_is_free, fixture) {
     open.open();
     one.line();
     one.line();
-    for (int i = 0; i < 50; ++i) { // what took long is smoothed away
+    for (int i = 0; i < 50; ++i) { // so that the average falls
         ask("DELEGATE self:quick");
     }
     BOOST_TEST(pool->load().service_us < 30'000U);

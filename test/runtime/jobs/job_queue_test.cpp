@@ -105,7 +105,7 @@ BOOST_FIXTURE_TEST_CASE(a_removed_job_is_not_popped, fixture) {
     }
     queue.remove(middle);
     queue.remove(only);
-    queue.remove(only); // is not there any more
+    queue.remove(only); // has been removed already
     BOOST_TEST(!middle.queued());
     BOOST_TEST(queue.size() == 2U);
     queue.remove(first);
@@ -128,7 +128,7 @@ BOOST_FIXTURE_TEST_CASE(many_requesters_are_served_alike, fixture) {
     BOOST_TEST(pop_all() == "a1 b1 a2");
 }
 
-// The same as a model that is too simple to be wrong: turns in a list, the jobs of each in a list.
+// Compares it with a simple model: a list of requesters, each with a list of jobs.
 BOOST_AUTO_TEST_CASE(it_behaves_like_a_simple_model) {
     std::mt19937 chance{7};
     for (int round = 0; round < 50; ++round) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Workers that find the executor late: they begin no job, and go on as soon as it is back.
+// Workers that find the executor late start no job until it has caught up.
 
 #include "jobs/completion_queue.hpp"
 #include "jobs/job_record.hpp"
@@ -32,12 +32,12 @@ bool happens(const std::atomic<int>& counter, int at_least) {
 
 } // namespace
 
-// The executor may have dealt with the pause before the worker puts its job back: only a `wake` is left to come.
+// The executor may have handled the pause before the worker puts its job back: then only a `wake` follows.
 BOOST_AUTO_TEST_CASE(a_worker_that_requeues_its_job_continues_when_woken) {
     cles::runtime::job_record_pool records;
     auto& job = records.acquire({});
-    cles::runtime::completion_queue box{[] {}};
-    const auto workers = std::make_shared<worker_pool>(cles::runtime::pool_options{.workers = 1}, box);
+    cles::runtime::completion_queue completions{[] {}};
+    const auto workers = std::make_shared<worker_pool>(cles::runtime::pool_options{.workers = 1}, completions);
     std::atomic<int> missed{0};
     workers->start(workers, [&] { ++missed; });
     workers->set_executor_due(cles::time_point::clock::now() - 1s);
@@ -55,7 +55,7 @@ BOOST_AUTO_TEST_CASE(a_worker_that_requeues_its_job_continues_when_woken) {
     records.recycle(job);
 }
 
-// An executor whose every tick comes late: what a short pause does now and then, all the time.
+// An executor whose timer is always late.
 BOOST_AUTO_TEST_CASE(all_jobs_complete_although_the_executor_is_often_late) {
     pooled_node node{{.workers = 16, .grace = 4ms, .check_interval = 1ms, .executor_lateness = 0ms}};
     node.tasks->on_delegate("quick", [] { return 1; });

@@ -25,7 +25,7 @@ struct fixture {
                                               .peer = &from,
                                               .deadline = cles::time_point{5s}};
         kept.assign(cles::request{data}, peer);
-    } // all that it was made from is gone now
+    } // the originals are destroyed now
 
     std::shared_ptr<const cles::identity> peer =
         std::make_shared<cles::identity>(cles::identity{.transport = "tcp", .address = "tcp://127.0.0.1:9"});

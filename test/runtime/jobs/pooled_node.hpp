@@ -21,7 +21,7 @@
 
 namespace cles::test {
 
-/// What several threads write down.
+/// Notes of several threads.
 class notes {
   public:
     void add(std::string what) {
@@ -51,7 +51,7 @@ class notes {
     std::vector<std::string> all_;
 };
 
-/// A service whose tasks run on a pool, and peers by plain sockets.
+/// A service whose tasks run on a pool, and peers with plain sockets.
 struct pooled_node {
     explicit pooled_node(runtime::pool_options options = {.workers = 2}) {
         options.log = [this](log_level, std::string_view text) { log.add(std::string{text}); };
@@ -67,7 +67,7 @@ struct pooled_node {
     void wait_for(Condition&& holds, const std::source_location& where = std::source_location::current()) {
         run_until(io, holds, patience, where);
     }
-    /// A task that waits at the gate.
+    /// Adds a task that waits at the gate.
     void add_held(std::string_view task = "held") {
         tasks->on_delegate(task, [gate = held_] {
             gate->pass();
@@ -75,15 +75,15 @@ struct pooled_node {
         });
     }
 
-    // Its service tells the same log.
+    // Its service writes to the same log.
     static service_options options_with(notes& log) {
         auto options = listening("car1");
         options.log = [&log](log_level, std::string_view text) { log.add(std::string{text}); };
         return options;
     }
 
-    notes log;                                              // before what may write there
-    std::shared_ptr<gate> held_ = std::make_shared<gate>(); // that of jobs which outlive this
+    notes log;                                              // before its writers
+    std::shared_ptr<gate> held_ = std::make_shared<gate>(); // of jobs that outlive this
     gate& hold = *held_;
     boost::asio::io_context io;
     service car{io, options_with(log)};

@@ -106,7 +106,7 @@ BOOST_FIXTURE_TEST_CASE(a_hanging_bind_handler_delays_no_other, fixture) {
     wait_for([&] { return hold.arrived() == 1; });
     car.update("slow", 7);
     hold.open();
-    BOOST_TEST(client.line() == R"(id=1 {"value":7})"); // the last update, as ever
+    BOOST_TEST(client.line() == R"(id=1 {"value":7})"); // the last update
     car.update("slow", 8);
     const auto update = client.line();
     BOOST_TEST(update.starts_with("UPDATE car1:slow seq=2 "), update);

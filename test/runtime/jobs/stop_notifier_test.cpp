@@ -27,7 +27,7 @@ void wait_until(Condition&& holds) {
     }
 }
 
-// What was logged.
+// The log.
 struct journal {
     void add(log_level level, const std::string& text) {
         const std::scoped_lock lock{mutex};
@@ -93,7 +93,7 @@ BOOST_AUTO_TEST_CASE(a_blocking_callback_is_reported_and_delays_no_other) {
     wait_until([&] { return told == 5; });
     BOOST_TEST(held->passed() == 0);
     wait_until([&] { return log->count("warning: its on_stop callback does not return") >= 4; });
-    // Those that come back serve on.
+    // Threads that return continue.
     held->open();
     wait_until([&] { return held->passed() == 5; });
     stops.notify({.callback = [&] { ++told; }});
@@ -157,7 +157,7 @@ BOOST_AUTO_TEST_CASE(a_callback_that_does_not_return_is_abandoned) {
         BOOST_TEST(stops.close(0ms) == 1U);
     }
     held->open();
-    wait_until([&] { return held->passed() == 1; }); // it still finds what it needs
+    wait_until([&] { return held->passed() == 1; }); // its state still exists
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Jobs that do not stop: reported, their workers replaced, and no reason not to shut down.
+// Jobs that do not stop: they are reported, their workers are replaced, and they do not prevent shutdown.
 
 #include "jobs/job_pool.hpp"
 #include "pooled_node.hpp"
@@ -30,7 +30,7 @@ struct fixture : pooled_node {
         const auto before = hold.arrived();
         client.send("DELEGATE self:held id=" + std::to_string(id) + "\n");
         wait_for([&] { return hold.arrived() == before + 1; });
-        // Only now, for a job whose time is over before it begins does not get stuck.
+        // Only now, because a job whose deadline passes before it starts does not get stuck.
         client.send("PUSH self:cles/cancel/" + std::to_string(id) + " id=99\n");
         BOOST_TEST(client.line().find(R"({"error":"cancelled")") != std::string::npos);
         BOOST_TEST(client.line() == "id=99 {}");
@@ -88,7 +88,7 @@ BOOST_FIXTURE_TEST_CASE(a_stuck_job_does_not_delay_shutdown, fixture) {
     BOOST_TEST(log.has("workers abandoned in jobs that do not end: 1"));
     BOOST_TEST(hold.passed() == 0);
     hold.open();
-    while (hold.passed() == 0) { // it still finds what it needs
+    while (hold.passed() == 0) { // its state still exists
         std::this_thread::yield();
     }
 }

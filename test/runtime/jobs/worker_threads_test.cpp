@@ -18,7 +18,7 @@ using threads = cles::runtime::worker_threads;
 
 std::shared_future<void> as_gate(std::promise<void>& opener) { return opener.get_future().share(); }
 
-// A thread that runs nothing but the waiting for a gate.
+// A thread that only waits for a gate.
 std::future<void> occupy(threads& on, std::shared_future<void> gate) {
     const auto entered = std::make_shared<std::promise<void>>();
     boost::asio::post(on.get_executor(), [entered, gate] {
@@ -63,7 +63,7 @@ BOOST_AUTO_TEST_CASE(a_thread_that_does_not_return_is_abandoned) {
         });
         entered.get_future().wait();
         BOOST_TEST(one.stop(1ms, 1) == 1U);
-        BOOST_TEST(one.stop(1ms, 1) == 0U); // was told of
+        BOOST_TEST(one.stop(1ms, 1) == 0U); // expected
     }
     opener.set_value();
     BOOST_TEST((over->get_future().wait_for(patience) == std::future_status::ready));

@@ -11,7 +11,7 @@ BOOST_AUTO_TEST_SUITE(worker_watchdog)
 using namespace std::chrono_literals;
 using cles::time_point;
 
-// Two workers, one replacement, a grace of 2 s.
+// Two workers, one replacement, a grace period of 2 s.
 struct fixture {
     using stuck_worker = cles::runtime::worker_watchdog::stuck_worker;
 

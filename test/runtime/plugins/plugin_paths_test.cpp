@@ -37,7 +37,7 @@ BOOST_AUTO_TEST_CASE(a_relative_path_begins_at_the_configuration_file) {
     BOOST_TEST(file_of("conf/clesd.yaml", "x/libx.so") == "conf/x/libx.so");
 }
 
-// What has no folder left would be looked for elsewhere.
+// Without a folder it would be searched for elsewhere.
 BOOST_AUTO_TEST_CASE(a_path_stays_a_path) {
     BOOST_TEST(file_of("clesd.yaml", "./libx.so") == "./libx.so");
     BOOST_TEST(file_of("./clesd.yaml", "./libx.so") == "./libx.so");
