@@ -52,9 +52,9 @@ constexpr std::array<std::pair<std::string_view, log_level>, 4> levels{{{"debug"
                                                                         {"warning", log_level::warning},
                                                                         {"error", log_level::error}}};
 
-// Converts the library's errors.
+// Calls a function of the library, and converts its errors.
 template <class F>
-auto with_invalid_value(F read) {
+auto translate_errors(F read) {
     try {
         return read();
     } catch (const error& e) {
@@ -158,7 +158,7 @@ std::string to_node_name(std::string_view text) {
 }
 
 std::string to_url(std::string_view text) {
-    const auto where = with_invalid_value([&] { return parse_url(text); });
+    const auto where = translate_errors([&] { return parse_url(text); });
     if (where.scheme == "inproc") {
         refuse(text, "cannot be reached from outside the process");
     }
@@ -180,7 +180,7 @@ std::string to_network(std::string_view text) {
 }
 
 multicast_options to_multicast(std::string_view text) {
-    return with_invalid_value([&] { return parse_multicast(text); });
+    return translate_errors([&] { return parse_multicast(text); });
 }
 
 std::string to_interfaces(std::string_view text) {
@@ -188,7 +188,7 @@ std::string to_interfaces(std::string_view text) {
         refuse(text, "is not an interface; 'multicast: off' turns multicast off");
     }
     multicast_options where{.interface = std::string{text}};
-    with_invalid_value([&] { check(where); });
+    translate_errors([&] { check(where); });
     return std::move(where.interface);
 }
 

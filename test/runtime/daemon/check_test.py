@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""clesd --check, --print-config, and where the configuration comes from."""
+"""clesd --check, --print-config, and the sources of the configuration."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ def children_of(pid):
 
 
 def has_ended(pid):
-    """Whether it runs no more, though nobody may have asked for its exit code."""
+    """Whether it has ended, even if it has not been waited for."""
     try:
         with open(f"/proc/{pid}/stat", encoding="utf-8") as stat:
             return stat.read().rpartition(")")[2].split()[0] in "ZX"
@@ -33,12 +33,12 @@ ROOT = os.path.join(os.path.dirname(__file__), "..", "..", "..")
 
 
 class Check(unittest.TestCase):
-    def test_a_configuration_that_can_be_used(self):
+    def test_a_valid_configuration(self):
         with Folder() as f:
             file = f.write("node: sat1\nlisten: tcp://127.0.0.1:0\n")
             self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used\n", ""))
 
-    def test_a_mistake_is_named_with_file_line_and_key(self):
+    def test_an_error_names_file_line_and_key(self):
         with Folder() as f:
             file = f.write("node: sat1\nmulticast:\n  prot: 1\n")
             code, out, err = clesd("--config", file, "--check")
@@ -46,14 +46,14 @@ class Check(unittest.TestCase):
             self.assertEqual(err, f"clesd: {file}:3: multicast.prot: unknown key; "
                                   "known here: group, interface, port, required\n")
 
-    def test_a_mistake_keeps_the_daemon_from_starting(self):
+    def test_an_error_prevents_the_start(self):
         with Folder() as f:
             file = f.write("workers: none\n")
             code, out, err = clesd("--config", file)
             self.assertEqual((code, out), (2, ""))
             self.assertEqual(err, f"clesd: {file}:1: workers: 'none' is not a number from 1 to 1024\n")
 
-    def test_a_plugin_that_is_not_there(self):
+    def test_a_missing_plugin(self):
         with Folder() as f:
             missing = f.file("missing.so")
             file = f.write(f"plugins:\n  - path: {missing}\n")
@@ -66,7 +66,7 @@ class Check(unittest.TestCase):
             self.assertEqual((code, out), (0, f"{file}: can be used\n"))
             self.assertIn("is not required", err)
 
-    def test_a_plugin_lies_where_the_file_says_wherever_the_daemon_runs(self):
+    def test_plugin_paths_are_relative_to_the_file(self):
         with Folder() as f:
             f.write("", "plugins/mine.so")
             shutil.copy(STUBBORN, f.file("plugins/mine.so"))
@@ -78,7 +78,7 @@ class Check(unittest.TestCase):
             self.assertEqual(clesd("--config", file, "--check", cwd="/")[0], 2)
 
     def refused(self, text, line, key, words, within=1.0):
-        """By a check, and by the daemon itself: the same words."""
+        """A check and the daemon refuse it with the same message."""
         with Folder() as f:
             file = f.write(text)
             begun = time.monotonic()
@@ -91,7 +91,7 @@ class Check(unittest.TestCase):
             self.assertLess(took, within * SLOWNESS)
             self.assertEqual(clesd("--config", file, "--node", "a", "--listen", "tcp://127.0.0.1:0"), (2, "", err))
 
-    def test_a_plugin_that_cannot_be_used(self):
+    def test_unusable_plugins(self):
         for name, words in (("crashes_in_entry", "its entry point ends the process by signal 11"),
                             ("exits_when_loaded", "ends the process"),
                             ("wrong_major", "this host has 1.1"),
@@ -102,7 +102,7 @@ class Check(unittest.TestCase):
             with self.subTest(name):
                 self.refused(f"node: a\nplugins:\n  - path: {FAULTY}/{name}.so\n", 3, "plugins[0].path", words)
 
-    def test_a_plugin_of_another_machine(self):
+    def test_a_plugin_for_another_machine(self):
         with Folder() as f, open(STUBBORN, "rb") as library:
             image = bytearray(library.read())
             image[18] = 243  # e_machine: RISC-V
@@ -111,8 +111,8 @@ class Check(unittest.TestCase):
                 out.write(image)
             self.refused(f"plugins: [{path}]\n", 1, "plugins[0].path", "it cannot be loaded: ")
 
-    def test_what_a_parent_ignores_and_blocks_does_not_matter(self):
-        """Which a parent without a thought for it hands down, as some supervisors do."""
+    def test_signal_settings_of_the_parent_are_reset(self):
+        """Some supervisors pass on ignored and blocked signals."""
         def careless():
             signal.signal(signal.SIGCHLD, signal.SIG_IGN)
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM, signal.SIGCHLD, signal.SIGALRM})
@@ -128,13 +128,13 @@ class Check(unittest.TestCase):
             process.send_signal(signal.SIGTERM)
             self.assertEqual(finish(process)[0], 0)
 
-    def test_plugins_are_not_started_by_a_check(self):
+    def test_a_check_does_not_start_plugins(self):
         with Folder() as f:
             for name in ("crashes_in_start", "hangs_in_start", "refuses"):
                 file = f.write(f"plugins:\n  - path: {FAULTY}/{name}.so\n")
                 self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used\n", ""))
 
-    def test_a_plugin_that_hangs_while_it_is_loaded_is_given_up_and_can_be_stopped(self):
+    def test_a_check_of_a_plugin_that_hangs_while_loading_can_be_stopped(self):
         for name in ("hangs_when_loaded", "hangs_in_entry"):
             with Folder() as f:
                 file = f.write(f"plugins:\n  - path: {FAULTY}/{name}.so\n")
@@ -150,17 +150,17 @@ class Check(unittest.TestCase):
                     process.kill()
                     process.wait()
 
-    def test_a_plugin_that_hangs_while_it_is_loaded_is_given_up(self):
+    def test_a_plugin_that_hangs_while_loading_is_given_up(self):
         self.refused(f"plugins: [{FAULTY}/hangs_when_loaded.so]\n", 1, "plugins[0].path", "does not end", within=15)
 
-    def test_settings_are_checked_by_the_plugin_and_the_right_key_is_blamed(self):
+    def test_plugins_check_settings_and_the_message_names_the_key(self):
         plugin = f"plugins:\n  - path: {FAULTY}/sound.so\n    required: true\n    config:\n"
         self.refused(plugin + "      number: many\n", 5, "plugins[0].config.number", "expected")
         self.refused(plugin + "      refuse: no\n      number: 1001\n", 6, "plugins[0].config.number", "1000 at most")
         self.refused(plugin + "      numer: 7\n", 5, "plugins[0].config.numer", "it has no setting 'numer'")
         self.refused(f"plugins:\n  - path: {STUBBORN}\n    config: {{a: 1}}\n", 3, "plugins[0].config.a",
                      "it has no settings")
-        # Those that come along.
+        # The installed plugins.
         for name, key, value, words in (("fmv", "streams", "65", "1 to 64"),
                                         ("fmv", "idle_s", "0", "1 to 3600"),
                                         ("primes", "limit", "1000000000001", "at most"),
@@ -173,12 +173,12 @@ class Check(unittest.TestCase):
             with self.subTest(f"{name} {key}: {value}"):
                 self.refused(f"node: a\nplugins:\n  - path: {PLUGINS}/libcles-{name}.so\n    config:\n"
                              f"      {key}: {value}\n", 5, f"plugins[0].config.{key}", words)
-        # As far as the file knows the key that the plugin names.
+        # The longest part of the key that the file contains.
         self.refused(f"plugins:\n  - path: {FAULTY}/refuses_setting.so\n    config:\n      cameras:\n"
                      "        - rate: 30\n        - name: left\n          rate: 90\n", 7,
                      "plugins[0].config.cameras[1].rate", "60 at most")
 
-    def test_a_file_that_is_no_configuration(self):
+    def test_an_invalid_file(self):
         for text, line in (("%%%\n", 1), ("# a comment\n%%%\n", 2), ("%%%\n---\nnode: a\n", 1), ("~\n", 1),
                            ("hello\n", 1), ("&a\n", 1), ("\ufeff%%%\n", 1), ("node: a\n...\n%%%\n", 3)):
             with self.subTest(text), Folder() as f:
@@ -191,7 +191,7 @@ class Check(unittest.TestCase):
             with self.subTest(text), Folder() as f:
                 self.assertEqual(clesd("--config", f.write(text), "--check")[0], 0)
 
-    def test_the_configuration_that_comes_along_can_be_used_and_says_the_defaults(self):
+    def test_the_installed_configuration_is_valid_and_contains_the_defaults(self):
         file = os.path.join(ROOT, "config", "clesd.yaml")
         self.assertEqual(clesd("--config", file, "--check")[0], 0)
         with Folder() as f:
@@ -209,7 +209,7 @@ class Sources(unittest.TestCase):
         self.assertEqual((code, err), (0, ""))
         return out
 
-    def test_what_is_printed_can_be_read_again(self):
+    def test_printed_configuration_reads_back(self):
         with Folder() as f:
             file = f.write("node: sat1\nplugins:\n  - path: /x.so\n    config: {a: [1, 'b']}\n    required: false\n")
             first = self.print_config("--config", file)
@@ -218,7 +218,7 @@ class Sources(unittest.TestCase):
             without_origins = [[line.split("  # ")[0] for line in text.splitlines()[1:]] for text in (first, second)]
             self.assertEqual(*without_origins)
 
-    def test_a_flag_goes_before_the_environment_and_that_before_the_file(self):
+    def test_flags_override_the_environment_and_the_file(self):
         with Folder() as f:
             file = f.write("node: from_file\nseeds: [tcp://127.0.0.1:1]\n")
             self.assertIn(f'node: "from_file"  # {file}:1\n', self.print_config("--config", file))
@@ -233,12 +233,12 @@ class Sources(unittest.TestCase):
             self.assertIn('node: "from_flag"  # --node\n', out)
             self.assertIn('seeds: ["tcp://127.0.0.1:5"]  # --seed\n', out)
 
-    def test_a_mistake_in_the_environment_names_the_variable(self):
+    def test_an_error_in_the_environment_names_the_variable(self):
         code, _, err = clesd("--check", env=clean_environment(CLES_LISTEN="there"))
         self.assertEqual(code, 2)
         self.assertTrue(err.startswith("clesd: CLES_LISTEN: "), err)
 
-    def test_the_usual_places(self):
+    def test_default_locations(self):
         with Folder() as f:
             f.write("node: in_home\n", "home/.config/cles/clesd.yaml")
             f.write("node: in_xdg\n", "xdg/cles/clesd.yaml")
@@ -260,7 +260,7 @@ class Sources(unittest.TestCase):
 
 
 class Unit(unittest.TestCase):
-    def test_the_unit_file_says_what_the_daemon_does(self):
+    def test_the_unit_file_matches_the_daemon(self):
         lines = {}
         with open(os.path.join(ROOT, "config", "clesd.service"), encoding="utf-8") as unit:
             for line in unit:
@@ -270,9 +270,9 @@ class Unit(unittest.TestCase):
         self.assertEqual(lines["Type"], "notify")
         self.assertEqual(lines["ExecStart"], "clesd --config /etc/cles/clesd.yaml")
         self.assertIn("-HUP $MAINPID", lines["ExecReload"])
-        # Neither a wrong configuration nor a name that is taken goes away by trying again.
+        # Restarting helps neither against an invalid configuration nor against a name conflict.
         self.assertEqual(lines["RestartPreventExitStatus"], "2 3")
-        # Longer than a drain takes by default.
+        # Longer than the default drain.
         drain = int(next(line for line in clesd("--print-config")[1].splitlines() if line.startswith("drain: "))
                     .removeprefix("drain: ").removesuffix("s"))
         self.assertGreater(int(lines["TimeoutStopSec"].removesuffix("s")), drain + 2)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Two daemons of one name: the second ends, and says who has it, unless it is told to go on."""
+"""Two daemons of one name: the second stops and reports the first, unless it is allowed to continue."""
 
 import contextlib
 import signal
@@ -15,7 +15,7 @@ class Clash(unittest.TestCase):
     def setUp(self):
         self.base = DEFAULTS.replace("multicast: off", f"multicast: {{interface: lo, port: {free_port()}}}")
         self.first = self.daemon()
-        time.sleep(1.1)  # of two that start within a second neither was there first
+        time.sleep(1.1)  # nodes that start within a second count as simultaneous
 
     def daemon(self, more=""):
         made = Daemon(more, base=self.base)
@@ -23,7 +23,7 @@ class Clash(unittest.TestCase):
         made.__enter__()
         return made
 
-    def test_the_second_ends_and_says_why(self):
+    def test_the_second_stops_with_a_reason(self):
         second = self.daemon()
         code, took = second.end()
         self.assertEqual(code, 3)
@@ -37,7 +37,7 @@ class Clash(unittest.TestCase):
 
     @contextlib.contextmanager
     def giving_way_with_a_job(self, drain):
-        """A second one that gives way when a job runs there: it learns of the first by a seed that it is told later."""
+        """A second one that stops while it runs a job, because a seed that is added later tells it of the first."""
         text = f"plugins: [{STUBBORN}]\ndrain: {drain}\n"
         second = Daemon(text, base=DEFAULTS)
         self.addCleanup(second.__exit__)
@@ -49,7 +49,7 @@ class Clash(unittest.TestCase):
             second.wait_for_entry("stopping: ")
             yield second
 
-    def test_a_signal_while_it_gives_way_is_its_first(self):
+    def test_a_signal_while_it_stops_counts_as_the_first(self):
         with self.giving_way_with_a_job("3s") as second:
             signalled = time.monotonic()
             code, _ = second.stop()
@@ -58,13 +58,13 @@ class Clash(unittest.TestCase):
         second.wait_for_entry("SIGTERM: already stopping")
         self.assertNotIn("on a second signal", second.log())
 
-    def test_a_second_signal_ends_it_also_while_it_gives_way(self):
+    def test_a_second_signal_stops_it_at_once(self):
         with self.giving_way_with_a_job("10min") as second:
             second.send_signal(signal.SIGTERM)
             second.wait_for_entry("SIGTERM: already stopping")
             self.assertEqual(second.stop()[0], 3)
 
-    def test_it_goes_on_where_it_is_told_to(self):
+    def test_it_continues_if_allowed(self):
         second = self.daemon("allow_clash: true\n")
         second.wait_for_entry("is taken: the node at " + self.first.url)
         wait_until(lambda: '"clash"' in self.first.ask("PULL self:cles/peers"), "the first knows of it")
@@ -72,7 +72,7 @@ class Clash(unittest.TestCase):
         for each in (self.first, second):
             self.assertEqual(each.stop()[0], 0)
 
-    def test_in_another_pool_there_is_no_clash(self):
+    def test_another_pool_has_no_conflict(self):
         second = self.daemon("pool: north\n")
         wait_until(lambda: body(second.ask("PULL self:cles/metrics"))["announcements_foreign"] > 2, "the first is heard")
         self.assertIsNone(second.process.poll())

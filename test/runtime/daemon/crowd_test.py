@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""A daemon to which a thousand nodes are announced that are not there: it goes on answering, in time, and rests."""
+"""A daemon that receives announcements of a thousand unreachable nodes still answers in time, and becomes idle."""
 
 import os
 import time
@@ -15,7 +15,7 @@ TICKS = os.sysconf("SC_CLK_TCK")
 
 
 def processor_time(process):
-    """Seconds that it has worked, in user and system."""
+    """The processor time that it has used, in seconds, in user and system mode."""
     with open(f"/proc/{process.pid}/stat", encoding="utf-8") as stat:
         fields = stat.read().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
@@ -43,7 +43,7 @@ class Crowd(unittest.TestCase):
         return len(body(self.link.ask("PULL self:cles/peers"))["peers"])
 
     def announce(self):
-        for first in range(0, COUNT, 64):  # no more than a socket's buffer takes
+        for first in range(0, COUNT, 64):  # as many as a socket's buffer takes
             self.fakes.announce(self.fakes.nodes[first:first + 64])
             time.sleep(0.002)
 
@@ -63,7 +63,7 @@ class Crowd(unittest.TestCase):
         answer = body(self.link.ask(f"PULL all:cles deadline={deadline}"))
         return answer, time.monotonic() - begun
 
-    def test_a_thousand_dead_names_do_not_slow_a_node(self):
+    def test_a_thousand_unreachable_nodes_do_not_slow_a_node(self):
         before = self.slowest(3)
         self.announce()
         wait_until(lambda: self.known() > COUNT * 9 // 10, "most of them are known")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""What the tests of `clesd` share: a daemon with a configuration of its own, and somebody who asks it."""
+"""Shared by the tests of `clesd`: a daemon with its own configuration, and a client."""
 
 import json
 import os
@@ -14,17 +14,17 @@ import time
 from support import PATIENCE, environment, finish, read_line
 
 CLESD = os.environ.get("CLESD", "clesd")
-# Plugins that are wrong in one way each, and one whose tasks are.
+# Plugins with one fault each, and one whose tasks misbehave.
 FAULTY = os.environ.get("FAULTY_PLUGINS", "")
 STUBBORN = os.environ.get("STUBBORN_PLUGIN", "")
-# Where those are that come along.
+# The folder of the installed plugins.
 PLUGINS = os.environ.get("PLUGINS", "")
 
 DEFAULTS = "node: sat1\nlisten: tcp://127.0.0.1:0\nmulticast: off\nworkers: 2\nlog: {level: debug, format: json}\n"
 
 
 def clean_environment(**more):
-    """Free of what the tester's own may say to a daemon, and without a configuration in a usual place."""
+    """An environment without variables for a daemon, and without a configuration in a default location."""
     env = {k: v for k, v in environment(XDG_CONFIG_HOME="/nowhere").items()
            if k not in ("CLES_NODE", "CLES_LISTEN", "CLES_SEEDS", "CLES_LOG", "CLES_CONFIG", "CLES_MULTICAST",
                         "NOTIFY_SOCKET")}
@@ -33,7 +33,7 @@ def clean_environment(**more):
 
 
 def clesd(*arguments, env=None, cwd=None):
-    """Runs it to its end; gives exit code, stdout, stderr."""
+    """Runs it to its end; returns exit code, stdout, stderr."""
     done = subprocess.run([CLESD, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, cwd=cwd,
                           env=env or clean_environment(), timeout=PATIENCE, check=False)
     return done.returncode, done.stdout, done.stderr
@@ -118,7 +118,7 @@ class Daemon(Folder):
         return self.end(begun)
 
     def end(self, begun=None):
-        """The same, where it has been told to: a second signal would end it at once."""
+        """The same without a signal, because a second one would stop it at once."""
         begun = begun or time.monotonic()
         code, _, _ = finish(self.process)
         return code, time.monotonic() - begun
@@ -131,7 +131,7 @@ class Daemon(Folder):
 
 
 class Link:
-    """A client of one socket: lines out, lines in."""
+    """A client that sends and receives lines on one socket."""
 
     def __init__(self, port):
         self.socket = socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
@@ -165,7 +165,7 @@ def body(reply):
 
 
 def wait_until_running(daemon, count):
-    """Until so many jobs run."""
+    """Waits until so many jobs run."""
     with daemon.connect() as link:
         end = time.monotonic() + PATIENCE
         while time.monotonic() < end:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Somebody who announces nodes that are not there."""
+"""Announces nodes that do not exist."""
 
 import json
 import random
@@ -9,7 +9,7 @@ GROUP = "239.255.25.37"
 
 
 def group_socket():
-    """One that sends to a group on loopback."""
+    """A socket that sends to a group on loopback."""
     made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     made.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, socket.inet_aton("127.0.0.1"))
     made.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_LOOP, 1)
@@ -18,7 +18,7 @@ def group_socket():
 
 
 class Announcer:
-    """Announces nodes to a group on loopback, from a source of its own."""
+    """Announces nodes to a group on loopback, from its own port."""
 
     def __init__(self, port):
         self.to = (GROUP, port)
@@ -48,7 +48,7 @@ class Fakes(Announcer):
 
     def __init__(self, port, count):
         super().__init__(port)
-        self.closed = socket.socket()  # bound, and nobody listens
+        self.closed = socket.socket()  # bound, but not listening
         self.closed.bind(("127.0.0.1", 0))
         self.url = f"tcp://127.0.0.1:{self.closed.getsockname()[1]}"
         draw = random.Random(4711)

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Daemons that are killed and paused while they have work: what became of every job is known, and nothing hangs."""
+"""Daemons that are killed and paused while they run jobs: the outcome of every job is known, and nothing hangs."""
 
 import signal
 import time
@@ -22,7 +22,7 @@ class Faults(unittest.TestCase):
         return load
 
     def account(self, load, paused=0.0):
-        """Every job has one fate, and has left as many marks as fit it."""
+        """Every job has one outcome, and has left as many marks as this allows."""
         load.finish()
         for code in self.fleet.stop():
             self.assertEqual(code, 0)
@@ -34,20 +34,20 @@ class Faults(unittest.TestCase):
         marks = self.fleet.marks()
         for job in load.jobs:
             runs = len(marks[job.number])
-            if job.task == "again":  # may run more than once, where its node was lost
+            if job.task == "again":  # may run more than once if its node was lost
                 self.assertTrue(runs > 0 or job.code is not None, job)
             else:
                 self.assertIn(runs, RUNS[job.code], f"{job} ran at {marks[job.number]}")
 
     def crowd(self, load):
-        """More than a node takes, of which it says so."""
+        """Sends more jobs than a node accepts, which it reports."""
         jobs = load.burst("sat2", 60, work_ms=20)
         load.run(until=lambda: all(job.ended for job in jobs), what="the burst is answered")
         self.assertIn("busy", {job.code for job in jobs})
         self.assertIn(None, {job.code for job in jobs})
 
     def hold(self, load, name):
-        """A job that has begun there, and does not end by itself."""
+        """A job that runs on that node, and does not end."""
         job = load.send(name, "holds")
         load.run(until=lambda: self.fleet.marks()[job.number], what="the job has begun")
         return job
@@ -69,12 +69,12 @@ class Faults(unittest.TestCase):
         self.fleet.kill("sat3")
         killed = time.monotonic()
         load.run(1)
-        self.assertEqual(held.code, "unavailable")  # told as soon as it is known, not at its deadline
+        self.assertEqual(held.code, "unavailable")  # at once, not at its deadline
         load.finish()
         after = self.lost_since(load, killed)
         print(f"no request goes to a node that was killed {after * 1000:.1f} ms after it")
         self.assertLessEqual(after, SLACK / 6)
-        # What may be repeated is.
+        # Idempotent jobs are repeated.
         self.assertEqual([job for job in load.jobs if job.task == "again" and job.code == "unavailable"], [])
         self.account(load)
 
@@ -108,27 +108,27 @@ class Faults(unittest.TestCase):
                 load.run(0.4)
         self.assertGreater(len(load.jobs), 1000)
         load.finish()
-        # What had not begun went elsewhere, and what had was answered.
+        # Jobs that had not started were sent elsewhere, and the others were answered.
         self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
         self.account(load)
 
-    def test_the_node_that_is_asked_is_restarted(self):
+    def test_the_routing_node_is_restarted(self):
         load = self.load_at("sat2")
         load.PACE, load.MIX = 0.001, (("any", "once"), ("named", "once"))
         load.run(0.3)
         self.fleet["sat2"].send_signal(signal.SIGTERM)
         load.run(until=lambda: not load.linked, what="the link has ended")
         self.assertTrue(load.left)
-        # Every job that was not answered is known not to have begun: another node may be asked for it.
+        # Every job without an answer is known not to have started, so another node may be asked.
         self.assertEqual([job for job in load.jobs if job.code not in (None, "busy")], [])
         load.connect(self.fleet["sat3"])
         load.names = ["sat1", "sat3", "sat4"]
         load.run(0.3)
         self.account(load)
 
-    def test_a_node_whose_workers_are_held_gets_no_work_while_others_are_free(self):
+    def test_a_busy_node_gets_no_jobs_while_others_are_free(self):
         load = self.load_at("sat1")
-        load.PACE, load.MIX = 0.01, (("any", "once"),)  # far less than three nodes do
+        load.PACE, load.MIX = 0.01, (("any", "once"),)  # far less than three nodes can do
         load.run(0.3)
         for name in ("sat3", "sat3", "sat4", "sat4"):
             job = load.send(name, "holds", deadline=PATIENCE)
@@ -143,7 +143,7 @@ class Faults(unittest.TestCase):
         self.assertGreater(len(jobs), 50)
         self.assertEqual([job for job in jobs if job.code or set(marks[job.number]) & {"sat3", "sat4"}], [])
 
-    def test_the_node_that_is_asked_is_killed(self):
+    def test_the_routing_node_is_killed(self):
         load = self.load_at("sat1")
         load.run(0.3)
         held = self.hold(load, "sat1")
@@ -151,7 +151,7 @@ class Faults(unittest.TestCase):
         self.fleet.kill("sat1")
         load.run(until=lambda: not load.linked, what="the link is lost")
         self.assertEqual({held.code, begun_elsewhere.code}, {"link lost"})
-        # Another one serves on, and loses nobody's job any more.
+        # Another node continues, and loses no more jobs.
         load.connect(self.fleet["sat2"])
         load.names = self.fleet.names[1:]
         since = time.monotonic()
@@ -160,7 +160,7 @@ class Faults(unittest.TestCase):
         self.assertLessEqual(self.lost_since(load, since), SLACK / 6)
         self.account(load)
 
-    def test_the_node_that_is_asked_is_paused(self):
+    def test_the_routing_node_is_paused(self):
         load = self.load_at("sat1")
         load.run(0.3)
         self.fleet.pause("sat1")

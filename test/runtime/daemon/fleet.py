@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Some daemons that have found each other, and what their jobs leave behind."""
+"""Several daemons that have discovered each other, and the marks of their jobs."""
 
 import collections
 import contextlib
@@ -14,7 +14,7 @@ COUNTING = os.environ.get("COUNTING_PLUGIN", "")
 
 
 class Fleet:
-    """Nodes sat1, sat2 ..., each of which can be asked for all; sat1 is the others' seed."""
+    """Nodes sat1, sat2 ..., each of which routes to all; sat1 is the others' seed."""
 
     def __init__(self, count):
         self.names = [f"sat{i + 1}" for i in range(count)]
@@ -43,16 +43,16 @@ class Fleet:
         return {peer["node"] for peer in self.peers_at(name) if peer["state"] == "live"}
 
     def load_at(self, name, other):
-        """What the one knows of the other's load."""
+        """The load of one node as another knows it."""
         return next((peer["load"] for peer in self.peers_at(name) if peer["node"] == other), {})
 
     def kill(self, name):
-        """Returns when it has gone, and the system has closed all that it held."""
+        """Returns when it has ended and its sockets are closed."""
         self.nodes[name].send_signal(signal.SIGKILL)
         self.nodes[name].process.wait()
 
     def restart(self, name, meanwhile):
-        """As at an update: told to end, and started again when it has, which `meanwhile(condition, what)` waits for."""
+        """Stops it and starts it again, as for an update; `meanwhile(condition, what)` waits for its end."""
         node = self.nodes[name]
         node.send_signal(signal.SIGTERM)
         meanwhile(lambda: node.process.poll() is not None, f"{name} has ended")
@@ -80,7 +80,7 @@ class Fleet:
             return found
 
     def stop(self):
-        """All that live; the codes with which they ended."""
+        """Stops all; returns their exit codes."""
         return [node.stop()[0] for node in self.nodes.values() if node.process.poll() is None]
 
     def __enter__(self):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""clesd from its start to its end: readiness, signals, draining, reading again."""
+"""The life cycle of clesd: readiness, signals, draining, reload."""
 
 import json
 import os
@@ -21,7 +21,7 @@ def known_to(daemon):
 
 
 class Manager:
-    """A service manager, as systemd is one: the socket that it hears by."""
+    """The socket of a service manager like systemd."""
 
     def __init__(self, name=None):
         self.socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
@@ -51,15 +51,15 @@ class Manager:
 
 
 class Start(unittest.TestCase):
-    def test_it_serves_and_ends_on_sigterm_and_on_sigint(self):
+    def test_it_stops_on_sigterm_and_sigint(self):
         for number in (signal.SIGTERM, signal.SIGINT):
             with Daemon() as d:
                 self.assertEqual(json.loads(d.ask("PULL self:cles"))["node"], "sat1")
                 code, took = d.stop(number)
                 self.assertEqual(code, 0)
-                self.assertLess(took, 4)  # nothing runs that it could wait for
+                self.assertLess(took, 4)  # there is nothing to wait for
 
-    def test_the_log_is_an_object_a_line_and_names_the_node(self):
+    def test_the_json_log_has_an_object_per_line(self):
         with Daemon() as d:
             d.stop()
             entries = d.entries()
@@ -69,12 +69,12 @@ class Start(unittest.TestCase):
                 self.assertIn(entry["level"], ("debug", "info", "warning", "error"))
                 self.assertRegex(entry["time"], r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}[+-]\d\d:\d\d$")
 
-    def test_the_log_is_text_unless_something_else_is_said(self):
+    def test_the_log_is_text_by_default(self):
         with Daemon(base=DEFAULTS.replace(", format: json", "")) as d:
             d.stop()
             self.assertRegex(d.log(), r"(?m)^\S+ info    sat1: stopping on SIGTERM; ")
 
-    def test_an_entry_about_somebody_names_the_peer(self):
+    def test_an_entry_about_a_peer_names_it(self):
         with Daemon() as d:
             with d.connect() as link:
                 where = link.socket.getsockname()
@@ -83,7 +83,7 @@ class Start(unittest.TestCase):
             entry = d.wait_for_entry("a web client")
             self.assertEqual(entry["peer"], f"tcp://127.0.0.1:{where[1]}")
 
-    def test_a_port_that_is_taken_is_said(self):
+    def test_a_port_in_use_is_reported(self):
         with Daemon() as d:
             code, _, err = clesd("--node", "b", "--listen", d.url, "--multicast", "off")
             self.assertEqual(code, 1)
@@ -114,27 +114,27 @@ class Readiness(unittest.TestCase):
             self.assertNotEqual(code, 0)
             self.assertTrue(m.hears_nothing())
 
-    def test_a_manager_that_is_not_there_keeps_nobody_from_running(self):
+    def test_a_missing_service_manager_does_not_prevent_the_start(self):
         with Daemon(env=clean_environment(NOTIFY_SOCKET="@nobody-is-there")) as d:
             d.wait_for_entry("service manager could not be notified")
             self.assertEqual(d.stop()[0], 0)
 
 
 class Drain(unittest.TestCase):
-    def test_a_job_that_runs_may_end_and_is_answered(self):
+    def test_a_running_job_may_end_and_is_answered(self):
         with Daemon(STUBBORN_TASKS + "drain: 60s\n") as d, d.connect() as link:
             link.send(f"DELEGATE sat1:waits/{d.file('go').replace('/', '%2F')} id=1 deadline=60000")
             wait_until_running(d, 1)
             d.send_signal(signal.SIGTERM)
             d.wait_for_entry("stopping on SIGTERM; 1 job running")
-            # What comes now is refused, and may be asked of another.
+            # New requests are refused, and may be sent to another node.
             with d.connect() as late:
                 self.assertEqual(body(late.ask("DELEGATE sat1:empty id=2"))["error"], "busy")
             d.write("", "go")
             self.assertEqual(link.read(), 'id=1 {"value":"found"}')
             self.assertEqual(d.end()[0], 0)
 
-    def test_a_job_that_never_ends_is_left_at_the_limit(self):
+    def test_a_job_that_does_not_end_is_abandoned_at_the_limit(self):
         with Daemon(STUBBORN_TASKS + "drain: 1s\n") as d, d.connect() as link:
             link.send("DELEGATE sat1:never_ends id=1 deadline=60000")
             wait_until_running(d, 1)
@@ -145,10 +145,10 @@ class Drain(unittest.TestCase):
             took = time.monotonic() - begun
             self.assertEqual(code, 0)
             self.assertGreaterEqual(took, 0.9)
-            self.assertLess(took, 4)  # the limit, and what a busy machine adds; nothing else would end it
+            self.assertLess(took, 4)  # the limit, and what a busy machine adds
             d.wait_for_entry("1 job did not end in time")
 
-    def test_a_second_signal_ends_it_at_once(self):
+    def test_a_second_signal_stops_it_at_once(self):
         with Daemon(STUBBORN_TASKS + "drain: 10min\n") as d, d.connect() as link:
             link.send("DELEGATE sat1:never_ends id=1 deadline=60000")
             wait_until_running(d, 1)
@@ -159,7 +159,7 @@ class Drain(unittest.TestCase):
 
 
 class Leave(unittest.TestCase):
-    """Others hear at the beginning of its end that a daemon leaves, so that they send it nothing more."""
+    """A daemon tells other nodes that it leaves when it begins to stop, so that they send it nothing more."""
 
     def leave_while_a_job_runs(self, base, seeded):
         tasks = STUBBORN_TASKS + "drain: 60s\n"
@@ -177,7 +177,7 @@ class Leave(unittest.TestCase):
                     self.assertEqual(other.ask("DELEGATE any:empty"), "{}")
             self.assertEqual(json.loads(leaves.ask("PULL self:cles/metrics"))["pool"]["refused"], 0)
             leaves.write("", "go")
-            self.assertEqual(link.read(), 'id=1 {"value":"found"}')  # what was begun is brought to its end
+            self.assertEqual(link.read(), 'id=1 {"value":"found"}')  # jobs that have started complete
             self.assertEqual(leaves.end()[0], 0)
 
     def test_by_gossip(self):
@@ -192,14 +192,14 @@ class Leave(unittest.TestCase):
 
 
 class Reload(unittest.TestCase):
-    def test_sighup_reads_seeds_and_log_again(self):
+    def test_sighup_reloads_seeds_and_log(self):
         with Daemon(base=DEFAULTS.replace("level: debug", "level: warning")) as d:
             self.assertEqual(d.entries(), [])
             d.write(DEFAULTS + "seeds: [tcp://127.0.0.1:1, tcp://127.0.0.1:2]\n")
             d.send_signal(signal.SIGHUP)
             self.assertIn("2 seeds, log debug", d.wait_for_entry("reloaded the configuration")["message"])
             d.stop()
-            d.wait_for_entry("stopping on SIGTERM")  # which a log of warnings does not hold
+            d.wait_for_entry("stopping on SIGTERM")  # which a log of warnings does not contain
 
     def test_a_new_seed_is_asked(self):
         with Daemon(base=DEFAULTS.replace("sat1", "sat2")) as seed, Daemon() as d:
@@ -210,7 +210,7 @@ class Reload(unittest.TestCase):
             wait_until(lambda: known_to(seed) == ["sat1"], "the seed was told")
             self.assertEqual(json.loads(d.ask("PULL sat2:cles"))["node"], "sat2")
 
-    def test_a_mistake_leaves_all_as_it_was(self):
+    def test_an_error_keeps_the_old_configuration(self):
         with Daemon() as d:
             d.write(DEFAULTS + "seeds: there\n")
             d.send_signal(signal.SIGHUP)
@@ -220,13 +220,13 @@ class Reload(unittest.TestCase):
             self.assertEqual(json.loads(d.ask("PULL self:cles"))["node"], "sat1")
             self.assertEqual(d.stop()[0], 0)
 
-    def test_what_does_not_change_before_the_next_start_is_said(self):
+    def test_changes_that_need_a_restart_are_reported(self):
         with Daemon() as d:
             d.write(DEFAULTS + "queue: 7\n")
             d.send_signal(signal.SIGHUP)
             d.wait_for_entry("take effect at the next start")
 
-    def test_the_service_manager_is_told(self):
+    def test_the_service_manager_is_notified(self):
         with Manager() as m, Daemon(env=clean_environment(NOTIFY_SOCKET=m.name)) as d:
             self.assertEqual(m.hear(), "READY=1")
             d.send_signal(signal.SIGHUP)

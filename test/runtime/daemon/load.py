@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Jobs without end, and what became of each of them."""
+"""A continuous stream of jobs, and the outcome of each."""
 
 import collections
 import json
@@ -9,10 +9,10 @@ import time
 
 from support import PATIENCE
 
-DEADLINE = PATIENCE / 15  # of a job; that of a quick one is far from it on any machine that the tests fit
-SLACK = PATIENCE / 10  # what a busy machine may add to a time that is asserted
+DEADLINE = PATIENCE / 15  # of a job; quick ones are far from it on any machine that can run the tests
+SLACK = PATIENCE / 10  # what a busy machine may add to an asserted time
 
-# How each code counts. Of what is unknown the work may have been done or not.
+# The outcome of each code. If it is unknown, the work may have been done or not.
 FATES = {None: "done", "busy": "refused", "unavailable": "unknown", "deadline": "unknown", "link lost": "unknown",
          "failed": "failed", "no_target": "failed", "no_task": "failed", "cancelled": "failed"}
 # How often a job that may run only once has run, by its code.
@@ -36,10 +36,10 @@ class Job:
 
 
 class Load:
-    """One client with many jobs at once, sent at a steady pace, whatever comes of those before."""
+    """A client that sends jobs at a steady pace, without waiting for their answers."""
 
     PACE = 0.005
-    # What is asked, in turns: most of it of anybody, and all that only names one node of each in turn.
+    # The kinds of requests, in turn: most are for any node; the others name each node in turn.
     MIX = (("any", "once"), ("any", "again"), ("named", "once"), ("any", "once"), ("any", "fails"), ("any", "once"))
 
     def __init__(self, daemon, names):
@@ -54,9 +54,9 @@ class Load:
         self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self.rest = b""
         self.linked = True
-        self.left = False  # the node has said that it leaves
+        self.left = False  # the node has announced that it leaves
 
-    # -- asking ------------------------------------------------------------------------------------------------------
+    # -- sending -----------------------------------------------------------------------------------------------------
 
     def send(self, target, task, work_ms=2, deadline=DEADLINE):
         job = self.prepare(target, task)
@@ -82,14 +82,14 @@ class Load:
         try:
             self.socket.sendall("".join(lines).encode())
         except (BrokenPipeError, ConnectionResetError):
-            pass  # reading tells what is left
+            pass  # reading returns the rest
 
     def send_next(self):
         turn = len(self.jobs)
         target, task = self.MIX[turn % len(self.MIX)]
         self.send(self.names[turn // len(self.MIX) % len(self.names)] if target == "named" else target, task)
 
-    # -- hearing -----------------------------------------------------------------------------------------------------
+    # -- receiving ---------------------------------------------------------------------------------------------------
 
     def hear(self, wait):
         ready, _, _ = select.select([self.socket], [], [], max(0.0, wait))
@@ -111,7 +111,7 @@ class Load:
                 return
             head, _, text = line.decode().partition(" ")
             answer = json.loads(text[text.index("{"):])
-            job = self.flying.pop(int(head.removeprefix("id=")))  # a second answer would find nothing
+            job = self.flying.pop(int(head.removeprefix("id=")))  # fails for a second answer
             job.ended, job.code = now, answer.get("error")
 
     def lose_link(self):
@@ -124,7 +124,7 @@ class Load:
         self.flying.clear()
 
     def run(self, seconds=None, until=None, what=""):
-        """Keeps asking for so long, or until something is so; or until the link is lost."""
+        """Sends jobs for some time, until a condition holds, or until the link is lost."""
         end = time.monotonic() + (seconds if seconds is not None else PATIENCE)
         while self.linked:
             now = time.monotonic()
@@ -136,11 +136,11 @@ class Load:
                 return
             if now >= self.next_due:
                 self.send_next()
-                self.next_due = max(self.next_due, now - 0.1) + self.PACE  # a late machine catches up with little
+                self.next_due = max(self.next_due, now - 0.1) + self.PACE  # a late machine catches up only a little
             self.hear(min(self.next_due, end) - time.monotonic())
 
     def finish(self):
-        """Asks no more, and waits for all that was asked."""
+        """Sends no more, and waits for all answers."""
         end = time.monotonic() + DEADLINE + SLACK
         while self.flying and self.linked:
             if time.monotonic() > end:
@@ -150,7 +150,7 @@ class Load:
     # -- counting ----------------------------------------------------------------------------------------------------
 
     def latest(self):
-        """The most time that a job took until it was answered."""
+        """The longest time until a job was answered."""
         return max(job.ended - job.sent for job in self.jobs if job.code != "link lost")
 
     def fates(self):

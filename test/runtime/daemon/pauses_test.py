@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""A daemon that was stopped, as by a debugger or a laptop's lid, and goes on: it begins no job that was withdrawn, or
-ran out of time, meanwhile."""
+"""A daemon that was suspended, as by a debugger or a laptop's lid, starts no job that was withdrawn, or whose deadline
+passed, in the meantime."""
 
 import contextlib
 import os
@@ -36,7 +36,7 @@ class Pauses(unittest.TestCase):
         os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
         try:
             yield
-            time.sleep(PAUSE)  # what is waited for is that time passes
+            time.sleep(PAUSE)  # time has to pass
         finally:
             process.send_signal(signal.SIGCONT)
 
@@ -44,14 +44,14 @@ class Pauses(unittest.TestCase):
         return sorted(body(link.read())["error"] for link in links)
 
     def serves(self, number):
-        """It does again what it is asked."""
+        """Serves requests again."""
         self.assertEqual(self.daemon.ask(f"DELEGATE sat1:once/{number}/0"), '{"value":"sat1"}')
 
-    def test_jobs_in_the_queue_that_are_withdrawn_or_late_do_not_begin(self):
+    def test_withdrawn_and_late_jobs_in_the_queue_do_not_start(self):
         for attempt in range(5):
             first = 1000 * attempt
             with self.daemon.connect() as link, self.daemon.connect() as other:
-                # Ends while the daemon is stopped, and leaves the only worker to the next.
+                # Ends during the pause, so that the only worker is free.
                 link.send(f"DELEGATE sat1:once/{first}/100 id=1")
                 wait_until(lambda n=first: n in self.begun(), "the first has begun")
                 for id_ in range(2, 12):
@@ -68,7 +68,7 @@ class Pauses(unittest.TestCase):
                 self.serves(first + 99)
             self.assertEqual([n - first for n in self.begun() if n >= first], [0, 99])
 
-    def test_jobs_that_are_asked_and_withdrawn_meanwhile_do_not_begin(self):
+    def test_jobs_sent_and_withdrawn_during_the_pause_do_not_start(self):
         for attempt in range(5):
             first = 1000 * attempt
             with contextlib.ExitStack() as opened:
@@ -85,7 +85,7 @@ class Pauses(unittest.TestCase):
             self.assertEqual([n - first for n in self.begun() if n >= first], [99])
         self.daemon.wait_for_entry("until the input that arrived since has been read")
 
-    def test_a_job_that_is_still_wanted_begins(self):
+    def test_other_jobs_start(self):
         with self.daemon.connect() as link:
             with self.paused():
                 link.send("DELEGATE sat1:once/1/0 id=1 deadline=60000")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""clesd and its plugins: those that cannot be used, and those whose tasks do what they must not."""
+"""clesd with plugins that cannot be used, and with plugins whose tasks misbehave."""
 
 import json
 import signal
@@ -13,7 +13,7 @@ from daemon import (CLESD, DEFAULTS, FAULTY, STUBBORN, Daemon, Folder, body, cle
                     wait_until_running)
 from support import wait_until
 
-# The plugin, and what is said of it.
+# The plugin, and a part of the message.
 FAULTS = {
     "bad_tasks": "",
     "crashes_in_entry": "by signal 11",
@@ -36,7 +36,7 @@ FAULTS = {
 
 class Unusable(unittest.TestCase):
     def refused(self, path, words):
-        """Required, it keeps the daemon from starting; not required, the daemon says the same and does without."""
+        """A required one prevents the start; without another one the daemon continues, with the same message."""
         with Folder() as f:
             file = f.write(DEFAULTS + f"plugins:\n  - path: {STUBBORN}\n  - path: {path}\n")
             code, out, err = clesd("--config", file)
@@ -58,7 +58,7 @@ class Unusable(unittest.TestCase):
             with self.subTest(name):
                 self.refused(f"{FAULTY}/{name}.so", words)
 
-    def test_one_that_ends_or_holds_the_process_while_it_starts(self):
+    def test_crashes_exits_and_hangs_at_the_start(self):
         for name, words in (("crashes_in_start", "its start ends the process by signal 11"),
                             ("overflows_in_start", "its start ends the process by signal 11"),
                             ("exits_in_start", "its start ends the process"),
@@ -70,7 +70,7 @@ class Unusable(unittest.TestCase):
                 self.assertEqual((code, out), (2, ""), err)
                 self.assertEqual(err.splitlines()[-1], f"clesd: {file}:8: plugins[1].path: {path}: {words}")
 
-    def test_one_that_hangs_while_it_starts_does_not_keep_the_daemon_from_being_stopped(self):
+    def test_the_daemon_can_be_stopped_while_a_plugin_hangs_at_its_start(self):
         with Folder() as f:
             file = f.write(DEFAULTS + f"plugins:\n  - path: {STUBBORN}\n  - path: {FAULTY}/hangs_in_start.so\n")
             with open(f.file("log"), "w", encoding="utf-8") as log:
@@ -78,20 +78,20 @@ class Unusable(unittest.TestCase):
                                            stdout=subprocess.DEVNULL, stderr=log)
             try:
                 wait_until(lambda: "plugin stubborn" in f.read("log"), "it starts them")
-                time.sleep(0.2)  # the next one hangs by then; where it does not, the signal ends the daemon too
+                time.sleep(0.2)  # the next one hangs by then; if it does not, the signal ends the daemon, too
                 process.send_signal(signal.SIGTERM)
                 self.assertEqual(process.wait(timeout=5), -signal.SIGTERM)
             finally:
                 process.kill()
                 process.wait()
 
-    def test_a_file_that_is_not_there(self):
+    def test_a_missing_file(self):
         self.refused("/nowhere/plugin.so", "there is no such file")
 
-    def test_a_file_that_is_no_library(self):
+    def test_a_file_that_is_not_a_library(self):
         self.refused(__file__, "cannot be loaded")
 
-    def test_a_task_that_another_plugin_has(self):
+    def test_a_task_of_another_plugin(self):
         with Folder() as f:
             copy = f.file("copy.so")
             with open(STUBBORN, "rb") as source, open(copy, "wb") as out:
@@ -100,7 +100,7 @@ class Unusable(unittest.TestCase):
 
 
 class Misbehaviour(unittest.TestCase):
-    """Whatever a job does, the daemon serves on."""
+    """Whatever a job does, the daemon continues."""
 
     def setUp(self):
         self.daemon = Daemon(f"plugins: [{STUBBORN}]\nstuck_after: 50ms\nreplacements: 2\ndrain: 200ms\n")
@@ -127,17 +127,17 @@ class Misbehaviour(unittest.TestCase):
             metrics = json.loads(self.daemon.ask("PULL self:cles/metrics"))
             return metrics["pool"]["answered_twice"] + metrics["plugins"]["answered_twice"]
 
-        wait_until(lambda: too_many() == 2, "the others are counted")  # they may come after the first has been read
+        wait_until(lambda: too_many() == 2, "the others are counted")  # they may arrive after the first has been read
 
-    def test_it_forgets_to_answer(self):
+    def test_it_does_not_answer(self):
         self.assertEqual(body(self.daemon.ask("DELEGATE sat1:forgets id=1 deadline=60000"))["error"], "failed")
 
-    def test_it_never_ends_and_its_worker_is_replaced(self):
+    def test_it_does_not_end_and_its_worker_is_replaced(self):
         with self.daemon.connect() as link:
             for id_ in (1, 2):
                 link.send(f"DELEGATE sat1:never_ends id={id_} deadline=100")
             self.assertEqual({body(link.read())["error"], body(link.read())["error"]}, {"deadline"})
-        # Both workers are gone; that quick tasks are answered takes others.
+        # Both workers are stuck; quick tasks need others.
         self.assertEqual(self.daemon.ask("PULL sat1:quick"), '{"value":42}')
         wait_until(lambda: self.pool()["replaced"] == 2, "both workers are replaced")
         self.assertEqual(self.pool()["stuck"], 2)
@@ -145,14 +145,14 @@ class Misbehaviour(unittest.TestCase):
         self.assertEqual(entry["level"], "error")
         self.assertIn("tcp://127.0.0.1:", entry["peer"])
 
-    def test_a_handler_on_the_io_thread_that_lingers_is_told_of(self):
+    def test_a_slow_inline_handler_is_logged(self):
         self.daemon.ask("PULL sat1:lingers")
         pool = self.pool()
         self.assertEqual((pool["inline_calls"], pool["inline_slow"]), (1, 1))
         self.assertGreaterEqual(pool["inline_worst_us"], 50_000)
         self.daemon.wait_for_entry("lingers")
 
-    def test_its_words_in_the_log_name_peer_and_request(self):
+    def test_its_log_entries_name_peer_and_request(self):
         with self.daemon.connect() as link:
             where = link.socket.getsockname()
             link.send(f"DELEGATE sat1:waits/{self.daemon.file('go').replace('/', '%2F')} id=17")
@@ -161,12 +161,12 @@ class Misbehaviour(unittest.TestCase):
             self.daemon.write("", "go")
             self.assertEqual(link.read(), 'id=17 {"value":"found"}')
 
-    def test_a_queue_that_is_full_refuses(self):
+    def test_a_full_queue_refuses(self):
         with Daemon(f"plugins: [{STUBBORN}]\nqueue: 2\ndrain: 0\n") as d, d.connect() as link:
             for id_ in range(1, 6):
                 link.send(f"DELEGATE sat1:never_ends id={id_} deadline=60000")
                 if id_ == 2:
-                    wait_until_running(d, 2)  # and wait no more
+                    wait_until_running(d, 2)  # and do not wait any more
             answer = link.read()
             self.assertTrue(answer.startswith("id=5 "), answer)
             self.assertEqual(body(answer)["error"], "busy")
@@ -175,7 +175,7 @@ class Misbehaviour(unittest.TestCase):
 
 
 class Apart(unittest.TestCase):
-    def test_a_task_that_hangs_does_not_slow_another_down(self):
+    def test_a_hanging_task_does_not_slow_another(self):
         """The quick task's p99, with and without a worker that hangs: medians of rounds in turns, on one daemon that
         hangs and one that does not."""
         rounds, asked = 7, 400
@@ -192,14 +192,14 @@ class Apart(unittest.TestCase):
             with held.connect() as hanging, free.connect() as to_free, held.connect() as to_held:
                 hanging.send("PULL sat1:hangs deadline=600000")
                 wait_until_running(held, 1)
-                for attempt in range(3):  # other programs have the machine now and then
+                for attempt in range(3):  # other programs may use the machine
                     pairs = [(p99(to_free), p99(to_held)) for _ in range(rounds)]
                     ratio = statistics.median(h for _, h in pairs) / statistics.median(f for f, _ in pairs)
                     print(f"attempt {attempt + 1}: p99 with a task that hangs {ratio:.2f} times that without")
                     if ratio <= 2:
                         break
                 self.assertLessEqual(ratio, 2)
-                wait_until_running(held, 1)  # it hangs still
+                wait_until_running(held, 1)  # it still hangs
 
 
 if __name__ == "__main__":

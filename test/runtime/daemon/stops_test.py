@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Jobs that are stopped: each is told, soon, whatever the others do when they are told."""
+"""Jobs that are stopped: each is told soon, whatever the callbacks of others do."""
 
 import socket
 import time
@@ -21,7 +21,7 @@ class Stops(unittest.TestCase):
         self.sent = 0
 
     def marks(self):
-        """When what was marked, in nanoseconds."""
+        """The time of each mark, in nanoseconds."""
         try:
             with open(self.file, encoding="utf-8") as marks:
                 return [(name, int(at)) for name, at in (line.split() for line in marks)]
@@ -32,7 +32,7 @@ class Stops(unittest.TestCase):
         return sum(1 for each, _ in self.marks() if each == name)
 
     def begin(self, link, task, names):
-        """Jobs that have begun; their ids."""
+        """Starts jobs; returns their ids."""
         before = self.count("begun")
         ids = []
         for name in names:
@@ -48,7 +48,7 @@ class Stops(unittest.TestCase):
             link.send(f"PUSH self:cles/cancel/{id_} reply=no")
         self.assertEqual({body(link.read())["error"] for _ in ids}, {"cancelled"})
 
-    def test_a_withdrawn_job_that_has_asked_another_is_told(self):
+    def test_a_withdrawn_job_that_waits_for_another_is_told(self):
         with self.daemon.connect() as link:
             for attempt in range(20):
                 self.withdraw(link, self.begin(link, "asks_and_listens", ["told"]))
@@ -57,11 +57,11 @@ class Stops(unittest.TestCase):
         self.assertEqual(self.count("ended_and_not_stopped"), 0)
         self.assertEqual(self.daemon.stop()[0], 0)
 
-    def test_one_that_blocks_when_it_is_told_delays_no_other(self):
+    def test_a_blocking_callback_delays_no_other(self):
         with self.daemon.connect() as link:
             blocking = self.begin(link, "blocks_when_stopped", [f"b{n}" for n in range(BLOCKERS)])
             late = []
-            for attempt in range(3):  # other programs have the machine now and then
+            for attempt in range(3):  # other programs may use the machine
                 names = [f"told{attempt}.{n}" for n in range(100)]
                 listening = self.begin(link, "listens", names)
                 withdrawn = time.monotonic_ns()
@@ -76,7 +76,7 @@ class Stops(unittest.TestCase):
         entry = self.daemon.wait_for_entry("on_stop callback does not return")
         self.assertEqual(entry["level"], "warning")
         self.assertIn("blocks_when_stopped", entry["message"])
-        # A job that looks by itself sees it at once, and its worker is free.
+        # A job that polls sees it at once, and its worker is free.
         with self.daemon.connect() as link:
             link.send("DELEGATE sat1:waits/nothing id=1 deadline=60000")
             self.daemon.wait_for_entry("waiting")
@@ -87,8 +87,8 @@ class Stops(unittest.TestCase):
         self.assertEqual(code, 0)
         self.assertLess(took, 5)
 
-    def test_the_daemon_ends_though_one_blocks(self):
-        """Even one alone, for which no other callback waits; and without destroying what it may use."""
+    def test_the_daemon_stops_although_a_callback_blocks(self):
+        """Even if no other callback waits; and without destroying what the callback may use."""
         with self.daemon.connect() as link:
             self.withdraw(link, self.begin(link, "blocks_when_stopped", ["alone"]))
             self.assertEqual(link.ask("PULL sat1:quick"), '{"value":42}')
@@ -98,8 +98,8 @@ class Stops(unittest.TestCase):
         entry = self.daemon.wait_for_entry("threads abandoned in on_stop callbacks that do not return: 1")
         self.assertEqual(entry["level"], "error")
 
-    def test_a_job_that_is_stopped_by_the_end_of_the_drain_may_end(self):
-        """Also where no link is there to wait for, as it was asked for by UDP."""
+    def test_a_job_that_is_stopped_at_the_limit_of_the_drain_may_end(self):
+        """Also if there is no link to wait for, because the request came by UDP."""
         self.daemon = Daemon(f"plugins: [{STUBBORN}]\nstuck_after: 500ms\ndrain: 200ms\n",
                              base=DEFAULTS.replace("tcp://127.0.0.1:0", "[tcp://127.0.0.1:0, udp://127.0.0.1:0]"))
         self.addCleanup(self.daemon.__exit__)
@@ -114,11 +114,11 @@ class Stops(unittest.TestCase):
             self.assertEqual(self.daemon.stop()[0], 0)
         self.assertEqual(self.count("ended"), 1)
 
-    def test_more_that_block_than_there_are_threads_are_reported(self):
+    def test_exhausted_threads_are_reported(self):
         with self.daemon.connect() as link:
             self.withdraw(link, self.begin(link, "blocks_when_stopped", [f"b{n}" for n in range(20)]))
             self.assertEqual(self.daemon.wait_for_entry("one more delays all that follow")["level"], "error")
-            # It serves on.
+            # It continues to serve.
             self.assertEqual(link.ask("PULL sat1:quick"), '{"value":42}')
         self.assertEqual(self.daemon.stop()[0], 0)
 
