@@ -183,7 +183,7 @@ BOOST_AUTO_TEST_CASE(a_job_on_a_pool_is_answered_where_it_answers_and_stops_when
 
 BOOST_AUTO_TEST_CASE(there_are_so_many_jobs_and_no_more) {
     std::vector<std::uint64_t> all;
-    for (std::size_t i = 0; i < jobs.most; ++i) {
+    for (std::size_t i = 0; i < jobs.max_open; ++i) {
         all.push_back(open());
     }
     BOOST_TEST(all.back() != 0U);
