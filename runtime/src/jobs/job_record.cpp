@@ -152,16 +152,17 @@ bool job_record::progress(double fraction, std::string_view json) {
     if (!wants_progress()) {
         return false;
     }
+    std::string details{json};
     if (std::isnan(fraction)) {
         fraction = 0;
     }
     {
         const std::lock_guard lock{mutex_};
         if (reports_.size() >= max_reports) {
-            reports_.back() = {fraction, std::string{json}};
+            reports_.back() = {fraction, std::move(details)};
             return true;
         }
-        reports_.push_back({fraction, std::string{json}});
+        reports_.push_back({fraction, std::move(details)});
         if (reports_.size() != 1) {
             return true; // an earlier one is being delivered
         }
