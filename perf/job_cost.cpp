@@ -9,7 +9,7 @@
 #include <cles/service.hpp>
 
 #include "child_process.hpp"
-#include "daemon.hpp"
+#include "daemon/daemon.hpp"
 #include "delegate_load.hpp"
 #include "icd_exchange.hpp"
 #include "latency_recorder.hpp"
@@ -92,7 +92,7 @@ void run_daemon(const options& o, const std::vector<int>& cores, const perf::chi
     setup.plugins = {{.path = o.plugin}};
     setup.log.level = cles::log_level::warning;
     runtime::daemon_log log{setup.node, setup.log};
-    const runtime::notifier nobody{""};
+    const runtime::service_manager nobody{""};
     boost::asio::io_context io{1};
     runtime::daemon car{io, setup, {}, log, nobody};
     announce(car.endpoints().front());

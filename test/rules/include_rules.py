@@ -99,9 +99,9 @@ NOT_SANS_IO_WORDS = [
 
 # (pattern of the header, where it may stand, what to say)
 RESERVED_HEADERS = [
-    (re.compile(r"yaml-cpp/"), re.compile(r"runtime/(src/)?config[^/]*(/.*)?$"), "yaml-cpp belongs to runtime/config alone"),
-    (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/(src/)?plugin_host[^/]*(/.*)?$"),
-     "Boost.DLL belongs to runtime/plugin_host alone"),
+    (re.compile(r"yaml-cpp/"), re.compile(r"runtime/src/config/"), "yaml-cpp belongs to runtime/config alone"),
+    (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/src/plugins/plugin_library\.[ch]pp$"),
+     "Boost.DLL belongs to runtime/plugins/plugin_library alone"),
     (re.compile(r"spdlog/"), re.compile(r"(?!libcles/)"), "the library logs through its sink; spdlog is for programs"),
 ]
 
@@ -330,8 +330,8 @@ GOOD = {
     "libcles/src/transport/tcp.hpp": "#pragma once\n",
     "libcles/src/service.cpp": '#include <cles/service.hpp>\n#include "shell/connection.hpp"\n',
     "libcles/src/shell/connection.hpp": "#pragma once\n",
-    "runtime/config.cpp": "#include <yaml-cpp/yaml.h>\n#include <cles/service.hpp>\n",
-    "runtime/plugin_host.cpp": "#include <boost/dll/shared_library.hpp>\n",
+    "runtime/src/config/config.cpp": "#include <yaml-cpp/yaml.h>\n#include <cles/service.hpp>\n",
+    "runtime/src/plugins/plugin_library.cpp": "#include <boost/dll/shared_library.hpp>\n",
     "apps/car/main.cpp": '#include <cles/service.hpp>\n#include <spdlog/spdlog.h>\n#include "car.hpp"\n#include <boost/asio.hpp>\n',
     "apps/car/car.hpp": "#pragma once\n",
     "test/unit/session_test.cpp": '#include "core/session.hpp"\n#include "support/clock.hpp"\n',
@@ -370,7 +370,7 @@ PLANTED = [
     ("apps/a.cpp", "#include <yaml-cpp/yaml.h>\n", "runtime/config alone"),
     ("perf/a.cpp", '#include "shell/connection.hpp"\n', "perf must not see shell"),
     ("plugins/a.cpp", '#include "runtime/config.hpp"\n#include <cles/nowhere.hpp>\n', "is no file of this project"),
-    ("runtime/a.cpp", "#include <boost/dll.hpp>\n", "runtime/plugin_host alone"),
+    ("runtime/a.cpp", "#include <boost/dll.hpp>\n", "runtime/plugins/plugin_library alone"),
     ("runtime/a.cpp", '#include "core/session.hpp"\n', "runtime must not see core"),
     ("apps/a.cpp", "task f() { if (ready && co_await g()) { } }\n", "co_await under"),
     ("apps/a.cpp", "task f() { x = co_await g() || y; }\n", "co_await under"),
