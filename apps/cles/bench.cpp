@@ -6,9 +6,9 @@
 
 #include "bench_arguments.hpp"
 #include "bench_run.hpp"
-#include "diagnostics.hpp"
-#include "exit_code.hpp"
-#include "output.hpp"
+#include "output/diagnostics.hpp"
+#include "output/exit_code.hpp"
+#include "output/output.hpp"
 #include "perf/pinning.hpp"
 
 #include <CLI/CLI.hpp>

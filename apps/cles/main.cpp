@@ -3,12 +3,12 @@
 
 #include "bench.hpp"
 #include "commands.hpp"
-#include "complete.hpp"
+#include "commands/help.hpp"
+#include "completion/complete.hpp"
 #include "context.hpp"
-#include "diagnostics.hpp"
-#include "exit_code.hpp"
-#include "failure.hpp"
-#include "help.hpp"
+#include "output/diagnostics.hpp"
+#include "output/exit_code.hpp"
+#include "output/failure.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
