@@ -6,9 +6,8 @@
 
 #include "bench_arguments.hpp"
 #include "bench_run.hpp"
-#include "output/diagnostics.hpp"
-#include "output/exit_code.hpp"
-#include "output/output.hpp"
+#include "output/errors.hpp"
+#include "output/terminal.hpp"
 #include "perf/pinning.hpp"
 
 #include <CLI/CLI.hpp>

@@ -2,7 +2,7 @@
 #include "bench_arguments.hpp"
 
 #include "options/duration.hpp"
-#include "output/failure.hpp"
+#include "output/errors.hpp"
 
 #include <CLI/CLI.hpp>
 

@@ -2,13 +2,12 @@
 #include "client/client.hpp"
 
 #include "client/logging.hpp"
+#include "client/offered_tasks.hpp"
 #include "client/suggestion.hpp"
 #include "options/arguments.hpp"
-#include "output/diagnostics.hpp"
-#include "output/exit_code.hpp"
-#include "output/failure.hpp"
+#include "output/errors.hpp"
 #include "output/json_node.hpp"
-#include "output/output.hpp"
+#include "output/terminal.hpp"
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -41,12 +40,12 @@ cles::service_options options_of(const address_book& addresses, int verbosity, b
     if (in_group || addresses.finds_by_name()) {
         options.multicast = addresses.group();
     }
-    options.insecure = true; // nothing is served here
-    options.log = log_of_client(verbosity);
+    options.insecure = true; // it serves nothing
+    options.log = make_client_log(verbosity);
     return options;
 }
 
-bool is(const std::exception_ptr& thrown, cles::errc code) {
+bool has_code(const std::exception_ptr& thrown, cles::errc code) {
     if (!thrown) {
         return false;
     }
@@ -65,18 +64,13 @@ std::string without_digits(std::string_view name) {
     return out;
 }
 
-// The verbs by which a node offers each of its tasks, from its answer to `PULL self:cles`.
-std::map<std::string, std::string> tasks_in(const std::string& description) {
+// The verbs of each task, from a node's answer to PULL self:cles.
+std::map<std::string, std::string> verbs_by_task(const std::string& description) {
     std::map<std::string, std::string> verbs_of;
-    const auto about = parse_json(description);
-    const auto* tasks = about.find("tasks");
-    for (const auto& entry : tasks != nullptr ? tasks->elements : std::vector<json_node>{}) {
-        const auto* verb = entry.find("verb");
-        const auto* task = entry.find("task");
-        if (verb != nullptr && task != nullptr) {
-            auto& verbs = verbs_of[task->text];
-            verbs.append(verbs.empty() ? "" : ", ").append(verb->text);
-        }
+    const auto node = parse_json(description);
+    for (const auto& offered : offered_tasks(node.find("tasks"))) {
+        auto& verbs = verbs_of[offered.task];
+        verbs.append(verbs.empty() ? "" : ", ").append(offered.verb);
     }
     return verbs_of;
 }
@@ -99,11 +93,11 @@ cles::call_options client::options_for(std::string_view noun, std::optional<std:
     return options;
 }
 
-void client::end_after(std::chrono::milliseconds span) {
-    end_timer_.expires_after(span);
+void client::end_after(std::chrono::milliseconds limit) {
+    end_timer_.expires_after(limit);
     end_timer_.async_wait([this](boost::system::error_code code) {
         if (!code && !finished_) {
-            end_early(exit_code::success);
+            end(exit_code::success);
         }
     });
 }
@@ -121,29 +115,29 @@ int client::run(asio::awaitable<void> work) {
                    asio::bind_cancellation_slot(cancel_.slot(), [this, &thrown](std::exception_ptr failure) {
                        finished_ = true;
                        thrown = std::move(failure);
-                       if (is(thrown, cles::errc::no_target)) {
-                           look_for_node();
+                       if (has_code(thrown, cles::errc::no_target)) {
+                           suggest_node();
                        }
-                       // What was sent to withdraw a request still leaves; nothing else is waited for.
+                       // Cancellations of requests are still sent; nothing else is waited for.
                        node_.stop();
                        signals_.cancel();
                        end_timer_.cancel();
                        output_timer_.cancel();
                    }));
     io_.run();
-    if (early_) {
-        return *early_;
+    if (end_code_) {
+        return *end_code_;
     }
     if (!thrown) {
         return exit_code::success;
     }
     const auto code = report_failure(thrown);
-    if (code == exit_code::not_found && addresses_.finds_by_name() && is(thrown, cles::errc::no_target)) {
+    if (code == exit_code::not_found && addresses_.finds_by_name() && has_code(thrown, cles::errc::no_target)) {
         const auto node = target_of(noun_);
         hint_ += hint_.empty() ? "" : " ";
         hint_ += node == "any" || node == "all"
-                     ? "any: and all: take a node that routes, such as clesd; --at URL says where one is"
-                     : "cles ls shows who is there; --at URL or --peer NAME=URL says where else to ask";
+                     ? "any: and all: need a node that routes, such as clesd; give its address by --at URL"
+                     : "cles ls lists the nodes; --at URL or --peer NAME=URL gives the address of another one";
     }
     if (!hint_.empty()) {
         note(hint_);
@@ -161,13 +155,13 @@ asio::awaitable<void> client::run_explained(asio::awaitable<void> work) {
     if (!thrown) {
         co_return;
     }
-    if (!early_ && is(thrown, cles::errc::no_task)) {
-        co_await look_for_task();
+    if (!end_code_ && has_code(thrown, cles::errc::no_task)) {
+        co_await suggest_task();
     }
     std::rethrow_exception(thrown);
 }
 
-asio::awaitable<void> client::look_for_task() {
+asio::awaitable<void> client::suggest_task() {
     const std::string node{target_of(noun_)};
     if (node.empty() || node == "any" || node == "all") {
         co_return;
@@ -176,21 +170,21 @@ asio::awaitable<void> client::look_for_task() {
     try {
         const auto options = options_for(node, 500ms);
         const cles::json_text about = co_await node_.async_pull(node + ":cles", options);
-        const auto offered = tasks_in(about.text);
+        const auto offered = verbs_by_task(about.text);
         std::vector<std::string> names;
         names.reserve(offered.size());
         for (const auto& [name, verbs] : offered) {
             names.push_back(name);
         }
-        if (const auto near = closest(task, names); !near.empty()) {
-            hint_ = "did you mean '" + node + ":" + near + "' (" + offered.at(near) + ")?";
+        if (const auto match = closest_match(task, names); !match.empty()) {
+            hint_ = "did you mean '" + node + ":" + match + "' (" + offered.at(match) + ")?";
         }
     } catch (const std::exception&) {
-        hint_.clear(); // the failure itself is what counts
+        hint_.clear(); // the original failure is reported
     }
 }
 
-void client::look_for_node() {
+void client::suggest_node() {
     std::vector<std::string> names;
     for (const auto& other : node_.peers()) {
         names.push_back(other.node);
@@ -201,13 +195,13 @@ void client::look_for_node() {
     // car9 is another node than car1, not a mistyped one.
     const auto typed = without_digits(target_of(noun_));
     std::erase_if(names, [&](const std::string& name) { return without_digits(name) == typed; });
-    if (const auto near = closest(target_of(noun_), names); !near.empty()) {
-        hint_ = "did you mean '" + near + "'?";
+    if (const auto match = closest_match(target_of(noun_), names); !match.empty()) {
+        hint_ = "did you mean '" + match + "'?";
     }
 }
 
-std::string client::where_is(std::string_view node) const {
-    auto url = addresses_.where_is(node);
+std::string client::endpoint_of(std::string_view node) const {
+    auto url = addresses_.endpoint_of(node);
     if (url.empty()) {
         for (const auto& other : node_.peers()) {
             if (other.node == node && other.state != cles::peer_state::clash && !other.endpoints.empty()) {
@@ -218,9 +212,9 @@ std::string client::where_is(std::string_view node) const {
     return url;
 }
 
-void client::end_early(int code) {
-    if (!early_) {
-        early_ = code;
+void client::end(int code) {
+    if (!end_code_) {
+        end_code_ = code;
         cancel_.emit(asio::cancellation_type::terminal);
     }
 }
@@ -230,15 +224,15 @@ void client::wait_for_signal() {
         if (code || finished_) {
             return;
         }
-        if (early_) { // asked again: there is no patience left
+        if (end_code_) { // the second signal: end at once
             std::_Exit(exit_code::signalled + signal);
         }
         wait_for_signal();
-        end_early(exit_code::signalled + signal);
+        end(exit_code::signalled + signal);
     });
 }
 
-// Without this, `cles bind ... | head -1` would stay until the next update.
+// Without this, `cles bind ... | head -1` would run until the next update.
 void client::watch_output() {
     output_timer_.expires_after(250ms);
     output_timer_.async_wait([this](boost::system::error_code code) {
@@ -246,7 +240,7 @@ void client::watch_output() {
             return;
         }
         if (is_output_closed()) {
-            end_early(exit_code::success);
+            end(exit_code::success);
         } else {
             watch_output();
         }

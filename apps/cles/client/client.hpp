@@ -19,43 +19,42 @@
 
 namespace tool {
 
-/// The command as a node that only asks. It runs one coroutine, and ends it early on a signal, when its time is up, or
-/// when nobody reads its output any more; a request in flight is then withdrawn.
+/// The command as a node that only sends requests. It runs one coroutine, and cancels it on a signal, at the end of a
+/// time limit, or when the reader of its output is gone; a request in flight is then cancelled at its node.
 class client {
   public:
-    /// `in_group`: it takes part in multicast, even where nothing is to be found by its name.
+    /// `in_group`: it takes part in multicast even if no node has to be found by its name.
     client(const address_book& addresses, int verbosity, bool in_group = false);
 
     cles::service& node() noexcept { return node_; }
     boost::asio::io_context& context() noexcept { return io_; }
 
-    /// Where and for how long to ask for this noun; no limit: the protocol's default.
+    /// The address and the deadline of requests with this noun; without a limit, the protocol's default.
     [[nodiscard]] cles::call_options options_for(std::string_view noun,
                                                  std::optional<std::chrono::milliseconds> limit) const;
 
-    /// The URL at which that node is asked, once it has answered.
-    [[nodiscard]] std::string where_is(std::string_view node) const;
+    /// The URL of that node, which is known at the latest when it has answered.
+    [[nodiscard]] std::string endpoint_of(std::string_view node) const;
 
-    /// Where a request for this noun fails because there is no such task, the node is asked what it offers, so that the
-    /// task that was probably meant can be named.
+    /// If a request with this noun fails because the node or the task does not exist, a similar name is suggested; for
+    /// a task, the node is asked what it offers.
     void explain_failures_of(std::string_view noun) { noun_ = noun; }
 
-    /// Ends the work, with this exit code.
-    void end(int code) { end_early(code); }
-    /// Ends the work, with success, when so much time has gone.
-    void end_after(std::chrono::milliseconds span);
+    /// Cancels the coroutine; `run` returns this exit code.
+    void end(int code);
+    /// Ends with success after that time.
+    void end_after(std::chrono::milliseconds limit);
 
     /// Waits; for a coroutine of this client.
     boost::asio::awaitable<void> sleep_until(std::chrono::steady_clock::time_point when);
 
-    /// Runs the coroutine and gives the exit code; what it throws is reported.
+    /// Runs the coroutine, and reports what it throws. \return the exit code
     int run(boost::asio::awaitable<void> work);
 
   private:
     boost::asio::awaitable<void> run_explained(boost::asio::awaitable<void> work);
-    boost::asio::awaitable<void> look_for_task();
-    void look_for_node();
-    void end_early(int code);
+    boost::asio::awaitable<void> suggest_task();
+    void suggest_node();
     void wait_for_signal();
     void watch_output();
 
@@ -68,9 +67,9 @@ class client {
     boost::asio::cancellation_signal cancel_;
     cles::service node_;
     std::string noun_;
-    std::string hint_; ///< what was probably meant
-    std::optional<int> early_;
-    bool finished_ = false; // what has expired or come in by then cannot be cancelled any more
+    std::string hint_;
+    std::optional<int> end_code_; ///< set when the coroutine is cancelled
+    bool finished_ = false;       // handlers that were queued by then can no longer be cancelled
 };
 
 } // namespace tool

@@ -5,13 +5,13 @@
 
 namespace tool {
 
-// The library's words go to stderr, in colour where that is a terminal and NO_COLOR is not set.
+// The library's log goes to stderr, in colour if that is a terminal and NO_COLOR is not set.
 
-/// A client logs nothing unless asked, since failures are reported anyway. -v: what happens. -vv: everything, and from
-/// now on each line that is sent or received on links.
-cles::log_sink log_of_client(int verbosity);
+/// A client logs nothing by default, because failures are reported anyway; with -v from level info, with -vv
+/// everything, and each line that is sent or received.
+cles::log_sink make_client_log(int verbosity);
 
-/// A server logs what happens, with -v everything, and with -vv the lines too.
-cles::log_sink log_of_server(int verbosity);
+/// A server logs from level info, with -v everything, and with -vv each line too.
+cles::log_sink make_server_log(int verbosity);
 
 } // namespace tool

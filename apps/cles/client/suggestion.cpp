@@ -9,9 +9,9 @@ namespace tool {
 namespace {
 
 constexpr std::size_t max_length = 64; // of words worth comparing
-constexpr std::size_t min_prefix = 3;  // letters that tell what was begun
+constexpr std::size_t min_prefix = 3;  // letters that identify a word
 
-// Letters added, left out, replaced, or swapped with the next one.
+// Letters added, left out, replaced, or swapped with the next one (optimal string alignment).
 std::size_t distance(std::string_view a, std::string_view b) {
     std::vector<std::size_t> before_last(b.size() + 1);
     std::vector<std::size_t> last(b.size() + 1);
@@ -35,9 +35,9 @@ std::size_t distance(std::string_view a, std::string_view b) {
 
 } // namespace
 
-std::string closest(std::string_view typed, const std::vector<std::string>& known) {
+std::string closest_match(std::string_view typed, const std::vector<std::string>& known) {
     std::string best;
-    auto least = std::clamp<std::size_t>(typed.size() / 3, 1, 3) + 1;
+    auto limit = std::clamp<std::size_t>(typed.size() / 3, 1, 3) + 1;
     if (typed.size() > max_length) {
         return best;
     }
@@ -45,10 +45,10 @@ std::string closest(std::string_view typed, const std::vector<std::string>& know
         if (word.size() > max_length || word == typed) {
             continue;
         }
-        const bool begun = typed.size() >= min_prefix && word.starts_with(typed);
-        const auto apart = begun ? 1 : distance(typed, word);
-        if (apart < least && apart < word.size()) {
-            least = apart;
+        const bool is_prefix = typed.size() >= min_prefix && word.starts_with(typed);
+        const auto edits = is_prefix ? 1 : distance(typed, word);
+        if (edits < limit && edits < word.size()) {
+            limit = edits;
             best = word;
         }
     }

@@ -7,7 +7,7 @@
 
 namespace tool {
 
-/// Of the words that exist the one that was probably meant: few letters away, or begun so. Empty where none is near.
-std::string closest(std::string_view typed, const std::vector<std::string>& known);
+/// The known word that was probably meant: at a small edit distance, or with this beginning. Empty if there is none.
+std::string closest_match(std::string_view typed, const std::vector<std::string>& known);
 
 } // namespace tool

@@ -16,64 +16,64 @@ namespace {
 
 namespace asio = boost::asio;
 
-constexpr std::size_t max_shown = 4096; // of a line; what is more is only counted
+constexpr std::size_t max_shown = 4096; // bytes of a line; the rest is only counted
 
-/// Passes everything on to the link inside, and logs the lines.
+/// Forwards everything to the inner link, and logs the lines.
 class logged_link final : public cles::link,
                           public cles::link_events,
                           public std::enable_shared_from_this<logged_link> {
   public:
-    logged_link(cles::link_ptr inside, std::string where, cles::log_sink log)
-        : inside_(std::move(inside)), where_(std::move(where)), log_(std::move(log)) {}
+    logged_link(cles::link_ptr inner, std::string address, cles::log_sink log)
+        : inner_(std::move(inner)), address_(std::move(address)), log_(std::move(log)) {}
 
     void start(std::shared_ptr<cles::link_events> owner) override {
         owner_ = std::move(owner);
-        inside_->start(shared_from_this());
+        inner_->start(shared_from_this());
     }
-    // Kept here until it is flushed, so that each line is logged once.
+    // Buffered here until it is flushed, so that each line is logged once.
     std::string& output() override { return output_; }
     std::string& urgent_output() override { return urgent_; }
-    [[nodiscard]] std::size_t datagram() const noexcept override { return inside_->datagram(); }
+    [[nodiscard]] std::size_t datagram() const noexcept override { return inner_->datagram(); }
     void flush() override {
-        hand_over();
-        inside_->flush();
+        forward_output();
+        inner_->flush();
     }
     [[nodiscard]] std::size_t unsent() const noexcept override {
-        return inside_->unsent() + output_.size() + urgent_.size();
+        return inner_->unsent() + output_.size() + urgent_.size();
     }
-    [[nodiscard]] std::uint64_t sent() const noexcept override { return inside_->sent(); }
-    [[nodiscard]] std::uint64_t received() const noexcept override { return inside_->received(); }
+    [[nodiscard]] std::uint64_t sent() const noexcept override { return inner_->sent(); }
+    [[nodiscard]] std::uint64_t received() const noexcept override { return inner_->received(); }
     [[nodiscard]] std::size_t buffered() const noexcept override {
-        return inside_->buffered() + output_.capacity() + urgent_.capacity();
+        return inner_->buffered() + output_.capacity() + urgent_.capacity();
     }
     void shrink() override {
-        for (auto* waiting : {&output_, &urgent_}) {
-            if (waiting->empty()) {
-                std::string{}.swap(*waiting);
+        for (auto* buffer : {&output_, &urgent_}) {
+            if (buffer->empty()) {
+                std::string{}.swap(*buffer);
             }
         }
-        inside_->shrink();
+        inner_->shrink();
     }
-    void pause(bool stop) override { inside_->pause(stop); }
+    void pause(bool stop) override { inner_->pause(stop); }
     void finish() override {
-        hand_over();
-        inside_->finish();
+        forward_output();
+        inner_->finish();
     }
     void close() override {
-        say("-", "closed");
-        inside_->close();
+        log_line("-", "closed");
+        inner_->close();
         owner_.reset();
     }
-    [[nodiscard]] const cles::identity& peer() const noexcept override { return inside_->peer(); }
+    [[nodiscard]] const cles::identity& peer() const noexcept override { return inner_->peer(); }
 
     void on_line(std::string_view line) override {
-        say("<", line);
+        log_line("<", line);
         if (const auto owner = owner_) {
             owner->on_line(line);
         }
     }
     void on_overlong(std::string_view head) override {
-        say("<", head);
+        log_line("<", head);
         if (const auto owner = owner_) {
             owner->on_overlong(head);
         }
@@ -84,19 +84,19 @@ class logged_link final : public cles::link,
         }
     }
     void on_cut(std::string_view part) override {
-        say("<", part);
+        log_line("<", part);
         if (const auto owner = owner_) {
             owner->on_cut(part);
         }
     }
     void on_end() override {
-        say("-", "the peer sends no more");
+        log_line("-", "the peer has finished sending");
         if (const auto owner = owner_) {
             owner->on_end();
         }
     }
     void on_lost(boost::system::error_code why) override {
-        say("-", "lost: " + why.message());
+        log_line("-", "lost: " + why.message());
         if (const auto owner = std::exchange(owner_, nullptr)) {
             owner->on_lost(why);
         }
@@ -108,9 +108,9 @@ class logged_link final : public cles::link,
     }
 
   private:
-    void say(std::string_view direction, std::string_view text) {
+    void log_line(std::string_view direction, std::string_view text) {
         std::string entry{direction};
-        entry.append(" ").append(where_).append(" ").append(text.substr(0, max_shown));
+        entry.append(" ").append(address_).append(" ").append(text.substr(0, max_shown));
         if (text.size() > max_shown) {
             entry.append("... and " + std::to_string(text.size() - max_shown) + " more bytes");
         }
@@ -119,7 +119,7 @@ class logged_link final : public cles::link,
     void move_lines(std::string& from, std::string& to) {
         for (std::size_t at = 0; at < from.size();) {
             const auto end = std::min(from.find('\n', at), from.size());
-            say(">", std::string_view{from}.substr(at, end - at));
+            log_line(">", std::string_view{from}.substr(at, end - at));
             at = end + 1;
         }
         if (to.empty()) {
@@ -129,13 +129,13 @@ class logged_link final : public cles::link,
             from.clear();
         }
     }
-    void hand_over() {
-        move_lines(urgent_, inside_->urgent_output());
-        move_lines(output_, inside_->output());
+    void forward_output() {
+        move_lines(urgent_, inner_->urgent_output());
+        move_lines(output_, inner_->output());
     }
 
-    cles::link_ptr inside_;
-    std::string where_;
+    cles::link_ptr inner_;
+    std::string address_;
     cles::log_sink log_;
     std::shared_ptr<cles::link_events> owner_;
     std::string output_;
@@ -144,62 +144,62 @@ class logged_link final : public cles::link,
 
 class logged_acceptor final : public cles::acceptor {
   public:
-    logged_acceptor(std::unique_ptr<cles::acceptor> inside, cles::log_sink log)
-        : inside_(std::move(inside)), log_(std::move(log)) {}
+    logged_acceptor(std::unique_ptr<cles::acceptor> inner, cles::log_sink log)
+        : inner_(std::move(inner)), log_(std::move(log)) {}
 
-    [[nodiscard]] cles::url local() const override { return inside_->local(); }
+    [[nodiscard]] cles::url local() const override { return inner_->local(); }
     void start(std::function<void(cles::link_ptr)> on_link) override {
-        inside_->start([log = log_, on_link = std::move(on_link)](cles::link_ptr arrived) {
-            const auto where = arrived->peer().address;
-            on_link(std::make_shared<logged_link>(std::move(arrived), where, log));
+        inner_->start([log = log_, on_link = std::move(on_link)](cles::link_ptr accepted) {
+            const auto address = accepted->peer().address;
+            on_link(std::make_shared<logged_link>(std::move(accepted), address, log));
         });
     }
-    void accept_waiting() override { inside_->accept_waiting(); }
-    void close() override { inside_->close(); }
+    void accept_waiting() override { inner_->accept_waiting(); }
+    void close() override { inner_->close(); }
 
   private:
-    std::unique_ptr<cles::acceptor> inside_;
+    std::unique_ptr<cles::acceptor> inner_;
     cles::log_sink log_;
 };
 
 class logged_transport final : public cles::link_transport {
   public:
     explicit logged_transport(cles::log_sink log) : log_(std::move(log)) {}
-    void wrap(std::unique_ptr<cles::link_transport> inside) { inside_ = std::move(inside); }
+    void wrap(std::unique_ptr<cles::link_transport> inner) { inner_ = std::move(inner); }
 
-    [[nodiscard]] bool is_exposed(const cles::url& where) const override { return inside_->is_exposed(where); }
-    std::unique_ptr<cles::acceptor> listen(const asio::any_io_executor& executor, const cles::url& where,
+    [[nodiscard]] bool is_exposed(const cles::url& address) const override { return inner_->is_exposed(address); }
+    std::unique_ptr<cles::acceptor> listen(const asio::any_io_executor& executor, const cles::url& address,
                                            const cles::limits& bounds) override {
-        return std::make_unique<logged_acceptor>(inside_->listen(executor, where, bounds), log_);
+        return std::make_unique<logged_acceptor>(inner_->listen(executor, address, bounds), log_);
     }
-    std::function<void()> dial(const asio::any_io_executor& executor, const cles::url& where,
+    std::function<void()> dial(const asio::any_io_executor& executor, const cles::url& address,
                                const cles::limits& bounds, cles::dial_callback done) override {
-        return inside_->dial(executor, where, bounds,
-                             [where = to_string(where), log = log_,
-                              done = std::move(done)](boost::system::error_code failed, cles::link_ptr made) {
-                                 if (made) {
-                                     made = std::make_shared<logged_link>(std::move(made), where, log);
-                                 }
-                                 done(failed, std::move(made));
-                             });
+        return inner_->dial(executor, address, bounds,
+                            [address = to_string(address), log = log_,
+                             done = std::move(done)](boost::system::error_code failed, cles::link_ptr made) {
+                                if (made) {
+                                    made = std::make_shared<logged_link>(std::move(made), address, log);
+                                }
+                                done(failed, std::move(made));
+                            });
     }
 
   private:
-    std::unique_ptr<cles::link_transport> inside_;
+    std::unique_ptr<cles::link_transport> inner_;
     cles::log_sink log_;
 };
 
 } // namespace
 
-cles::link_ptr logged(cles::link_ptr inside, std::string where, cles::log_sink log) {
-    return std::make_shared<logged_link>(std::move(inside), std::move(where), std::move(log));
+cles::link_ptr logged(cles::link_ptr inner, std::string address, cles::log_sink log) {
+    return std::make_shared<logged_link>(std::move(inner), std::move(address), std::move(log));
 }
 
 void log_wire(const cles::log_sink& log) {
     for (const auto* scheme : {"tcp", "udp", "unix"}) {
         auto logged = std::make_unique<logged_transport>(log);
-        auto& outside = *logged;
-        outside.wrap(cles::register_transport(scheme, std::move(logged)));
+        auto& outer = *logged;
+        outer.wrap(cles::register_transport(scheme, std::move(logged)));
     }
 }
 

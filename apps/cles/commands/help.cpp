@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "commands/help.hpp"
-
 #include "client/suggestion.hpp"
 #include "commands.hpp"
-#include "context.hpp"
-#include "output/diagnostics.hpp"
-#include "output/exit_code.hpp"
-#include "output/output.hpp"
+#include "output/errors.hpp"
+#include "output/terminal.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -24,7 +20,7 @@ std::vector<const CLI::App*> commands_in(const CLI::App& app) {
     return app.get_subcommands([](const CLI::App*) { return true; });
 }
 
-void append_options(std::vector<std::string>& names, const CLI::App& command) {
+void append_option_names(std::vector<std::string>& names, const CLI::App& command) {
     for (const auto* option : command.get_options()) {
         for (const auto& name : option->get_lnames()) {
             names.push_back(name);
@@ -38,14 +34,14 @@ std::string overview_of(const CLI::App& app) {
     return app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
 }
 
-void refuse_command(const CLI::App& app, const std::string& typed) {
+void report_unknown_command(const CLI::App& app, const std::string& typed) {
     std::vector<std::string> names;
     for (const auto* command : commands_in(app)) {
         names.push_back(command->get_name());
     }
-    complain("there is no command '" + typed + "'");
-    if (const auto near = closest(typed, names); !near.empty()) {
-        note("did you mean 'cles " + near + "'?");
+    print_error("there is no command '" + typed + "'");
+    if (const auto match = closest_match(typed, names); !match.empty()) {
+        note("did you mean 'cles " + match + "'?");
     }
 }
 
@@ -54,31 +50,31 @@ void suggest_option(const CLI::App& app, const CLI::App& command, const std::str
         return;
     }
     std::vector<std::string> names;
-    append_options(names, command);
-    append_options(names, app);
+    append_option_names(names, command);
+    append_option_names(names, app);
     const auto typed = std::string_view{word}.substr(0, word.find('=')).substr(2);
-    if (const auto near = closest(typed, names); !near.empty()) {
-        note("did you mean '--" + near + "'?");
+    if (const auto match = closest_match(typed, names); !match.empty()) {
+        note("did you mean '--" + match + "'?");
     }
 }
 
 void add_help(CLI::App& app, context& shared) {
-    auto wanted = std::make_shared<std::string>();
-    auto* command = app.add_subcommand("help", "Show what a command does and its options");
-    command->add_option("command", *wanted, "The command; without it, all that there are")->type_name("");
+    auto name = std::make_shared<std::string>();
+    auto* command = app.add_subcommand("help", "Show what a command does, and its options");
+    command->add_option("command", *name, "The command; without it, all commands are listed")->type_name("");
     command->footer("Examples:\n"
                     "  cles help\n"
                     "  cles help pull");
-    command->callback([wanted, &app, &shared] {
+    command->callback([name, &app, &shared] {
         const auto all = commands_in(app);
-        const auto about =
-            std::find_if(all.begin(), all.end(), [&](const CLI::App* each) { return each->get_name() == *wanted; });
-        if (wanted->empty()) {
+        const auto found =
+            std::find_if(all.begin(), all.end(), [&](const CLI::App* each) { return each->get_name() == *name; });
+        if (name->empty()) {
             write_output(overview_of(app));
-        } else if (about != all.end()) {
-            write_output((*about)->help(app.get_name()));
+        } else if (found != all.end()) {
+            write_output((*found)->help(app.get_name()));
         } else {
-            refuse_command(app, *wanted);
+            report_unknown_command(app, *name);
             shared.exit_code = exit_code::usage;
         }
     });

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "client/client.hpp"
 #include "commands.hpp"
-#include "commands/feed_command.hpp"
-#include "commands/feed_events.hpp"
-#include "context.hpp"
-#include "output/output.hpp"
+#include "commands/feed_arguments.hpp"
+#include "output/printer.hpp"
 #include "output/statistics.hpp"
+#include "output/terminal.hpp"
 
 #include <boost/describe.hpp>
 
@@ -27,8 +26,8 @@ using steady = std::chrono::steady_clock;
 
 namespace {
 
-struct hz_command {
-    feed_command feed;
+struct hz_arguments {
+    feed_arguments feed;
     std::size_t window = 1000;
     bool json = false;
 };
@@ -39,7 +38,7 @@ struct update_counts {
 };
 BOOST_DESCRIBE_STRUCT(update_counts, (), (updates, missed))
 
-/// What can be said once there is an interval.
+/// Known after the second update.
 struct update_rate : update_counts {
     double rate = 0;
     double mean_ms = 0;
@@ -49,11 +48,11 @@ struct update_rate : update_counts {
 };
 BOOST_DESCRIBE_STRUCT(update_rate, (update_counts), (rate, mean_ms, min_ms, max_ms, stddev_ms))
 
-/// Counts updates and says every second, and at its end, how they came.
+/// Measures the intervals between updates, and reports them every second and at its end.
 class rate_meter {
   public:
-    rate_meter(client& asker, const hz_command& wanted)
-        : asker_(asker), wanted_(wanted), timer_(asker.context()), intervals_(wanted.window) {}
+    rate_meter(client& requester, const hz_arguments& args)
+        : requester_(requester), args_(args), timer_(requester.context()), intervals_(args.window) {}
     rate_meter(const rate_meter&) = delete;
     rate_meter& operator=(const rate_meter&) = delete;
 
@@ -64,9 +63,9 @@ class rate_meter {
         } catch (...) {
             ended = std::current_exception();
         }
-        ended_ = true; // a timer that has expired already cannot be cancelled
+        ended_ = true; // a timer that has already expired cannot be cancelled
         timer_.cancel();
-        // A binding that was never made has nothing to sum up.
+        // Without a binding there is nothing to report.
         if (bound_) {
             report();
         }
@@ -77,12 +76,12 @@ class rate_meter {
 
   private:
     asio::awaitable<void> measure() {
-        const auto options = wanted_.feed.options(asker_);
-        auto feed = co_await asker_.node().async_bind(wanted_.feed.noun, options);
+        const auto options = args_.feed.options(requester_);
+        auto feed = co_await requester_.node().async_bind(args_.feed.noun, options);
         bound_ = true;
         next_report_ = steady::now();
         report_every_second();
-        while (wanted_.feed.count == 0 || updates_ < wanted_.feed.count) {
+        while (args_.feed.count == 0 || updates_ < args_.feed.count) {
             const auto item = co_await feed.async_next();
             if (item.kind == cles::feed_event::update) {
                 count();
@@ -90,9 +89,9 @@ class rate_meter {
             }
             missed_ += item.missed;
             if (item.kind == cles::feed_event::lost) {
-                last_.reset(); // what follows is no interval of the publisher's
+                last_.reset(); // the time until the next one is not an interval of the publisher
             }
-            note_event(wanted_.feed.noun, item);
+            note_event(args_.feed.noun, item);
         }
     }
 
@@ -114,7 +113,7 @@ class rate_meter {
             }
             try {
                 report();
-            } catch (...) { // the reader has gone, which the client notices by itself
+            } catch (...) { // the reader is gone, which the client detects
                 return;
             }
             report_every_second();
@@ -124,7 +123,7 @@ class rate_meter {
     void report() {
         const bool silent = updates_ == reported_;
         reported_ = updates_;
-        if (wanted_.json) {
+        if (args_.json) {
             write_output(as_json() + "\n");
             return;
         }
@@ -136,8 +135,8 @@ class rate_meter {
         }
         write_output(fixed(1000 / intervals_.mean(), 2) + " updates/s; interval mean " + fixed(intervals_.mean(), 3) +
                      " min " + fixed(intervals_.min(), 3) + " max " + fixed(intervals_.max(), 3) + " stddev " +
-                     fixed(intervals_.deviation(), 3) + " ms over " + std::to_string(intervals_.count()) + "; " +
-                     counted);
+                     fixed(intervals_.standard_deviation(), 3) + " ms over " + std::to_string(intervals_.count()) +
+                     "; " + counted);
     }
 
     [[nodiscard]] std::string as_json() const {
@@ -150,12 +149,12 @@ class rate_meter {
         now.mean_ms = rounded(intervals_.mean(), 4);
         now.min_ms = rounded(intervals_.min(), 4);
         now.max_ms = rounded(intervals_.max(), 4);
-        now.stddev_ms = rounded(intervals_.deviation(), 4);
+        now.stddev_ms = rounded(intervals_.standard_deviation(), 4);
         return cles::to_json(now);
     }
 
-    client& asker_;
-    const hz_command& wanted_;
+    client& requester_;
+    const hz_arguments& args_;
     asio::steady_timer timer_;
     statistics intervals_;
     std::optional<steady::time_point> last_;
@@ -170,29 +169,23 @@ class rate_meter {
 } // namespace
 
 void add_hz(CLI::App& app, context& shared) {
-    auto wanted = std::make_shared<hz_command>();
-    auto* command = app.add_subcommand("hz", "Measure how often updates come");
-    wanted->feed.add_options(*command, "End after so many updates; 0: until interrupted (default 0)");
-    command->add_option("-w,--window", wanted->window, "Intervals that the figures are about (default 1000)")
+    auto args = std::make_shared<hz_arguments>();
+    auto* command = app.add_subcommand("hz", "Measure the rate of updates");
+    args->feed.add_options(*command, "End after this number of updates; 0: until interrupted (default 0)");
+    command->add_option("-w,--window", args->window, "Number of intervals for the statistics (default 1000)")
         ->type_name("N")
         ->check(CLI::Range(1, 10'000'000).description(""));
-    command
-        ->add_option_function<std::string>(
-            "-o,--output", [wanted](const std::string& name) { wanted->json = name == "json"; },
-            "text, or json: a document per line (default text)")
-        ->type_name("FORMAT")
-        ->check(CLI::IsMember({"text", "json"}).description(""));
-    command->footer("A line each second, and one at the end.\n\n"
+    add_json_option(*command, args->json, "a document per line");
+    command->footer("Prints a line each second, and one at the end.\n\n"
                     "Examples:\n"
                     "  cles hz car1:localization\n"
                     "  cles hz car1:localization --duration 10s -o json | tail -1 | jq .rate");
-    command->callback([wanted, &shared] {
-        wanted->feed.check();
-        client asker{wanted->feed.addresses, shared.verbosity, wanted->feed.is_multicast()};
-        asker.explain_failures_of(wanted->feed.noun);
-        wanted->feed.arm(asker);
-        rate_meter meter{asker, *wanted};
-        shared.exit_code = asker.run(meter.run());
+    command->callback([args, &shared] {
+        args->feed.check();
+        client requester{args->feed.addresses, shared.verbosity, args->feed.is_multicast()};
+        args->feed.prepare(requester);
+        rate_meter meter{requester, *args};
+        shared.exit_code = requester.run(meter.run());
     });
 }
 

@@ -1,12 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "client/client.hpp"
 #include "commands.hpp"
-#include "context.hpp"
-#include "options/arguments.hpp"
 #include "options/common_options.hpp"
 #include "options/duration.hpp"
-#include "output/failure.hpp"
-#include "output/output.hpp"
 #include "output/printer.hpp"
 #include "output/table.hpp"
 #include "output/terminal.hpp"
@@ -29,26 +25,26 @@ namespace asio = boost::asio;
 
 namespace {
 
-struct task_line {
+struct task_document {
     std::string verb;
     std::string task;
     std::optional<std::string> description;
     std::optional<std::vector<std::string>> parameters;
 };
-BOOST_DESCRIBE_STRUCT(task_line, (), (verb, task, description, parameters))
+BOOST_DESCRIBE_STRUCT(task_document, (), (verb, task, description, parameters))
 
-struct node_description {
+struct node_document {
     std::string node;
     std::optional<std::string> version;
     std::optional<int> protocol;
     std::optional<std::string> epoch;
     std::optional<std::int64_t> uptime_ms;
     std::optional<std::vector<std::string>> endpoints;
-    std::vector<task_line> tasks;
+    std::vector<task_document> tasks;
 };
-BOOST_DESCRIBE_STRUCT(node_description, (), (node, version, protocol, epoch, uptime_ms, endpoints, tasks))
+BOOST_DESCRIBE_STRUCT(node_document, (), (node, version, protocol, epoch, uptime_ms, endpoints, tasks))
 
-struct info_command {
+struct info_arguments {
     address_book addresses;
     std::string node = "self";
     std::string noun{};
@@ -56,39 +52,36 @@ struct info_command {
     output_format format = output_format::automatic;
 };
 
-std::string facts_of(const node_description& about) {
+std::string details_of(const node_document& node) {
     std::string out;
     const auto add = [&](std::string_view name, const std::string& value) {
         out.append(bold(stream::out, name)).append(11 - name.size(), ' ').append(printable(value)).append("\n");
     };
-    add("node", about.node);
-    if (about.version) {
-        add("version", *about.version);
+    add("node", node.node);
+    if (node.version) {
+        add("version", *node.version);
     }
-    if (about.protocol) {
-        add("protocol", std::to_string(*about.protocol));
+    if (node.protocol) {
+        add("protocol", std::to_string(*node.protocol));
     }
-    if (about.epoch) {
-        add("epoch", *about.epoch);
+    if (node.epoch) {
+        add("epoch", *node.epoch);
     }
-    if (about.uptime_ms) {
-        add("uptime", to_text(std::chrono::milliseconds{*about.uptime_ms}));
+    if (node.uptime_ms) {
+        add("uptime", to_text(std::chrono::milliseconds{*node.uptime_ms}));
     }
     std::string_view name = "endpoints";
-    if (about.endpoints) {
-        for (const auto& endpoint : *about.endpoints) {
+    if (node.endpoints) {
+        for (const auto& endpoint : *node.endpoints) {
             add(std::exchange(name, ""), endpoint);
         }
     }
     return out;
 }
 
-std::string tasks_of(const node_description& about) {
-    table out;
-    for (const char* title : {"VERB", "TASK", "DESCRIPTION"}) {
-        out.column(title);
-    }
-    for (const auto& task : about.tasks) {
+std::string tasks_of(const node_document& node) {
+    table out{"VERB", "TASK", "DESCRIPTION"};
+    for (const auto& task : node.tasks) {
         std::string path = task.task;
         if (task.parameters) {
             for (const auto& parameter : *task.parameters) {
@@ -103,40 +96,34 @@ std::string tasks_of(const node_description& about) {
     return out.text();
 }
 
-asio::awaitable<void> show(client& asker, const info_command& wanted) {
-    const auto options = asker.options_for(wanted.noun, wanted.timeout);
-    const cles::json_text answer = co_await asker.node().async_pull(wanted.noun, options);
-    if (resolved(wanted.format) == output_format::table) {
-        const auto about = cles::from_json<node_description>(answer.text);
-        write_output(facts_of(about) + (about.tasks.empty() ? "" : "\n" + tasks_of(about)));
+asio::awaitable<void> show(client& requester, const info_arguments& args) {
+    const auto options = requester.options_for(args.noun, args.timeout);
+    const cles::json_text answer = co_await requester.node().async_pull(args.noun, options);
+    if (resolved(args.format) == output_format::table) {
+        const auto node = cles::from_json<node_document>(answer.text);
+        write_output(details_of(node) + (node.tasks.empty() ? "" : "\n" + tasks_of(node)));
     } else {
-        printer{wanted.format, false}.print(answer.text);
+        printer{args.format, false}.print(answer.text);
     }
 }
 
 } // namespace
 
 void add_info(CLI::App& app, context& shared) {
-    auto wanted = std::make_shared<info_command>();
-    auto* command = app.add_subcommand("info", "Show what a node is and what it offers");
-    command->add_option("node", wanted->node, "A node's name or a URL (default: the node at --at)")->type_name("");
-    wanted->addresses.add_options(*command);
-    add_timeout(*command, wanted->timeout, "5s");
-    add_output_option(*command, wanted->format);
+    auto args = std::make_shared<info_arguments>();
+    auto* command = app.add_subcommand("info", "Describe a node and what it offers");
+    command->add_option("node", args->node, "The name of a node, or a URL (default: the node at --at)")->type_name("");
+    args->addresses.add_options(*command);
+    add_timeout(*command, args->timeout, "5s");
+    add_output_option(*command, args->format);
     command->footer("Examples:\n"
                     "  cles info\n"
                     "  cles info tcp://10.0.0.7\n"
                     "  cles info --at unix:///run/car1.sock -o json | jq -r '.tasks[].task'");
-    command->callback([wanted, &shared] {
-        if (wanted->node.find("://") != std::string::npos) {
-            wanted->addresses.set_at(std::exchange(wanted->node, "self"));
-        }
-        if (!is_name(wanted->node)) {
-            throw usage_error("'" + wanted->node + "' is neither a node's name nor a URL such as tcp://10.0.0.7:25370");
-        }
-        wanted->noun = wanted->node + ":cles";
-        client asker{wanted->addresses, shared.verbosity};
-        shared.exit_code = asker.run(show(asker, *wanted));
+    command->callback([args, &shared] {
+        args->noun = args->addresses.use_target(args->node);
+        client requester{args->addresses, shared.verbosity};
+        shared.exit_code = requester.run(show(requester, *args));
     });
 }
 

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "client/client.hpp"
 #include "commands.hpp"
-#include "context.hpp"
 #include "options/arguments.hpp"
 #include "options/common_options.hpp"
-#include "output/diagnostics.hpp"
-#include "output/exit_code.hpp"
-#include "output/failure.hpp"
-#include "output/output.hpp"
+#include "output/errors.hpp"
 #include "output/printer.hpp"
 #include "output/statistics.hpp"
 #include "output/terminal.hpp"
@@ -16,7 +12,6 @@
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
-#include <CLI/Validators.hpp>
 
 #include <cstdint>
 #include <exception>
@@ -52,7 +47,7 @@ struct ping_summary {
 };
 BOOST_DESCRIBE_STRUCT(ping_summary, (), (node, sent, received))
 
-/// What can be said once there is an answer.
+/// Known after the first answer.
 struct ping_times : ping_summary {
     double min_ms = 0;
     double avg_ms = 0;
@@ -61,7 +56,7 @@ struct ping_times : ping_summary {
 };
 BOOST_DESCRIBE_STRUCT(ping_times, (ping_summary), (min_ms, avg_ms, max_ms, mdev_ms))
 
-struct ping_command {
+struct ping_arguments {
     address_book addresses;
     std::string target = "self";
     std::optional<std::chrono::milliseconds> timeout;
@@ -73,18 +68,18 @@ struct ping_command {
 
 class pinger {
   public:
-    pinger(client& asker, const ping_command& wanted) : asker_(asker), wanted_(wanted) {}
+    pinger(client& requester, const ping_arguments& args) : requester_(requester), args_(args) {}
     pinger(const pinger&) = delete;
     pinger& operator=(const pinger&) = delete;
 
     asio::awaitable<void> run() {
-        options_ = asker_.options_for(wanted_.noun, wanted_.timeout);
-        // The first one makes the connection and learns the name; timed would be what follows it.
-        const auto first = co_await asker_.node().async_pull<self_description>(wanted_.noun, options_);
+        options_ = requester_.options_for(args_.noun, args_.timeout);
+        // The first request, which is not timed, opens the connection and gets the name.
+        const auto first = co_await requester_.node().async_pull<self_description>(args_.noun, options_);
         node_ = printable(first.node);
-        if (!wanted_.json) {
-            write_output("PING " + node_ + " (" + asker_.where_is(target_of(wanted_.noun)) + "): PULL " + wanted_.noun +
-                         (first.version ? ", version " + printable(*first.version) : "") + "\n");
+        if (!args_.json) {
+            write_output("PING " + node_ + " (" + requester_.endpoint_of(target_of(args_.noun)) + "): PULL " +
+                         args_.noun + (first.version ? ", version " + printable(*first.version) : "") + "\n");
         }
         std::exception_ptr ended;
         try {
@@ -104,23 +99,23 @@ class pinger {
   private:
     asio::awaitable<void> repeat() {
         auto next = steady::now();
-        while (wanted_.count == 0 || sent_ < wanted_.count) {
+        while (args_.count == 0 || sent_ < args_.count) {
             if (sent_ > 0) {
-                next += wanted_.interval;
-                co_await asker_.sleep_until(next);
+                next += args_.interval;
+                co_await requester_.sleep_until(next);
             }
             ++sent_;
             const auto start = steady::now();
             bool answered = false;
             try {
-                co_await asker_.node().async_pull<self_description>(wanted_.noun, options_);
+                co_await requester_.node().async_pull<self_description>(args_.noun, options_);
                 answered = true;
             } catch (const cles::error& e) {
                 if (e.code() == cles::errc::cancelled) {
                     throw;
                 }
                 last_failure_ = std::current_exception();
-                complain("seq=" + std::to_string(sent_) + " " + e.what());
+                print_error("seq=" + std::to_string(sent_) + " " + e.what());
             }
             if (answered) {
                 report(std::chrono::duration<double, std::milli>{steady::now() - start}.count());
@@ -131,7 +126,7 @@ class pinger {
     void report(double ms) {
         ++received_;
         times_.add(ms);
-        if (wanted_.json) {
+        if (args_.json) {
             write_output(cles::to_json(ping_reply{node_, sent_, rounded(ms, 4)}) + "\n");
         } else {
             write_output("answer from " + node_ + ": seq=" + std::to_string(sent_) + " time=" + fixed(ms, 3) + " ms\n");
@@ -139,7 +134,7 @@ class pinger {
     }
 
     void summarize() {
-        if (wanted_.json) {
+        if (args_.json) {
             write_output(summary_as_json() + "\n");
             return;
         }
@@ -150,7 +145,7 @@ class pinger {
                            "% lost\n";
         if (!times_.empty()) {
             text += "round trip min/avg/max/mdev = " + fixed(times_.min(), 3) + "/" + fixed(times_.mean(), 3) + "/" +
-                    fixed(times_.max(), 3) + "/" + fixed(times_.deviation(), 3) + " ms\n";
+                    fixed(times_.max(), 3) + "/" + fixed(times_.standard_deviation(), 3) + " ms\n";
         }
         write_output(text);
     }
@@ -164,12 +159,12 @@ class pinger {
         timed.min_ms = rounded(times_.min(), 4);
         timed.avg_ms = rounded(times_.mean(), 4);
         timed.max_ms = rounded(times_.max(), 4);
-        timed.mdev_ms = rounded(times_.deviation(), 4);
+        timed.mdev_ms = rounded(times_.standard_deviation(), 4);
         return cles::to_json(timed);
     }
 
-    client& asker_;
-    const ping_command& wanted_;
+    client& requester_;
+    const ping_arguments& args_;
     cles::call_options options_;
     std::string node_;
     std::uint64_t sent_ = 0;
@@ -178,42 +173,27 @@ class pinger {
     std::exception_ptr last_failure_;
 };
 
-void aim(ping_command& wanted) {
-    if (wanted.target.find("://") != std::string::npos) {
-        wanted.addresses.set_at(wanted.target);
-        wanted.target = "self";
-    }
-    if (!is_name(wanted.target)) {
-        throw usage_error("'" + wanted.target + "' is neither a node's name nor a URL such as tcp://10.0.0.7:25370");
-    }
-    wanted.noun = wanted.target + ":cles";
-}
-
 } // namespace
 
 void add_ping(CLI::App& app, context& shared) {
-    auto wanted = std::make_shared<ping_command>();
-    auto* command = app.add_subcommand("ping", "Measure round trips of a small PULL");
-    command->add_option("target", wanted->target, "A URL, or a node's name (default: the node at --at)")->type_name("");
-    wanted->addresses.add_options(*command);
-    add_timeout(*command, wanted->timeout, "5s");
-    add_count(*command, wanted->count, "How often; 0: until interrupted (default 4)");
-    add_duration(*command, "-i,--interval", wanted->interval, "From one request to the next (default 1s)");
-    command
-        ->add_option_function<std::string>(
-            "-o,--output", [wanted](const std::string& name) { wanted->json = name == "json"; },
-            "text, or json: a document per answer and one for the summary (default text)")
-        ->type_name("FORMAT")
-        ->check(CLI::IsMember({"text", "json"}).description(""));
-    command->footer("An untimed request goes first, which makes the connection.\n\n"
+    auto args = std::make_shared<ping_arguments>();
+    auto* command = app.add_subcommand("ping", "Measure the round trip time of a small PULL");
+    command->add_option("target", args->target, "A URL, or the name of a node (default: the node at --at)")
+        ->type_name("");
+    args->addresses.add_options(*command);
+    add_timeout(*command, args->timeout, "5s");
+    add_count(*command, args->count, "Number of requests; 0: until interrupted (default 4)");
+    add_duration(*command, "-i,--interval", args->interval, "Time between requests (default 1s)");
+    add_json_option(*command, args->json, "a document per answer, and one for the summary");
+    command->footer("The first request, which opens the connection, is not timed.\n\n"
                     "Examples:\n"
                     "  cles ping tcp://10.0.0.7\n"
                     "  cles ping car1 --peer car1=unix:///run/car1.sock -n 1000 -i 0");
-    command->callback([wanted, &shared] {
-        aim(*wanted);
-        client asker{wanted->addresses, shared.verbosity};
-        pinger work{asker, *wanted};
-        shared.exit_code = asker.run(work.run());
+    command->callback([args, &shared] {
+        args->noun = args->addresses.use_target(args->target);
+        client requester{args->addresses, shared.verbosity};
+        pinger work{requester, *args};
+        shared.exit_code = requester.run(work.run());
     });
 }
 

@@ -3,21 +3,38 @@
 
 #include <cles/json_writer.hpp>
 
-#include "options/duration.hpp"
+#include "output/json_node.hpp"
 #include "output/statistics.hpp"
 #include "output/table.hpp"
 #include "output/terminal.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <optional>
 #include <string_view>
+#include <system_error>
 #include <tuple>
 
 namespace tool {
 namespace {
 
-double work_per_worker(const top_row& row) {
+template <class T>
+std::optional<T> number_in(const json_node* node) {
+    T value{};
+    if (node == nullptr || node->kind != json_node::type::other) {
+        return {};
+    }
+    const auto* end = node->text.data() + node->text.size();
+    const auto [rest, code] = std::from_chars(node->text.data(), end, value);
+    return code == std::errc{} && rest == end ? std::optional{value} : std::nullopt;
+}
+
+double per_second(std::uint64_t before, std::uint64_t after, double seconds) {
+    return after <= before ? 0 : static_cast<double>(after - before) / seconds;
+}
+
+double jobs_per_worker(const top_row& row) {
     if (!row.node.load) {
         return 0;
     }
@@ -25,10 +42,10 @@ double work_per_worker(const top_row& row) {
     return (static_cast<double>(load.running) + load.queued) / std::max(1U, load.workers);
 }
 
-std::string or_dash(const std::optional<double>& value, int digits) { return value ? fixed(*value, digits) : "-"; }
+std::string number_text(const std::optional<double>& value, int digits) { return value ? fixed(*value, digits) : "-"; }
 
-// With the unit that keeps it short: "6.1 us", "3.22 s".
-std::string span_or_dash(const std::optional<double>& us) {
+// In the unit that keeps it short: "6.1 us", "3.22 s".
+std::string time_text(const std::optional<double>& us) {
     if (!us) {
         return "-";
     }
@@ -38,7 +55,7 @@ std::string span_or_dash(const std::optional<double>& us) {
     return *us < 999'995 ? fixed(*us / 1e3, 2) + " ms" : fixed(*us / 1e6, 2) + " s";
 }
 
-void add(cles::json_writer& w, std::string_view name, const std::optional<double>& value) {
+void write_rate(cles::json_writer& w, std::string_view name, const std::optional<double>& value) {
     if (value) {
         w.key(name);
         w.value(rounded(*value, 3));
@@ -47,9 +64,40 @@ void add(cles::json_writer& w, std::string_view name, const std::optional<double
 
 } // namespace
 
+node_rate node_rates::update(const std::string& run, std::string_view metrics, time_point now) {
+    const auto document = parse_json(metrics);
+    counters current{.when = now};
+    if (const auto* requests = document.find("requests"); requests != nullptr) {
+        for (const auto& [verb, count] : requests->members) {
+            current.requests += number_in<std::uint64_t>(&count).value_or(0);
+        }
+    }
+    current.errors = number_in<std::uint64_t>(document.find("errors")).value_or(0);
+
+    node_rate out;
+    if (const auto* times = document.find("handler_us");
+        times != nullptr && number_in<std::uint64_t>(times->find("samples")).value_or(0) > 0) {
+        out.p50_us = number_in<double>(times->find("p50"));
+        out.p99_us = number_in<double>(times->find("p99"));
+    }
+    const auto before = last_.find(run);
+    if (before != last_.end() && now > before->second.when) {
+        const auto seconds = std::chrono::duration<double>{now - before->second.when}.count();
+        out.requests =
+            per_second(before->second.requests + 1, current.requests, seconds); // one of them was this request
+        out.errors = per_second(before->second.errors, current.errors, seconds);
+    }
+    last_[run] = current;
+    return out;
+}
+
+void node_rates::remove_before(time_point when) {
+    std::erase_if(last_, [&](const auto& each) { return each.second.when < when; });
+}
+
 void sort_rows(std::vector<top_row>& rows, top_order order) {
     const auto rank = [&](const top_row& row) {
-        const auto first = order == top_order::load ? -work_per_worker(row) : 0.0;
+        const auto first = order == top_order::load ? -jobs_per_worker(row) : 0.0;
         const auto second = order == top_order::load ? -row.rate.requests.value_or(0) : 0.0;
         return std::tuple{first, second, std::string_view{row.node.node}};
     };
@@ -72,11 +120,7 @@ std::string summary_of(const std::vector<top_row>& rows) {
 }
 
 std::string to_table(const std::vector<top_row>& rows) {
-    table out;
-    for (const char* title :
-         {"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50", "P99", "HEARD"}) {
-        out.column(title);
-    }
+    table out{"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50", "P99", "HEARD"};
     const auto number = [&](std::size_t column, std::string text) { out.set(column, std::move(text), true); };
     for (const auto& row : rows) {
         const auto& node = row.node;
@@ -86,12 +130,11 @@ std::string to_table(const std::vector<top_row>& rows) {
         number(2, node.load && node.load->workers != 0 ? std::to_string(node.load->workers) : "-");
         number(3, node.load ? std::to_string(node.load->running) : "-");
         number(4, node.load ? std::to_string(node.load->queued) : "-");
-        number(5, or_dash(row.rate.requests, 0));
-        number(6, or_dash(row.rate.errors, 0));
-        number(7, span_or_dash(row.rate.p50_us));
-        number(8, span_or_dash(row.rate.p99_us));
-        auto heard = node.age_ms ? to_text(std::chrono::milliseconds{*node.age_ms}) + " ago" : std::string{"now"};
-        out.set(9, node.error.empty() ? std::move(heard) : heard + " (" + printable(node.error) + ")");
+        number(5, number_text(row.rate.requests, 0));
+        number(6, number_text(row.rate.errors, 0));
+        number(7, time_text(row.rate.p50_us));
+        number(8, time_text(row.rate.p99_us));
+        out.set(9, node.last_seen() + (node.error.empty() ? "" : " (" + printable(node.error) + ")"));
     }
     return out.text();
 }
@@ -112,10 +155,10 @@ std::string to_json(const std::vector<top_row>& rows) {
             w.key("load");
             write_load(w, *row.node.load);
         }
-        add(w, "requests_per_s", row.rate.requests);
-        add(w, "errors_per_s", row.rate.errors);
-        add(w, "handler_p50_us", row.rate.p50_us);
-        add(w, "handler_p99_us", row.rate.p99_us);
+        write_rate(w, "requests_per_s", row.rate.requests);
+        write_rate(w, "errors_per_s", row.rate.errors);
+        write_rate(w, "handler_p50_us", row.rate.p50_us);
+        write_rate(w, "handler_p99_us", row.rate.p99_us);
         w.key("age_ms");
         w.value(row.node.age_ms.value_or(0));
         if (!row.node.error.empty()) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "completion/candidates.hpp"
 
-#include "discovery/network_interfaces.hpp"
+#include "discovery/host.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Error.hpp>
@@ -15,7 +15,7 @@
 namespace tool {
 namespace {
 
-// Up to where a sentence of the help goes on with details.
+// The first part of a help text, without details.
 std::string short_form(const std::string& help) {
     const auto words = help.substr(0, help.find_first_of(":;(\n"));
     return words.substr(0, words.find_last_not_of(' ') + 1);
@@ -35,27 +35,27 @@ void append_options(std::vector<candidate>& out, CLI::App& command) {
     }
 }
 
-// An option tells of no list of words, but of each word whether it is one of its own.
-std::vector<candidate> words_of(CLI::Option& option) {
-    constexpr std::array words{"table", "json", "raw",       "text",      "tcp",      "udp",  "unix", "inproc",
-                               "bash",  "zsh",  "multicast", "coroutine", "callback", "fish", "name", "load"};
+// CLI11 does not list the values of an option, but says of each word whether it is valid.
+std::vector<candidate> keywords_of(CLI::Option& option) {
+    constexpr std::array keywords{"table", "json", "raw",       "text",      "tcp",      "udp",  "unix", "inproc",
+                                  "bash",  "zsh",  "multicast", "coroutine", "callback", "fish", "name", "load"};
     std::vector<candidate> out;
     try {
         const auto& accepts = *option.get_validator();
-        for (std::string word : words) {
+        for (std::string word : keywords) {
             if (accepts(word).empty()) {
                 out.push_back({word});
             }
         }
     } catch (const CLI::OptionNotFound&) {
-        return {}; // it takes anything
+        return {}; // it takes any value
     }
     return out;
 }
 
 std::vector<candidate> interface_names() {
     std::vector<candidate> out{{"off", "no multicast"}};
-    for (const auto& interface : interfaces_of_host()) {
+    for (const auto& interface : network_interfaces()) {
         out.push_back({interface.name, interface.address});
     }
     return out;
@@ -89,26 +89,26 @@ std::vector<candidate> commands_of(CLI::App& app) {
     return out;
 }
 
-std::vector<candidate> options_at(CLI::App& app, const cursor& here) {
+std::vector<candidate> options_at(CLI::App& app, const cursor& cursor) {
     std::vector<candidate> out;
-    append_options(out, *here.command);
-    if (here.command != &app) {
+    append_options(out, *cursor.command);
+    if (cursor.command != &app) {
         for (const auto* name : {"-v", "--verbose"}) {
-            out.push_back({name, "Say more on stderr"});
+            out.push_back({name, "Log more on stderr"});
         }
     }
     return out;
 }
 
-std::vector<candidate> values_at(const cursor& here) {
-    const std::string kind = here.option->get_type_name();
+std::vector<candidate> values_at(const cursor& cursor) {
+    const std::string kind = cursor.option->get_type_name();
     if (kind.starts_with("IFACE")) {
         return interface_names();
     }
     if (kind == "JSON") {
-        return files_at(here.typed);
+        return files_at(cursor.typed);
     }
-    return words_of(*here.option);
+    return keywords_of(*cursor.option);
 }
 
 } // namespace tool

@@ -17,7 +17,7 @@ CLI::App* find_command(CLI::App& app, const std::string& name) {
     return found.empty() ? nullptr : found.front();
 }
 
-// A subcommand knows the program's options too.
+// The options of the program are valid in a subcommand too.
 CLI::Option* find_option(CLI::App& app, CLI::App& command, std::string_view word) {
     const std::string name{word.substr(0, word.find('='))};
     auto* option = command.get_option_no_throw(name);
@@ -36,50 +36,50 @@ bool is_option(const std::string& word) { return word.size() > 1 && word.front()
 } // namespace
 
 cursor find_cursor(CLI::App& app, std::vector<std::string> words) {
-    cursor here{.command = &app};
+    cursor out{.command = &app};
     if (words.empty()) {
         words.emplace_back();
     }
-    here.typed = std::move(words.back());
+    out.typed = std::move(words.back());
     words.pop_back();
-    here.words = std::move(words);
+    out.words = std::move(words);
 
     bool no_more_options = false;
     std::size_t positionals = 0;
-    for (std::size_t i = 0; i < here.words.size(); ++i) {
-        const auto& word = here.words[i];
+    for (std::size_t i = 0; i < out.words.size(); ++i) {
+        const auto& word = out.words[i];
         if (!no_more_options && word == "--") {
             no_more_options = true;
         } else if (!no_more_options && is_option(word)) {
-            auto* option = find_option(app, *here.command, word);
-            if (takes_value(option) && word.find('=') == std::string::npos && ++i == here.words.size()) {
-                here.option = option;
+            auto* option = find_option(app, *out.command, word);
+            if (takes_value(option) && word.find('=') == std::string::npos && ++i == out.words.size()) {
+                out.option = option;
             }
-        } else if (here.command != &app) {
+        } else if (out.command != &app) {
             ++positionals;
-        } else if (here.command = find_command(app, word); here.command == nullptr) {
-            return here;
+        } else if (out.command = find_command(app, word); out.command == nullptr) {
+            return out;
         }
     }
 
-    const auto equals = here.typed.find('=');
-    if (here.option != nullptr) {
-        here.words.pop_back(); // its name, which says nothing yet
-        here.what = cursor::at::value;
-    } else if (!no_more_options && here.typed.starts_with("--") && equals != std::string::npos) {
-        here.option = find_option(app, *here.command, here.typed);
-        here.what = takes_value(here.option) ? cursor::at::value : cursor::at::nothing;
-        here.before = here.typed.substr(0, equals + 1);
-        here.typed.erase(0, equals + 1);
-    } else if (!no_more_options && here.typed.starts_with("-")) {
-        here.what = cursor::at::option;
-    } else if (here.command == &app) {
-        here.what = cursor::at::command;
+    const auto equals = out.typed.find('=');
+    if (out.option != nullptr) {
+        out.words.pop_back(); // its name, which is incomplete without a value
+        out.what = cursor::at::value;
+    } else if (!no_more_options && out.typed.starts_with("--") && equals != std::string::npos) {
+        out.option = find_option(app, *out.command, out.typed);
+        out.what = takes_value(out.option) ? cursor::at::value : cursor::at::nothing;
+        out.before = out.typed.substr(0, equals + 1);
+        out.typed.erase(0, equals + 1);
+    } else if (!no_more_options && out.typed.starts_with("-")) {
+        out.what = cursor::at::option;
+    } else if (out.command == &app) {
+        out.what = cursor::at::command;
     } else {
-        here.option = find_positional(*here.command, positionals);
-        here.what = here.option != nullptr ? cursor::at::value : cursor::at::nothing;
+        out.option = find_positional(*out.command, positionals);
+        out.what = out.option != nullptr ? cursor::at::value : cursor::at::nothing;
     }
-    return here;
+    return out;
 }
 
 } // namespace tool

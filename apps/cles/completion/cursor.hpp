@@ -11,16 +11,16 @@ class Option;
 
 namespace tool {
 
-/// What is being typed at the end of a command line that is not complete yet.
+/// What is being typed at the end of an incomplete command line.
 struct cursor {
     enum class at { command, option, value, nothing };
 
     at what = at::nothing;
     CLI::App* command = nullptr;      ///< the subcommand, or the program itself
-    CLI::Option* option = nullptr;    ///< of a `value`: whose; arguments without a name are options too
-    std::string before{};             ///< what stands before it in the same word, as in "--output="
-    std::string typed{};              ///< what there is of it
-    std::vector<std::string> words{}; ///< the complete ones before it
+    CLI::Option* option = nullptr;    ///< whose `value` is typed; positional arguments are options too
+    std::string before{};             ///< what precedes it in the same word, as in "--output="
+    std::string typed{};              ///< the part that has been typed
+    std::vector<std::string> words{}; ///< the complete words before it
 };
 
 /// The last word is being typed, and may be empty.

@@ -4,9 +4,9 @@
 #include <cles/error.hpp>
 
 #include "client/client.hpp"
+#include "client/offered_tasks.hpp"
 #include "discovery/ask_all.hpp"
-#include "discovery/node_search.hpp"
-#include "discovery/time_left.hpp"
+#include "discovery/find_nodes.hpp"
 #include "output/json_node.hpp"
 
 #include <algorithm>
@@ -22,7 +22,7 @@ using steady = std::chrono::steady_clock;
 
 namespace {
 
-constexpr std::size_t most_asked = 32; // so many nodes answer in time, and tell enough
+constexpr std::size_t max_described = 32; // that many nodes answer in time, and are enough
 
 void add_once(std::vector<candidate>& out, candidate more) {
     if (std::none_of(out.begin(), out.end(), [&](const candidate& c) { return c.text == more.text; })) {
@@ -32,52 +32,43 @@ void add_once(std::vector<candidate>& out, candidate more) {
 
 // From an answer to PULL self:cles.
 void add_nouns(std::vector<candidate>& out, const std::string& node, cles::verb verb, std::string_view description) {
-    const auto about = parse_json(description);
-    const auto* tasks = about.find("tasks");
-    if (tasks == nullptr) {
-        return;
-    }
-    for (const auto& entry : tasks->elements) {
-        const auto* its_verb = entry.find("verb");
-        const auto* task = entry.find("task");
-        if (task != nullptr && its_verb != nullptr && its_verb->text == to_string(verb)) {
-            const auto* parameters = entry.find("parameters");
-            const auto* words = entry.find("description");
-            const bool goes_on = parameters != nullptr && !parameters->elements.empty();
-            add_once(out, {node + ":" + task->text + (goes_on ? "/" : ""), words != nullptr ? words->text : ""});
+    const auto document = parse_json(description);
+    for (const auto& offered : offered_tasks(document.find("tasks"))) {
+        if (offered.verb == to_string(verb)) {
+            add_once(out, {node + ":" + offered.task + (offered.has_parameters ? "/" : ""), offered.description});
         }
     }
 }
 
-// What each node has of itself.
+// The tasks that every node has.
 void add_reserved(std::vector<candidate>& out, const std::string& node) {
-    add_once(out, {node + ":cles", "What it is and what it offers"});
-    add_once(out, {node + ":cles/metrics", "What it has counted"});
-    add_once(out, {node + ":cles/peers", "Whom it knows"});
+    add_once(out, {node + ":cles", "Describes the node and what it offers"});
+    add_once(out, {node + ":cles/metrics", "Its counters"});
+    add_once(out, {node + ":cles/peers", "The nodes that it knows"});
 }
 
-asio::awaitable<std::vector<std::string>> descriptions(client& asker, const address_book& addresses, std::string node,
-                                                       steady::time_point until) {
+asio::awaitable<std::vector<std::string>> descriptions(client& requester, const address_book& addresses,
+                                                       std::string node, steady::time_point until) {
     std::vector<std::string> out;
     if (node != "any" && node != "all") {
         const auto noun = node + ":cles";
-        const auto options = asker.options_for(noun, time_left(until));
+        const auto options = requester.options_for(noun, time_left(until));
         try {
-            const cles::json_text answer = co_await asker.node().async_pull(noun, options);
+            const cles::json_text answer = co_await requester.node().async_pull(noun, options);
             out.push_back(answer.text);
         } catch (const cles::error&) {
-            out.clear(); // it is not there, or too slow
+            out.clear(); // it does not answer in time
         }
         co_return out;
     }
-    const auto nodes = co_await find_nodes_soon(asker, addresses, until);
+    const auto nodes = co_await find_nodes_soon(requester, addresses, until);
     std::vector<std::string> urls;
     for (const auto& one : nodes) {
-        if (urls.size() < most_asked && !one.endpoints.empty()) {
+        if (urls.size() < max_described && !one.endpoints.empty()) {
             urls.push_back(one.endpoints.front());
         }
     }
-    auto answers = co_await ask_all(asker, "self:cles", std::move(urls), time_left(until));
+    auto answers = co_await ask_all(requester, "self:cles", std::move(urls), time_left(until));
     for (auto& answer : answers) {
         if (answer.error.empty()) {
             out.push_back(std::move(answer.json));
@@ -88,21 +79,21 @@ asio::awaitable<std::vector<std::string>> descriptions(client& asker, const addr
 
 } // namespace
 
-asio::awaitable<std::vector<candidate>> live_names(client& asker, const address_book& addresses,
+asio::awaitable<std::vector<candidate>> live_names(client& requester, const address_book& addresses,
                                                    steady::time_point until) {
-    const auto nodes = co_await find_nodes_soon(asker, addresses, until);
+    const auto nodes = co_await find_nodes_soon(requester, addresses, until);
     std::vector<candidate> out;
     for (const auto& node : nodes) {
-        const auto where = node.endpoints.empty() ? std::string{} : node.endpoints.front();
-        add_once(out, {node.node, node.state == "live" || node.state.empty() ? where : node.state});
+        const auto url = node.url();
+        add_once(out, {node.node, node.state == "live" || node.state.empty() ? url : node.state});
     }
     std::sort(out.begin(), out.end(), [](const candidate& a, const candidate& b) { return a.text < b.text; });
     co_return out;
 }
 
-asio::awaitable<std::vector<candidate>> live_urls(client& asker, const address_book& addresses,
+asio::awaitable<std::vector<candidate>> live_urls(client& requester, const address_book& addresses,
                                                   steady::time_point until) {
-    const auto nodes = co_await find_nodes_soon(asker, addresses, until);
+    const auto nodes = co_await find_nodes_soon(requester, addresses, until);
     std::vector<candidate> out;
     for (const auto& node : nodes) {
         for (const auto& url : node.endpoints) {
@@ -112,18 +103,18 @@ asio::awaitable<std::vector<candidate>> live_urls(client& asker, const address_b
     co_return out;
 }
 
-asio::awaitable<std::vector<candidate>> live_nouns(client& asker, const address_book& addresses, std::string node,
+asio::awaitable<std::vector<candidate>> live_nouns(client& requester, const address_book& addresses, std::string node,
                                                    cles::verb verb, steady::time_point until) {
-    const auto told = co_await descriptions(asker, addresses, node, until);
+    const auto found = co_await descriptions(requester, addresses, node, until);
     std::vector<candidate> out;
-    for (const auto& description : told) {
+    for (const auto& description : found) {
         try {
             add_nouns(out, node, verb, description);
         } catch (const cles::error&) {
             continue; // it is not JSON
         }
     }
-    if (verb == cles::verb::pull && !told.empty()) {
+    if (verb == cles::verb::pull && !found.empty()) {
         add_reserved(out, node);
     }
     co_return out;

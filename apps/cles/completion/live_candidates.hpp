@@ -3,7 +3,7 @@
 
 #include <cles/verb.hpp>
 
-#include "completion/candidate.hpp"
+#include "completion/candidates.hpp"
 
 #include <boost/asio/awaitable.hpp>
 
@@ -16,19 +16,19 @@ namespace tool {
 class address_book;
 class client;
 
-// What can be asked of the network now, found out within a time that somebody who types does not notice. What cannot
-// be had by then is left out; nothing is thrown but for an interruption.
+// Candidates from the nodes on the network. What is not known by the time `until` is left out. They only throw when
+// they are cancelled.
 
 /// The names of nodes, "car1".
-boost::asio::awaitable<std::vector<candidate>> live_names(client& asker, const address_book& addresses,
+boost::asio::awaitable<std::vector<candidate>> live_names(client& requester, const address_book& addresses,
                                                           std::chrono::steady_clock::time_point until);
 
 /// The URLs of nodes.
-boost::asio::awaitable<std::vector<candidate>> live_urls(client& asker, const address_book& addresses,
+boost::asio::awaitable<std::vector<candidate>> live_urls(client& requester, const address_book& addresses,
                                                          std::chrono::steady_clock::time_point until);
 
-/// The nouns of that node for that verb, "car1:localization", "car1:echo/". Of `any` and `all` those of every node.
-boost::asio::awaitable<std::vector<candidate>> live_nouns(client& asker, const address_book& addresses,
+/// The nouns of that node for that verb, "car1:localization", "car1:echo/". For `any` and `all` those of every node.
+boost::asio::awaitable<std::vector<candidate>> live_nouns(client& requester, const address_book& addresses,
                                                           std::string node, cles::verb verb,
                                                           std::chrono::steady_clock::time_point until);
 

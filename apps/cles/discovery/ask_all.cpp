@@ -17,19 +17,19 @@ namespace asio = boost::asio;
 
 namespace {
 
-/// Answers may still come when nobody waits for them any more.
-class node_query : public std::enable_shared_from_this<node_query> {
+/// Shared, because answers may arrive when the caller is gone.
+class parallel_query : public std::enable_shared_from_this<parallel_query> {
   public:
-    node_query(client& asker, std::size_t nodes)
-        : asker_(asker), ended_(asker.context(), asio::steady_timer::time_point::max()), answers_(nodes) {}
+    parallel_query(client& requester, std::size_t nodes)
+        : requester_(requester), done_(requester.context(), asio::steady_timer::time_point::max()), answers_(nodes) {}
 
     void ask(std::size_t which, const std::string& noun, const std::string& url, std::chrono::milliseconds limit) {
         auto& answer = answers_[which];
         if (url.empty()) {
-            answer.error = "no address that can be used from here";
+            answer.error = "no address that is reachable from this host";
             return;
         }
-        ++missing_;
+        ++pending_;
         cles::call_options options;
         options.at(url).deadline(limit).diagnostics(answer.error);
         const auto on_answer = [self = shared_from_this(), &answer](boost::system::error_code code,
@@ -40,36 +40,36 @@ class node_query : public std::enable_shared_from_this<node_query> {
             } else if (answer.error.empty()) {
                 answer.error = code.message();
             }
-            if (--self->missing_ == 0) {
-                self->ended_.cancel();
+            if (--self->pending_ == 0) {
+                self->done_.cancel();
             }
         };
-        asker_.node().async_pull(noun, options, on_answer);
+        requester_.node().async_pull(noun, options, on_answer);
     }
 
     asio::awaitable<void> finish() {
         boost::system::error_code code;
-        if (missing_ > 0) {
-            co_await ended_.async_wait(asio::redirect_error(asio::use_awaitable, code));
+        if (pending_ > 0) {
+            co_await done_.async_wait(asio::redirect_error(asio::use_awaitable, code));
         }
-        if (missing_ > 0) {
+        if (pending_ > 0) {
             throw boost::system::system_error(code); // interrupted
         }
     }
     [[nodiscard]] const std::vector<node_answer>& answers() const noexcept { return answers_; }
 
   private:
-    client& asker_;
-    asio::steady_timer ended_;
+    client& requester_;
+    asio::steady_timer done_;
     std::vector<node_answer> answers_;
-    std::size_t missing_ = 0;
+    std::size_t pending_ = 0;
 };
 
 } // namespace
 
-asio::awaitable<std::vector<node_answer>> ask_all(client& asker, std::string noun, std::vector<std::string> urls,
+asio::awaitable<std::vector<node_answer>> ask_all(client& requester, std::string noun, std::vector<std::string> urls,
                                                   std::chrono::milliseconds limit) {
-    const auto query = std::make_shared<node_query>(asker, urls.size());
+    const auto query = std::make_shared<parallel_query>(requester, urls.size());
     for (std::size_t i = 0; i < urls.size(); ++i) {
         query->ask(i, noun, urls[i], limit);
     }

@@ -3,11 +3,12 @@
 
 #include <cles/multicast.hpp>
 
-#include "doctor/finding.hpp"
-
 #include <boost/asio/awaitable.hpp>
 
+#include <cstdint>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace tool {
@@ -15,27 +16,54 @@ namespace tool {
 class address_book;
 class client;
 
-// Each looks at one thing and adds what it found.
+enum class verdict : std::uint8_t { ok, warning, failure };
 
-/// Whether `clesd` could be started with the configuration that it would use, by its own word.
-void check_config(findings& found);
+/// What a check of `cles doctor` found.
+struct finding {
+    std::string_view check; ///< its name: "ports"
+    verdict how = verdict::ok;
+    std::string text;
+    std::string advice; ///< what to do about it
+};
 
-/// The interfaces of this host, and those that multicast is to go by.
-void check_interfaces(const cles::multicast_options& where, findings& found);
+/// Collects the findings of all checks.
+class findings {
+  public:
+    void ok(std::string_view check, std::string text, std::string advice = {}) {
+        all_.push_back({check, verdict::ok, std::move(text), std::move(advice)});
+    }
+    void warning(std::string_view check, std::string text, std::string advice = {}) {
+        all_.push_back({check, verdict::warning, std::move(text), std::move(advice)});
+    }
+    void failure(std::string_view check, std::string text, std::string advice = {}) {
+        all_.push_back({check, verdict::failure, std::move(text), std::move(advice)});
+    }
 
-/// Sends a word to the group by each interface and listens for it. \return by which it was heard
-std::vector<std::string> check_multicast(const cles::multicast_options& where, findings& found);
+    [[nodiscard]] const std::vector<finding>& all() const noexcept { return all_; }
 
-/// Whether the ports that nodes use unless something else is said are free, or theirs; with --at, who is there.
-boost::asio::awaitable<void> check_ports(client& asker, const address_book& addresses, findings& found);
+  private:
+    std::vector<finding> all_;
+};
 
-/// Whether the nodes that can be heard can also be asked, whether their names are their own, and what time they have.
-boost::asio::awaitable<void> check_nodes(client& asker, const address_book& addresses, findings& found);
+/// Whether `clesd` accepts the configuration that it would use, which it checks itself.
+void check_configuration(findings& found);
+
+/// The interfaces of this host, and those that multicast uses.
+void check_interfaces(const cles::multicast_options& group, findings& found);
+
+/// Sends a datagram to the group on each interface, and waits for it. \return the interfaces on which it was received
+std::vector<std::string> check_multicast(const cles::multicast_options& group, findings& found);
+
+/// Whether the default ports of nodes are free, or used by nodes; with --at, which node is there.
+boost::asio::awaitable<void> check_ports(client& requester, const address_book& addresses, findings& found);
+
+/// Whether the nodes that announce themselves answer, have unique names, and have the time of this host.
+boost::asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, findings& found);
 
 /// The clock of this host.
 void check_clock(findings& found);
 
-/// How many files, and so links, a program may have open.
+/// The number of files, and therefore links, that a program may open.
 void check_limits(findings& found);
 
 } // namespace tool

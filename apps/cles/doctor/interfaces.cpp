@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "discovery/network_interfaces.hpp"
+#include "discovery/host.hpp"
 #include "doctor/checks.hpp"
 
 #include <algorithm>
 #include <string>
+#include <vector>
 
 namespace tool {
 namespace {
 
-std::string names_of(const std::vector<net_interface>& all) {
+std::string interfaces_text(const std::vector<network_interface>& all) {
     std::string out;
     for (const auto& each : all) {
         if (each.up) {
@@ -19,63 +20,59 @@ std::string names_of(const std::vector<net_interface>& all) {
     return out.empty() ? "none is up" : out;
 }
 
-// Another one, by which the network could be reached.
-const net_interface* better_than_loopback(const std::vector<net_interface>& all) {
-    const auto at = std::find_if(all.begin(), all.end(), [](const net_interface& i) {
+// An interface over which other hosts could be reached, or null.
+const network_interface* external_interface(const std::vector<network_interface>& all) {
+    const auto at = std::find_if(all.begin(), all.end(), [](const network_interface& i) {
         return i.up && i.multicast && !i.loopback && !i.address.empty();
     });
     return at == all.end() ? nullptr : &*at;
 }
 
-// What two machines take, by this interface of this one.
-std::string for_other_hosts(const net_interface& by, const std::string& chosen, const cles::multicast_options& where) {
-    return "to reach other hosts: CLES_MULTICAST=" + chosen +
-           " (there their own interface), nodes with --listen tcp://" + by.address + " --insecure, and UDP port " +
-           std::to_string(where.port) + " open";
+// What both hosts need to work together over this interface.
+std::string advice_for_other_hosts(const network_interface& interface, const std::string& selection,
+                                   const cles::multicast_options& group) {
+    return "to reach other hosts: CLES_MULTICAST=" + selection +
+           " (there their own interface), nodes with --listen tcp://" + interface.address +
+           " --insecure, and UDP port " + std::to_string(group.port) + " open";
 }
 
-void check_chosen(const std::string& name, const cles::multicast_options& where, const std::vector<net_interface>& all,
-                  findings& found) {
-    const auto at = std::find_if(all.begin(), all.end(), [&](const net_interface& i) { return i.name == name; });
-    if (at == all.end()) {
-        found.push_back({"interfaces", verdict::failure, "multicast is to go by " + name + ", and there is none",
-                         "name one that there is by --multicast, CLES_MULTICAST or multicast.interface in clesd.yaml"});
-    } else if (!at->up) {
-        found.push_back({"interfaces", verdict::failure, "multicast is to go by " + name + ", which is down",
-                         "ip link set " + name + " up"});
-    } else if (at->address.empty()) {
-        found.push_back({"interfaces", verdict::failure,
-                         "multicast is to go by " + name + ", which has no IPv4 address",
-                         "give it one: multicast of CLES is IPv4"});
-    } else if (!at->multicast && !at->loopback) {
-        found.push_back({"interfaces", verdict::warning, name + " says that it carries no multicast",
-                         "ip link set " + name + " multicast on, or find nodes by seeds and --at"});
-    } else if (at->loopback && where.interface != name) {
-        found.push_back({"interfaces", verdict::ok, "multicast goes by " + name + ", for nodes on this host"});
-    } else if (at->loopback) {
-        const auto* other = better_than_loopback(all);
-        found.push_back({"interfaces", verdict::ok,
-                         "multicast goes by " + name + ": only nodes on this host find each other",
-                         other == nullptr ? "" : for_other_hosts(*other, other->name, where)});
+void check_interface(const std::string& name, const cles::multicast_options& group,
+                     const std::vector<network_interface>& all, findings& found) {
+    const auto used = "multicast is configured for " + name;
+    const auto* interface = find_interface(all, name);
+    if (interface == nullptr) {
+        found.failure("interfaces", used + ", which does not exist",
+                      "choose an existing one with --multicast, CLES_MULTICAST or multicast.interface in clesd.yaml");
+    } else if (!interface->up) {
+        found.failure("interfaces", used + ", which is down", "ip link set " + name + " up");
+    } else if (interface->address.empty()) {
+        found.failure("interfaces", used + ", which has no IPv4 address", "give it one: CLES uses IPv4 for multicast");
+    } else if (!interface->multicast && !interface->loopback) {
+        found.warning("interfaces", name + " does not support multicast according to its flags",
+                      "ip link set " + name + " multicast on, or find nodes by seeds and --at");
+    } else if (interface->loopback && group.interface != name) {
+        found.ok("interfaces", "multicast uses " + name + ", for nodes on this host");
+    } else if (interface->loopback) {
+        const auto* other = external_interface(all);
+        found.ok("interfaces", "multicast uses " + name + ": only nodes on this host find each other",
+                 other == nullptr ? "" : advice_for_other_hosts(*other, other->name, group));
     } else {
-        found.push_back(
-            {"interfaces", verdict::ok, "multicast goes by " + name, for_other_hosts(*at, where.interface, where)});
+        found.ok("interfaces", "multicast uses " + name, advice_for_other_hosts(*interface, group.interface, group));
     }
 }
 
 } // namespace
 
-void check_interfaces(const cles::multicast_options& where, findings& found) {
-    const auto all = interfaces_of_host();
-    found.push_back({"interfaces", verdict::ok, names_of(all)});
-    const auto chosen = cles::interfaces_of(where);
-    for (const auto& name : chosen) {
-        check_chosen(name, where, all, found);
+void check_interfaces(const cles::multicast_options& group, findings& found) {
+    const auto all = network_interfaces();
+    found.ok("interfaces", interfaces_text(all));
+    const auto used = cles::interfaces_of(group);
+    for (const auto& name : used) {
+        check_interface(name, group, all, found);
     }
-    if (where.is_on() && chosen.empty()) {
-        found.push_back({"interfaces", verdict::failure,
-                         "multicast is to go by 'auto', and no interface is up with an IPv4 address",
-                         "ip link set lo up"});
+    if (group.is_on() && used.empty()) {
+        found.failure("interfaces", "multicast is configured for 'auto', and no interface is up with an IPv4 address",
+                      "ip link set lo up");
     }
 }
 

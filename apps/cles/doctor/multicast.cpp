@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "discovery/network_interfaces.hpp"
-#include "discovery/sockets.hpp"
+#include "discovery/host.hpp"
 #include "doctor/checks.hpp"
 
 #include <boost/asio/buffer.hpp>
@@ -32,25 +31,24 @@ using steady = std::chrono::steady_clock;
 
 namespace {
 
-/// A listener at the group's port, and a sender of its own, as nodes have them.
+/// A socket that listens at the port of the group, and one that sends, as nodes have them.
 class group_probe {
   public:
-    /// \throws boost::system::system_error, and then `step` says what could not be done
-    group_probe(const cles::multicast_options& where, const std::string& interface, std::string& step)
-        : group_(asio::ip::make_address_v4(where.group), where.port) {
-        const auto all = interfaces_of_host();
-        const auto by =
-            std::find_if(all.begin(), all.end(), [&](const net_interface& i) { return i.name == interface; });
-        const auto address =
-            by == all.end() || by->address.empty() ? asio::ip::address_v4{} : asio::ip::make_address_v4(by->address);
+    /// \throws boost::system::system_error, and `step` is what could not be done
+    group_probe(const cles::multicast_options& options, const std::string& interface, std::string& step)
+        : group_(asio::ip::make_address_v4(options.group), options.port) {
+        const auto all = network_interfaces();
+        const auto* used = find_interface(all, interface);
+        const auto address = used == nullptr || used->address.empty() ? asio::ip::address_v4{}
+                                                                      : asio::ip::make_address_v4(used->address);
         ip_mreqn membership{};
         membership.imr_multiaddr.s_addr = htonl(group_.address().to_v4().to_uint());
         membership.imr_ifindex = static_cast<int>(::if_nametoindex(interface.c_str()));
 
         listener_.set_option(asio::socket_base::reuse_address{true});
-        step = "listen to udp port " + std::to_string(where.port);
+        step = "listen at udp port " + std::to_string(options.port);
         listener_.bind(group_);
-        step = "join the group " + where.group + " on " + interface;
+        step = "join the group " + options.group + " on " + interface;
         set(listener_, IP_ADD_MEMBERSHIP, membership);
         step = "send from " + interface;
         sender_.bind({address, 0});
@@ -59,13 +57,13 @@ class group_probe {
     }
 
     void send() {
-        // Nodes that receive it announce where they are, as for any node that starts.
-        static constexpr std::string_view word = "BIND all:cles\n";
-        sender_.send_to(asio::buffer(word), group_);
+        // Nodes that receive it announce their addresses, as for any node that starts.
+        static constexpr std::string_view request = "BIND all:cles\n";
+        sender_.send_to(asio::buffer(request), group_);
     }
 
-    /// Whether the own word comes back in time.
-    bool hears_itself(std::chrono::milliseconds limit) {
+    /// Whether the datagram that was sent is received in time.
+    bool receives_own(std::chrono::milliseconds limit) {
         const auto until = steady::now() + limit;
         const auto own = sender_.local_endpoint();
         std::array<char, 2048> text{};
@@ -98,47 +96,48 @@ class group_probe {
     udp::socket sender_{io_, udp::v4()};
 };
 
-std::string advice_for(const boost::system::error_code& code, const cles::multicast_options& where,
-                       const std::string& interface) {
+std::string advice_on(const boost::system::error_code& code, const cles::multicast_options& group,
+                      const std::string& interface) {
     if (code == asio::error::address_in_use) {
-        const auto holder = holder_of("udp", where.port);
+        const auto holder = process_listening_at("udp", group.port);
         return "stop " + (holder.empty() ? "the program" : holder) +
-               " that keeps the port to itself, or choose another: IFACE,GROUP:PORT on all nodes";
+               ", which uses the port exclusively, or choose another port: IFACE,GROUP:PORT on all nodes";
     }
     if (code == asio::error::no_permission || code == asio::error::access_denied) {
-        return "a firewall or a sandbox forbids it: allow udp to " + where.group + ":" + std::to_string(where.port);
+        return "a firewall or a sandbox blocks it: allow udp to " + group.group + ":" + std::to_string(group.port);
     }
-    return "is " + interface + " up, and does its network carry multicast? cles ls --at URL and seeds need none";
+    return "check that " + interface +
+           " is up, and that its network supports multicast; cles ls --at URL and seeds work "
+           "without it";
 }
 
-bool is_heard(const cles::multicast_options& where, const std::string& interface, findings& found) {
-    const auto group = where.group + ":" + std::to_string(where.port) + " on " + interface;
+bool check_group(const cles::multicast_options& group, const std::string& interface, findings& found) {
+    const auto address = group.group + ":" + std::to_string(group.port);
     std::string step;
     try {
-        group_probe probe{where, interface, step};
+        group_probe probe{group, interface, step};
         probe.send();
-        if (probe.hears_itself(1s)) {
-            found.push_back({"multicast", verdict::ok, "what is sent to " + group + " is heard"});
+        if (probe.receives_own(1s)) {
+            found.ok("multicast", "datagrams to " + address + " on " + interface + " are received");
             return true;
         }
-        found.push_back(
-            {"multicast", verdict::failure, "what this host sends to " + group + " does not come back to it",
-             "a firewall drops it: allow udp from any port to " + where.group + ":" + std::to_string(where.port)});
+        found.failure("multicast", "datagrams from this host to " + address + " on " + interface + " do not come back",
+                      "a firewall drops them: allow udp from any port to " + address);
     } catch (const boost::system::system_error& e) {
-        found.push_back({"multicast", verdict::failure, "this host cannot " + step + ": " + e.code().message(),
-                         advice_for(e.code(), where, interface)});
+        found.failure("multicast", "this host cannot " + step + ": " + e.code().message(),
+                      advice_on(e.code(), group, interface));
     }
     return false;
 }
 
 } // namespace
 
-std::vector<std::string> check_multicast(const cles::multicast_options& where, findings& found) {
-    if (!where.is_on()) {
-        found.push_back({"multicast", verdict::ok, "is off: nodes are found by --at, --peer and seeds"});
+std::vector<std::string> check_multicast(const cles::multicast_options& group, findings& found) {
+    if (!group.is_on()) {
+        found.ok("multicast", "is off: nodes are found by --at, --peer and seeds");
     }
-    auto interfaces = cles::interfaces_of(where);
-    std::erase_if(interfaces, [&](const std::string& each) { return !is_heard(where, each, found); });
+    auto interfaces = cles::interfaces_of(group);
+    std::erase_if(interfaces, [&](const std::string& each) { return !check_group(group, each, found); });
     return interfaces;
 }
 

@@ -3,7 +3,7 @@
 #include <cles/url.hpp>
 
 #include "client/client.hpp"
-#include "discovery/sockets.hpp"
+#include "discovery/host.hpp"
 #include "doctor/checks.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -25,7 +25,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-constexpr auto port_patience = 500ms;
+constexpr auto port_timeout = 500ms;
 
 struct listener {
     std::string node;
@@ -33,97 +33,97 @@ struct listener {
 };
 BOOST_DESCRIBE_STRUCT(listener, (), (node, version))
 
-/// Who is there; where nobody says so, why.
+/// The node that listens somewhere, or why it is not known.
 struct listener_or_error : listener {
     std::string error;
-    bool is_node = false; // it is one, though it does not say which
+    bool is_node = false; // even if it does not say which
 };
 
-// Only a node answers so. By datagram, one that offers much has more to say of itself than an answer can hold.
-bool is_said_by_a_node(boost::system::error_code code) {
+// Only a node answers with these. By datagram, the description of a node with many tasks exceeds the size of an answer.
+bool is_error_of_node(boost::system::error_code code) {
     return code == cles::errc::too_large || code == cles::errc::denied || code == cles::errc::busy;
 }
 
-asio::awaitable<listener_or_error> ask(client& asker, cles::call_options options) {
+asio::awaitable<listener_or_error> identify(client& requester, cles::call_options options) {
     listener_or_error out;
     try {
-        const auto there = co_await asker.node().async_pull<listener>("self:cles", options);
-        out.node = there.node;
-        out.version = there.version;
+        const auto answer = co_await requester.node().async_pull<listener>("self:cles", options);
+        out.node = answer.node;
+        out.version = answer.version;
         out.is_node = true;
     } catch (const cles::error& e) {
-        out.is_node = is_said_by_a_node(e.code());
+        out.is_node = is_error_of_node(e.code());
         out.error = e.message().empty() ? e.code().message() : e.message();
     }
     co_return out;
 }
 
-finding is_there(const std::string& url, const listener_or_error& who) {
-    return {"ports", verdict::ok,
-            who.node.empty() ? url + ": a node is there, which answers: " + who.error
-                             : url + ": the node " + who.node + " is there, version " + who.version};
+void report_node(const std::string& url, const listener_or_error& node, findings& found) {
+    found.ok("ports", node.node.empty() ? url + ": a node is there, which answers: " + node.error
+                                        : url + ": the node " + node.node + " is there, version " + node.version);
 }
 
-// What a node that wants to listen there would be told.
+// What a node that wants to listen there would get.
 template <class Protocol>
-boost::system::error_code try_to_bind(asio::io_context& io, std::uint16_t port) {
+boost::system::error_code try_to_bind(asio::io_context& io) {
     boost::system::error_code code;
     typename Protocol::socket socket{io};
     socket.open(Protocol::v4(), code);
     if constexpr (std::same_as<Protocol, asio::ip::tcp>) {
-        socket.set_option(asio::socket_base::reuse_address{true}, code); // as nodes do; it shares with no listener
+        socket.set_option(asio::socket_base::reuse_address{true}, code); // as nodes do; it allows no second listener
     }
-    socket.bind({asio::ip::address_v4::loopback(), port}, code);
+    socket.bind({asio::ip::address_v4::loopback(), cles::default_port}, code);
     return code;
 }
 
-finding taken(const std::string& url, std::string_view protocol, const std::string& why) {
-    const auto holder = holder_of(protocol, cles::default_port);
-    return {"ports", verdict::failure,
-            url + ": " + (holder.empty() ? "another program" : holder) + " is there, and it is no node: " + why,
-            "stop it, or let nodes listen elsewhere: --listen of cles serve, listen in clesd.yaml"};
-}
-
-asio::awaitable<void> check_usual(client& asker, std::string_view protocol, findings& found) {
+asio::awaitable<void> check_default_port(client& requester, std::string_view protocol, findings& found) {
     const auto url = std::string{protocol} + "://127.0.0.1:" + std::to_string(cles::default_port);
-    const auto code = protocol == "tcp" ? try_to_bind<asio::ip::tcp>(asker.context(), cles::default_port)
-                                        : try_to_bind<asio::ip::udp>(asker.context(), cles::default_port);
+    const auto code = protocol == "tcp" ? try_to_bind<asio::ip::tcp>(requester.context())
+                                        : try_to_bind<asio::ip::udp>(requester.context());
     if (!code) {
-        found.push_back({"ports", verdict::ok, url + " is free"});
+        found.ok("ports", url + " is free");
         co_return;
     }
     if (code != asio::error::address_in_use) {
-        found.push_back({"ports", verdict::failure, url + " cannot be had: " + code.message(),
-                         "is the interface lo up? ip link set lo up"});
+        found.failure("ports", url + " is not available: " + code.message(),
+                      "check that the interface lo is up: ip link set lo up");
         co_return;
     }
     cles::call_options options;
-    options.at(url).deadline(port_patience);
-    const auto answer = co_await ask(asker, options);
-    found.push_back(answer.is_node ? is_there(url, answer) : taken(url, protocol, answer.error));
+    options.at(url).deadline(port_timeout);
+    const auto answer = co_await identify(requester, options);
+    if (answer.is_node) {
+        report_node(url, answer, found);
+        co_return;
+    }
+    const auto process = process_listening_at(protocol, cles::default_port);
+    found.failure("ports",
+                  url + ": " + (process.empty() ? "another program" : process) +
+                      " is there, which is not a node: " + answer.error,
+                  "stop it, or let nodes listen elsewhere: --listen of cles serve, listen in clesd.yaml");
 }
 
-asio::awaitable<void> check_named(client& asker, const address_book& addresses, findings& found) {
+asio::awaitable<void> check_given_address(client& requester, const address_book& addresses, findings& found) {
     const auto url = addresses.url_for("self");
-    const auto options = asker.options_for("self:cles", port_patience);
-    const auto answer = co_await ask(asker, options);
+    const auto options = requester.options_for("self:cles", port_timeout);
+    const auto answer = co_await identify(requester, options);
     if (answer.is_node) {
-        found.push_back(is_there(url, answer));
+        report_node(url, answer, found);
     } else {
-        found.push_back({"ports", verdict::failure, url + " does not answer: " + answer.error,
-                         "start a node there (clesd, or cles serve --listen URL), or see who is there: cles ls"});
+        found.failure("ports", url + " does not answer: " + answer.error,
+                      "start a node there (clesd, or cles serve --listen URL), or list the nodes: cles ls");
     }
 }
 
 } // namespace
 
-asio::awaitable<void> check_ports(client& asker, const address_book& addresses, findings& found) {
+asio::awaitable<void> check_ports(client& requester, const address_book& addresses, findings& found) {
     if (addresses.has_url()) {
-        co_await check_named(asker, addresses, found);
+        co_await check_given_address(requester, addresses, found);
         co_return;
     }
-    co_await check_usual(asker, "tcp", found);
-    co_await check_usual(asker, "udp", found);
+    co_await check_default_port(requester, "tcp", found);
+    co_await check_default_port(requester, "udp", found);
 }
 
 } // namespace tool

@@ -2,7 +2,7 @@
 #include "options/common_options.hpp"
 
 #include "options/duration.hpp"
-#include "output/failure.hpp"
+#include "output/errors.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -17,11 +17,11 @@ void add_noun(CLI::App& command, std::string& noun) {
         ->type_name("");
 }
 
-void add_timeout(CLI::App& command, std::optional<std::chrono::milliseconds>& limit, const std::string& otherwise) {
+void add_timeout(CLI::App& command, std::optional<std::chrono::milliseconds>& limit, const std::string& default_value) {
     command
         .add_option_function<std::string>(
             "-t,--timeout", [&limit](const std::string& text) { limit = parse_positive_duration(text); },
-            "How long to wait for an answer: 500ms, 2s, or seconds (default " + otherwise + ")")
+            "How long to wait for an answer: 500ms, 2s, or seconds (default " + default_value + ")")
         ->type_name("TIME");
 }
 
@@ -33,7 +33,7 @@ void add_count(CLI::App& command, std::uint64_t& count, const std::string& help)
                 const auto* end = text.data() + text.size();
                 const auto [rest, code] = std::from_chars(text.data(), end, count);
                 if (code != std::errc{} || rest != end) {
-                    throw usage_error("--count '" + text + "' is no number from 0 up");
+                    throw usage_error("--count '" + text + "' is not a whole number from 0 up");
                 }
             },
             help)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "options/duration.hpp"
 
-#include "output/failure.hpp"
+#include "output/errors.hpp"
 
 #include <charconv>
 #include <cmath>
@@ -17,10 +17,10 @@ std::chrono::milliseconds parse_duration(std::string_view text) {
     const std::string_view unit{rest, static_cast<std::size_t>(end - rest)};
     const double scale = unit.empty() || unit == "s" ? 1000 : unit == "ms" ? 1 : unit == "min" ? 60'000 : 0;
     if (code != std::errc{} || scale == 0 || !std::isfinite(number) || std::signbit(number)) {
-        throw usage_error("'" + std::string{text} + "' is no time: write 500ms, 2s, 1min, or seconds as in 0.5");
+        throw usage_error("'" + std::string{text} + "' is not a duration: write 500ms, 2s, 1min, or seconds as in 0.5");
     }
     if (number * scale > static_cast<double>(std::chrono::milliseconds{24h}.count())) {
-        throw usage_error("'" + std::string{text} + "' is more than a day");
+        throw usage_error("'" + std::string{text} + "' is longer than a day");
     }
     return std::chrono::milliseconds{std::llround(number * scale)};
 }
@@ -28,7 +28,7 @@ std::chrono::milliseconds parse_duration(std::string_view text) {
 std::chrono::milliseconds parse_positive_duration(std::string_view text) {
     const auto span = parse_duration(text);
     if (span < 1ms) {
-        throw usage_error("'" + std::string{text} + "' is too short: a millisecond at least");
+        throw usage_error("'" + std::string{text} + "' is too short: at least 1ms");
     }
     return span;
 }

@@ -8,22 +8,22 @@
 
 namespace tool {
 
-/// A JSON value to be shown. Unlike a document tree made for computing it keeps each number as it was written.
+/// A JSON value to display. It keeps each number as it was written.
 struct json_node {
     enum class type { object, array, text, other };
 
     type kind = type::other;
-    std::string text{}; ///< a string's content; of everything else its JSON
+    std::string text{}; ///< the content of a string; the JSON of other scalars
     std::vector<std::pair<std::string, json_node>> members{};
     std::vector<json_node> elements{};
 
-    /// An array that holds objects alone, and at least one.
+    /// A non-empty array of objects only.
     [[nodiscard]] bool is_list_of_objects() const;
     /// The member of that name, or null.
     [[nodiscard]] const json_node* find(std::string_view name) const;
 };
 
-/// \throws cles::error with `conversion` where it is not JSON
+/// \throws cles::error with `conversion` if it is not JSON
 json_node parse_json(std::string_view json);
 
 /// One value of an object, nested ones included: {"a":{"b":1}} has "a.b".
@@ -33,7 +33,7 @@ struct json_cell {
     bool is_number = false;
 };
 
-/// An object's values in their order, fit for a terminal. An array is one value; one of objects alone stays JSON.
+/// An object's values in their order, safe for a terminal. An array is one value; an array of objects stays JSON.
 std::vector<json_cell> flatten(const json_node& object);
 
 } // namespace tool

@@ -3,7 +3,6 @@
 
 #include <cles/json_reader.hpp>
 
-#include "output/output.hpp"
 #include "output/terminal.hpp"
 
 #include <CLI/App.hpp>
@@ -25,6 +24,15 @@ void add_output_option(CLI::App& command, output_format& format) {
             "table, json (one document per line) or raw (as it came); default: table on a terminal, else json")
         ->type_name("FORMAT")
         ->check(CLI::IsMember({"table", "json", "raw"}).description(""));
+}
+
+void add_json_option(CLI::App& command, bool& json, const std::string& documents) {
+    command
+        .add_option_function<std::string>(
+            "-o,--output", [&json](const std::string& name) { json = name == "json"; },
+            "text, or json: " + documents + " (default text)")
+        ->type_name("FORMAT")
+        ->check(CLI::IsMember({"text", "json"}).description(""));
 }
 
 output_format resolved(output_format format) {

@@ -17,22 +17,25 @@ enum class output_format { automatic, table, json, raw };
 /// -o: table, json or raw.
 void add_output_option(CLI::App& command, output_format& format);
 
-/// The format, `automatic` resolved: a table for a terminal, JSON for everything else.
+/// -o: text or json.
+void add_json_option(CLI::App& command, bool& json, const std::string& documents);
+
+/// The format, where `automatic` means a table on a terminal, and JSON otherwise.
 output_format resolved(output_format format);
 
-/// Shows JSON documents on stdout as the user wants them.
+/// Prints JSON documents on stdout in the format that was requested.
 class printer {
   public:
-    /// `stream`: several documents are to come, so a table has one header, and a row for each.
+    /// `stream`: several documents follow each other, so that a table has one header, and a row for each.
     printer(output_format format, bool stream) : format_(resolved(format)), stream_(stream) {}
 
-    /// `leading` is put in front of a row of a table.
+    /// `leading`: cells before those of the document in a row of a table.
     void print(std::string_view json, std::vector<json_cell> leading = {});
 
   private:
     output_format format_;
     bool stream_;
-    row_view rows_;
+    row_printer rows_;
 };
 
 } // namespace tool

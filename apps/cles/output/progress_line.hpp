@@ -5,24 +5,24 @@
 
 namespace tool {
 
-/// Shows on stderr how far a task is: one line that is drawn anew on a terminal, a line per report elsewhere.
+/// Shows the progress of a task on stderr: one line that is redrawn on a terminal, a line per report elsewhere.
 class progress_line {
   public:
-    /// `always`: also where stderr is no terminal.
+    /// `always`: also where stderr is not a terminal.
     explicit progress_line(bool always);
     progress_line(const progress_line&) = delete;
     progress_line& operator=(const progress_line&) = delete;
-    /// Wipes the line.
+    /// Erases the line.
     ~progress_line() { clear(); }
 
-    /// Whether anybody would see it.
-    [[nodiscard]] bool is_wanted() const noexcept { return redraws_ || always_; }
+    /// Whether progress is shown at all.
+    [[nodiscard]] bool is_wanted() const noexcept { return is_terminal_ || always_; }
     /// `details`: a JSON object.
     void show(double fraction, std::string_view details);
     void clear();
 
   private:
-    bool redraws_;
+    bool is_terminal_;
     bool always_;
     bool drawn_ = false;
 };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "output/screen.hpp"
 
-#include "output/output.hpp"
 #include "output/terminal.hpp"
 
 #include <boost/asio/buffer.hpp>
@@ -20,7 +19,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-// ECMA-48, and xterm's second screen.
+// ECMA-48, and xterm's alternate screen.
 constexpr std::string_view enter = "\x1b[?1049h\x1b[?25l";
 constexpr std::string_view leave = "\x1b[?25h\x1b[?1049l";
 constexpr std::string_view to_top = "\x1b[H";
@@ -38,30 +37,30 @@ winsize size_of_terminal() {
 
 } // namespace
 
-/// Reads each key at once, without showing it.
-class screen::keys {
+/// Reads each key at once, without echo.
+class screen::key_reader {
   public:
-    keys(asio::io_context& io, const termios& before, std::function<void()> on_quit)
+    key_reader(asio::io_context& io, const termios& before, std::function<void()> on_quit)
         : before_(before), input_(io, ::dup(STDIN_FILENO)), on_quit_(std::move(on_quit)) {
         auto quiet = before;
         quiet.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
         ::tcsetattr(STDIN_FILENO, TCSANOW, &quiet);
-        hear();
+        read_key();
     }
-    keys(const keys&) = delete;
-    keys& operator=(const keys&) = delete;
-    ~keys() { ::tcsetattr(STDIN_FILENO, TCSANOW, &before_); }
+    key_reader(const key_reader&) = delete;
+    key_reader& operator=(const key_reader&) = delete;
+    ~key_reader() { ::tcsetattr(STDIN_FILENO, TCSANOW, &before_); }
 
   private:
-    void hear() {
+    void read_key() {
         input_.async_read_some(asio::buffer(typed_), [this](boost::system::error_code code, std::size_t size) {
-            if (code) { // this may have gone
+            if (code) { // this may be destroyed
                 return;
             }
             if (std::string_view{typed_.data(), size}.find('q') != std::string_view::npos) {
                 on_quit_();
             } else {
-                hear();
+                read_key();
             }
         });
     }
@@ -72,14 +71,14 @@ class screen::keys {
     std::array<char, 64> typed_{};
 };
 
-bool screen::is_there() {
+bool screen::is_supported() {
     const char* term = std::getenv("TERM");
     return is_terminal(stream::out) && term != nullptr && *term != '\0' && std::string_view{term} != "dumb";
 }
 
 screen::screen(asio::io_context& io, std::function<void()> on_quit) {
     if (termios now{}; ::tcgetattr(STDIN_FILENO, &now) == 0) {
-        keys_ = std::make_unique<keys>(io, now, std::move(on_quit));
+        keys_ = std::make_unique<key_reader>(io, now, std::move(on_quit));
     }
     write_output(enter);
 }
@@ -87,7 +86,7 @@ screen::screen(asio::io_context& io, std::function<void()> on_quit) {
 screen::~screen() {
     try {
         write_output(leave);
-    } catch (...) { // then nobody looks at it any more
+    } catch (...) { // the output is closed
         return;
     }
 }
@@ -116,7 +115,7 @@ std::string cut_to_width(std::string_view line, std::size_t columns) {
             }
             if (++used > columns) {
                 line.remove_prefix(length);
-                continue; // what styles end behind it still counts
+                continue; // escape sequences behind it still apply
             }
         }
         out.append(line.substr(0, length));

@@ -13,11 +13,11 @@
 
 namespace tool {
 
-/// The whole terminal, for something that changes in place; what was there before is back when it is destroyed.
+/// The whole terminal, for output that changes in place; the destructor restores what was shown before.
 class screen {
   public:
-    /// Whether stdout is a terminal that can be written in place.
-    static bool is_there();
+    /// Whether stdout is a terminal that supports this.
+    static bool is_supported();
 
     /// \param on_quit is called for 'q', on the context
     screen(boost::asio::io_context& io, std::function<void()> on_quit);
@@ -25,16 +25,16 @@ class screen {
     screen& operator=(const screen&) = delete;
     ~screen();
 
-    /// Shows these lines, as far as they have room.
+    /// Shows these lines, as far as they fit.
     void show(std::string_view text);
 
   private:
-    class keys;
+    class key_reader;
 
-    std::unique_ptr<keys> keys_; // null where stdin is no terminal
+    std::unique_ptr<key_reader> keys_; // null if stdin is not a terminal
 };
 
-/// The first so many columns of a line, escape sequences not counted.
+/// The first `columns` columns of a line; escape sequences do not count.
 std::string cut_to_width(std::string_view line, std::size_t columns);
 
 } // namespace tool

@@ -24,11 +24,11 @@ double statistics::mean() const {
     return std::accumulate(values_.begin(), values_.end(), 0.0) / static_cast<double>(values_.size());
 }
 
-double statistics::deviation() const {
-    const double middle = mean();
+double statistics::standard_deviation() const {
+    const double average = mean();
     double sum = 0;
     for (const double value : values_) {
-        sum += (value - middle) * (value - middle);
+        sum += (value - average) * (value - average);
     }
     return std::sqrt(sum / static_cast<double>(values_.size()));
 }

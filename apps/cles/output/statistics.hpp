@@ -7,7 +7,7 @@
 
 namespace tool {
 
-/// Minimum, mean, maximum and standard deviation of the newest values, up to a number of them.
+/// Minimum, mean, maximum and standard deviation of the newest values, at most `window` of them.
 class statistics {
   public:
     explicit statistics(std::size_t window) : window_(window) {}
@@ -19,17 +19,17 @@ class statistics {
     [[nodiscard]] double min() const;
     [[nodiscard]] double max() const;
     [[nodiscard]] double mean() const;
-    [[nodiscard]] double deviation() const;
+    [[nodiscard]] double standard_deviation() const;
 
   private:
     std::size_t window_;
     std::deque<double> values_;
 };
 
-/// With so many digits after the point.
+/// With that many digits after the decimal point.
 std::string fixed(double value, int digits);
 
-/// As a number of JSON that is fit for people too: at most so many digits after the point.
+/// Rounded to at most that many digits after the decimal point.
 double rounded(double value, int digits);
 
 } // namespace tool

@@ -12,14 +12,6 @@ namespace {
 
 constexpr std::size_t gap = 2;
 
-std::string padded(std::string text, std::size_t width, bool right) {
-    const auto taken = width_of(text);
-    if (taken < width) {
-        text.insert(right ? 0 : text.size(), width - taken, ' ');
-    }
-    return text;
-}
-
 void append_line(std::string& out, std::string line, bool is_header) {
     line.erase(line.find_last_not_of(' ') + 1);
     out.append(is_header ? bold(stream::out, line) : line).append("\n");
@@ -43,8 +35,8 @@ std::string key_value_lines(const std::vector<json_cell>& cells) {
     return out;
 }
 
-// What follows may be somewhat longer: a decimal with more digits, a counter that has grown.
-std::size_t room_for(const json_cell& cell) {
+// Later values may be longer: a decimal with more digits, a counter that has grown.
+std::size_t reserved_width(const json_cell& cell) {
     constexpr std::size_t more_digits = 3;
     const bool grows = cell.text.find('.') != std::string::npos || cell.text.size() > 2 * more_digits;
     return width_of(cell.text) + (cell.is_number && grows ? more_digits : 0);
@@ -70,20 +62,27 @@ std::string object_text(json_node object) {
 
 } // namespace
 
-std::size_t table::column(std::string_view title) {
-    const auto at = std::find_if(heads_.begin(), heads_.end(), [&](const head& h) { return h.title == title; });
-    if (at == heads_.end()) {
-        heads_.push_back({std::string{title}, width_of(title)});
-        return heads_.size() - 1;
+table::table(std::initializer_list<const char*> titles) {
+    for (const char* title : titles) {
+        column(title);
     }
-    return static_cast<std::size_t>(at - heads_.begin());
+}
+
+std::size_t table::column(std::string_view title) {
+    const auto at =
+        std::find_if(headers_.begin(), headers_.end(), [&](const table_header& h) { return h.title == title; });
+    if (at == headers_.end()) {
+        headers_.push_back({std::string{title}, width_of(title)});
+        return headers_.size() - 1;
+    }
+    return static_cast<std::size_t>(at - headers_.begin());
 }
 
 void table::set(std::size_t column, std::string text, bool is_number) {
     auto& cells = rows_.back();
     cells.resize(std::max(cells.size(), column + 1));
-    heads_[column].width = std::max(heads_[column].width, width_of(text));
-    heads_[column].numbers = heads_[column].numbers && is_number;
+    headers_[column].width = std::max(headers_[column].width, width_of(text));
+    headers_[column].numbers = headers_[column].numbers && is_number;
     cells[column] = std::move(text);
 }
 
@@ -91,14 +90,14 @@ std::string table::text() const {
     const std::string between(gap, ' ');
     std::string out;
     std::string line;
-    for (const auto& h : heads_) {
+    for (const auto& h : headers_) {
         line += padded(h.title, h.width, h.numbers) + between;
     }
     append_line(out, std::move(line), true);
     for (const auto& cells : rows_) {
         line.clear();
         for (std::size_t i = 0; i < cells.size(); ++i) {
-            line += padded(cells[i], heads_[i].width, heads_[i].numbers) + between;
+            line += padded(cells[i], headers_[i].width, headers_[i].numbers) + between;
         }
         append_line(out, std::move(line), false);
     }
@@ -138,21 +137,22 @@ std::string to_table(std::string_view json) {
     return out;
 }
 
-bool row_view::fits(const std::vector<json_cell>& cells) const {
-    return std::equal(
-        cells.begin(), cells.end(), heads_.begin(), heads_.end(),
-        [](const json_cell& cell, const head& h) { return cell.path == h.title && width_of(cell.text) <= h.width; });
+bool row_printer::fits(const std::vector<json_cell>& cells) const {
+    return std::equal(cells.begin(), cells.end(), headers_.begin(), headers_.end(),
+                      [](const json_cell& cell, const table_header& h) {
+                          return cell.path == h.title && width_of(cell.text) <= h.width;
+                      });
 }
 
-std::string row_view::line_of(const std::vector<json_cell>& cells) const {
+std::string row_printer::line_of(const std::vector<json_cell>& cells) const {
     std::string line;
     for (std::size_t i = 0; i < cells.size(); ++i) {
-        line += padded(cells[i].text, heads_[i].width, heads_[i].numbers) + std::string(gap, ' ');
+        line += padded(cells[i].text, headers_[i].width, headers_[i].numbers) + std::string(gap, ' ');
     }
     return line;
 }
 
-std::string row_view::add(std::string_view json, std::vector<json_cell> leading) {
+std::string row_printer::add(std::string_view json, std::vector<json_cell> leading) {
     auto node = parse_json(json);
     if (node.kind != json_node::type::object) {
         json_node holder{.kind = json_node::type::object};
@@ -167,18 +167,19 @@ std::string row_view::add(std::string_view json, std::vector<json_cell> leading)
 
     std::string out;
     if (!fits(cells)) {
-        out.append(heads_.empty() ? "" : "\n");
+        out.append(headers_.empty() ? "" : "\n");
         std::vector<json_cell> titles;
-        std::vector<head> heads;
+        std::vector<table_header> headers;
         for (const auto& cell : cells) {
-            // A column that has been wider stays so, or rows of several publishers would repeat the header for ever.
-            const auto before =
-                std::find_if(heads_.begin(), heads_.end(), [&](const head& h) { return h.title == cell.path; });
-            const auto width = before == heads_.end() ? 0 : before->width;
-            heads.push_back({cell.path, std::max({width_of(cell.path), room_for(cell), width}), cell.is_number});
+            // A column never becomes narrower; otherwise rows of several publishers would repeat the header each time.
+            const auto before = std::find_if(headers_.begin(), headers_.end(),
+                                             [&](const table_header& h) { return h.title == cell.path; });
+            const auto width = before == headers_.end() ? 0 : before->width;
+            headers.push_back(
+                {cell.path, std::max({width_of(cell.path), reserved_width(cell), width}), cell.is_number});
             titles.push_back({cell.path, cell.path, false});
         }
-        heads_ = std::move(heads);
+        headers_ = std::move(headers);
         append_line(out, line_of(titles), true);
     }
     append_line(out, line_of(cells), false);

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "output/terminal.hpp"
 
+#include "output/errors.hpp"
+
 #include <array>
+#include <cerrno>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <stdexcept>
+#include <system_error>
 
+#include <poll.h>
 #include <unistd.h>
 
 namespace tool {
@@ -23,7 +29,7 @@ std::string styled(stream s, std::string_view style, std::string_view text) {
     return std::string{"\x1b["}.append(style).append("m").append(text).append("\x1b[0m");
 }
 
-bool is_unfit(std::uint32_t c) {
+bool needs_escape(std::uint32_t c) {
     return c < 0x20 || (c >= 0x7f && c <= 0x9f) || (c >= 0x202a && c <= 0x202e) || (c >= 0x2066 && c <= 0x2069);
 }
 
@@ -39,7 +45,7 @@ void append_escape(std::uint32_t c, std::string& out) {
     out += escape.data();
 }
 
-// The character that begins the text, and the bytes it takes; 0 bytes where it is no UTF-8.
+// The character that begins the text, and the bytes it takes; 0 bytes where it is not UTF-8.
 std::size_t decode(std::string_view text, std::uint32_t& c) {
     const auto first = static_cast<unsigned char>(text.front());
     const std::size_t length = first < 0x80                    ? 1
@@ -86,7 +92,7 @@ std::string printable(std::string_view text) {
         if (length == 0) {
             out += "\xef\xbf\xbd"; // U+FFFD
             length = 1;
-        } else if (is_unfit(c)) {
+        } else if (needs_escape(c)) {
             append_escape(c, out);
         } else {
             out += text.substr(0, length);
@@ -102,6 +108,39 @@ std::size_t width_of(std::string_view text) {
         width += (static_cast<unsigned char>(c) & 0xc0U) != 0x80 ? 1 : 0;
     }
     return width;
+}
+
+std::string padded(std::string text, std::size_t width, bool align_right) {
+    const auto used = width_of(text);
+    if (used < width) {
+        text.insert(align_right ? 0 : text.size(), width - used, ' ');
+    }
+    return text;
+}
+
+void write_output(std::string_view text) {
+    while (!text.empty()) {
+        const auto written = ::write(STDOUT_FILENO, text.data(), text.size());
+        if (written >= 0) {
+            text.remove_prefix(static_cast<std::size_t>(written));
+        } else if (errno == EAGAIN) { // another process that shares the pipe made it non-blocking
+            pollfd out{STDOUT_FILENO, POLLOUT, 0};
+            ::poll(&out, 1, -1);
+        } else if (errno == EPIPE) {
+            throw output_closed{};
+        } else if (errno == EINTR) {
+            throw output_interrupted{};
+        } else {
+            throw std::runtime_error("cannot write the output: " + std::generic_category().message(errno));
+        }
+    }
+}
+
+void write_stderr(std::string_view text) { std::fwrite(text.data(), 1, text.size(), stderr); }
+
+bool is_output_closed() {
+    pollfd out{STDOUT_FILENO, 0, 0};
+    return ::poll(&out, 1, 0) == 1 && (out.revents & (POLLERR | POLLHUP)) != 0;
 }
 
 } // namespace tool

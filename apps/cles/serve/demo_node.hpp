@@ -10,11 +10,11 @@
 
 namespace tool {
 
-/// A node to play with: a moving vehicle that tells where it is, and the tasks of play_tasks.hpp.
-class play_node {
+/// A node to experiment with: a moving vehicle that publishes its position, and the tasks of demo_tasks.hpp.
+class demo_node {
   public:
-    /// `rate`: how often a second the localization is published; 0: only pulled.
-    play_node(boost::asio::io_context& io, cles::service_options options, double rate);
+    /// `rate`: publications of the localization per second; 0: it can only be pulled.
+    demo_node(boost::asio::io_context& io, cles::service_options options, double rate);
 
     cles::service& service() noexcept { return service_; }
     void stop();

@@ -7,7 +7,7 @@ class registrar;
 
 namespace tool {
 
-/// The tasks of `cles serve` that need no publisher: echo, sleep, fail, notice.
-void register_play_tasks(cles::registrar& tasks);
+/// The tasks of `cles serve` besides localization: echo, sleep, fail, notice.
+void register_demo_tasks(cles::registrar& tasks);
 
 } // namespace tool

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "commands.hpp"
-#include "commands/completion_scripts.hpp"
-#include "context.hpp"
-#include "output/output.hpp"
+#include "output/terminal.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -12,17 +10,42 @@
 #include <iterator>
 #include <memory>
 #include <string>
+#include <string_view>
 
 namespace tool {
+namespace {
+
+/// What a shell reads to complete `cles`: a file of apps/completion, which the build embeds.
+struct completion_script {
+    std::string_view shell;
+    std::string_view text;
+};
+
+constexpr completion_script completion_scripts[] = {
+    {
+        "bash",
+#include "cles.bash.inc"
+    },
+    {
+        "zsh",
+#include "_cles.inc"
+    },
+    {
+        "fish",
+#include "cles.fish.inc"
+    },
+};
+
+} // namespace
 
 void add_completion(CLI::App& app, context& shared) {
     auto shell = std::make_shared<std::string>();
-    auto* command = app.add_subcommand("completion", "Print what a shell needs to complete nouns and options");
+    auto* command = app.add_subcommand("completion", "Print the completion script for a shell");
     command->add_option("shell", *shell, "bash, zsh or fish")
         ->required()
         ->type_name("")
         ->check(CLI::IsMember({"bash", "zsh", "fish"}).description(""));
-    command->footer("An installed cles brings it along. Nodes and their tasks are asked for while you type.\n\n"
+    command->footer("An installation of cles includes the scripts. They ask nodes for their tasks while you type.\n\n"
                     "Examples:\n"
                     "  source <(cles completion bash)                         # in ~/.bashrc\n"
                     "  source <(cles completion zsh)                          # in ~/.zshrc, after compinit\n"
