@@ -4,7 +4,6 @@
 #include <cles/service.hpp>
 
 #include "events.hpp"
-#include "some_run.hpp"
 #include "strike/order.hpp"
 
 #include <boost/asio/co_spawn.hpp>

@@ -3,6 +3,7 @@
 
 #include <cles/convert.hpp>
 
+#include <random>
 #include <string>
 #include <string_view>
 
@@ -31,5 +32,11 @@ class events {
 
 /// A number with so many digits behind the point.
 std::string fixed(double number, int digits);
+
+/// No other run has the same, so that what is named after it is no other run's.
+inline std::string some_run() {
+    std::random_device chance;
+    return std::to_string(chance());
+}
 
 } // namespace jadc2

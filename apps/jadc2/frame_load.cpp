@@ -3,10 +3,10 @@
 
 #include <cles/service.hpp>
 
+#include "events.hpp"
 #include "fmv/base64.hpp"
 #include "fmv/messages.hpp"
 #include "scene.hpp"
-#include "some_run.hpp"
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>

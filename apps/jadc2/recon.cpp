@@ -2,7 +2,6 @@
 #include "recon.hpp"
 
 #include "fmv/base64.hpp"
-#include "some_run.hpp"
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "vehicle_node.hpp"
 
-#include "own_address.hpp"
 #include "simulation.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -9,17 +8,28 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/describe/enum_to_string.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <memory>
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 
 namespace platoon {
 
 namespace asio = boost::asio;
+using namespace std::chrono_literals;
 using steady = std::chrono::steady_clock;
 
 namespace {
 
+constexpr double approach = 40;     // m from the last vehicle, where it begins
+constexpr double one_at_a_time = 5; // s for which one that was let in is waited for
+constexpr double asks_for = 2 * one_at_a_time;
 constexpr std::size_t most_latencies = 1'000'000; // kept of one drive
 constexpr double leaves_for = 1;                  // s for which it tells that it leaves
 
@@ -31,6 +41,23 @@ std::string reason_of(const std::exception_ptr& failure) {
     }
 }
 
+// The IPv4 address of an interface of this host; 127.0.0.1 if it is loopback, or has none.
+std::string own_address(const std::string& interface_name) {
+    ifaddrs* first = nullptr;
+    const bool told = ::getifaddrs(&first) == 0;
+    const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> all{first, &::freeifaddrs};
+    for (const auto* each = told ? first : nullptr; each != nullptr; each = each->ifa_next) {
+        std::array<char, INET_ADDRSTRLEN> text{};
+        if (interface_name == each->ifa_name && (each->ifa_flags & IFF_LOOPBACK) == 0 && each->ifa_addr != nullptr &&
+            each->ifa_addr->sa_family == AF_INET) {
+            const auto* at = reinterpret_cast<const sockaddr_in*>(each->ifa_addr);
+            ::inet_ntop(AF_INET, &at->sin_addr, text.data(), text.size());
+            return text.data();
+        }
+    }
+    return "127.0.0.1";
+}
+
 // By each interface at its address there, so that nodes on that network can reach this one.
 std::vector<std::string> listen_at(const cles::multicast_options& group) {
     std::vector<std::string> urls;
@@ -38,6 +65,19 @@ std::vector<std::string> listen_at(const cles::multicast_options& group) {
         urls.push_back("tcp://" + own_address(interface) + ":0");
     }
     return urls;
+}
+
+/// The last of a platoon: whom nobody follows, and of several such the one that is farthest behind.
+std::string last_of(const std::map<std::string, state>& heard) {
+    std::string last;
+    for (const auto& [name, at] : heard) {
+        const bool followed = std::any_of(heard.begin(), heard.end(),
+                                          [&name = name](const auto& other) { return other.second.ahead == name; });
+        if (!followed && (last.empty() || at.x < heard.at(last).x)) {
+            last = name;
+        }
+    }
+    return last;
 }
 
 } // namespace
@@ -109,6 +149,74 @@ void vehicle_node::begin(const driver_setup& setup) {
 void vehicle_node::note(double at, const std::string& mode, const std::string& why) {
     std::fprintf(stderr, "%8.3f s  %s  %s: %s\n", at, report_.vehicle.c_str(), mode.c_str(), why.c_str());
     report_.events.push_back({at, report_.vehicle, mode, why});
+}
+
+void vehicle_node::be_followed(const applicant& who) {
+    if (!driver_ || left_at_) {
+        throw cles::error(cles::errc::busy, report_.vehicle + " is about to leave, or not there yet");
+    }
+    if (!follower_.empty() && follower_ != who.name && now() < followed_at_ + one_at_a_time) {
+        throw cles::error(cles::errc::busy, follower_ + " joins behind " + report_.vehicle + " just now");
+    }
+    follower_ = who.name;
+    followed_at_ = now();
+}
+
+asio::awaitable<std::map<std::string, state>> vehicle_node::listen() {
+    std::map<std::string, state> heard;
+    auto feed = co_await service_.async_bind<state>("all:state");
+    asio::steady_timer enough{io_, 300ms + std::chrono::milliseconds{static_cast<int>(3000 / options_.setup.hz)}};
+    enough.async_wait([&feed](boost::system::error_code failed) {
+        if (!failed) {
+            feed.close();
+        }
+    });
+    try {
+        for (;;) {
+            const auto item = co_await feed.async_next();
+            if (item.has_value()) {
+                heard[item.publisher] = item.value;
+            }
+        }
+    } catch (const cles::error& e) {
+        if (e.code() != cles::errc::cancelled) {
+            throw;
+        }
+    }
+    co_return heard;
+}
+
+asio::awaitable<void> vehicle_node::join() {
+    const applicant self{options_.setup.name};
+    for (const double until = now() + asks_for;;) {
+        const auto heard = co_await listen();
+        if (heard.empty()) {
+            throw cles::error(cles::errc::no_target, "nobody leads: no vehicle is heard in the group " +
+                                                         options_.group.group + ":" +
+                                                         std::to_string(options_.group.port));
+        }
+        if (heard.contains(self.name)) {
+            throw cles::error(cles::errc::invalid_name, "a vehicle named " + self.name + " is on the road already");
+        }
+        const auto last = last_of(heard);
+        std::optional<cles::error> refused;
+        try {
+            co_await service_.async_push(last + ":join", self);
+        } catch (const cles::error& e) {
+            refused = e;
+        }
+        if (!refused) {
+            auto setup = options_.setup;
+            const auto& at = heard.at(last);
+            setup.ahead = last;
+            setup.start = {at.x - approach, at.v, 0};
+            begin(setup);
+            co_return;
+        }
+        if (now() >= until) {
+            throw cles::error(refused->code(), refused->message());
+        }
+    }
 }
 
 asio::awaitable<void> vehicle_node::drive() {

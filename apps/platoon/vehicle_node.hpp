@@ -5,7 +5,7 @@
 
 #include "driver.hpp"
 #include "impairment.hpp"
-#include "report.hpp"
+#include "recording.hpp"
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
