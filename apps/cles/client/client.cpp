@@ -169,8 +169,8 @@ asio::awaitable<void> client::suggest_task() {
     const auto task = noun_.substr(node.size() + 1, noun_.find('/') - node.size() - 1);
     try {
         const auto options = options_for(node, 500ms);
-        const cles::json_text about = co_await node_.async_pull(node + ":cles", options);
-        const auto offered = verbs_by_task(about.text);
+        const cles::json_text answer = co_await node_.async_pull(node + ":cles", options);
+        const auto offered = verbs_by_task(answer.text);
         std::vector<std::string> names;
         names.reserve(offered.size());
         for (const auto& [name, verbs] : offered) {

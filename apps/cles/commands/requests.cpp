@@ -110,7 +110,7 @@ int run_request(const request_arguments& args, int verbosity) {
 }
 
 void add_request(CLI::App& app, context& shared, cles::verb verb, const std::string& name, const std::string& help,
-                 const std::string& footer) {
+                 const std::string& examples) {
     auto args = std::make_shared<request_arguments>(request_arguments{.verb = verb});
     auto* command = app.add_subcommand(name, help);
     add_noun(*command, args->noun);
@@ -131,7 +131,7 @@ void add_request(CLI::App& app, context& shared, cles::verb verb, const std::str
         command->add_flag("--progress", args->progress,
                           "Show progress, a line per report, even if stderr is not a terminal");
     }
-    command->footer(footer);
+    command->footer(examples);
     command->callback([args, &shared] { shared.exit_code = run_request(*args, shared.verbosity); });
 }
 
