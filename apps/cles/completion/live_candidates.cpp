@@ -61,7 +61,7 @@ asio::awaitable<std::vector<std::string>> descriptions(client& requester, const 
         }
         co_return out;
     }
-    const auto nodes = co_await find_nodes_soon(requester, addresses, until);
+    const auto nodes = co_await find_nodes_quickly(requester, addresses, until);
     std::vector<std::string> urls;
     for (const auto& one : nodes) {
         if (urls.size() < max_described && !one.endpoints.empty()) {
@@ -81,7 +81,7 @@ asio::awaitable<std::vector<std::string>> descriptions(client& requester, const 
 
 asio::awaitable<std::vector<candidate>> live_names(client& requester, const address_book& addresses,
                                                    steady::time_point until) {
-    const auto nodes = co_await find_nodes_soon(requester, addresses, until);
+    const auto nodes = co_await find_nodes_quickly(requester, addresses, until);
     std::vector<candidate> out;
     for (const auto& node : nodes) {
         const auto url = node.url();
@@ -93,7 +93,7 @@ asio::awaitable<std::vector<candidate>> live_names(client& requester, const addr
 
 asio::awaitable<std::vector<candidate>> live_urls(client& requester, const address_book& addresses,
                                                   steady::time_point until) {
-    const auto nodes = co_await find_nodes_soon(requester, addresses, until);
+    const auto nodes = co_await find_nodes_quickly(requester, addresses, until);
     std::vector<candidate> out;
     for (const auto& node : nodes) {
         for (const auto& url : node.endpoints) {
