@@ -200,7 +200,7 @@ std::string mission::explain(const cles::error& why) const {
     if (why.code() != cles::errc::no_target) {
         return why.what();
     }
-    return node_.peers().empty() ? "no node answers where it was record to ask (--strike): is clesd running there?"
+    return node_.peers().empty() ? "no node answers at the given address (--strike): is clesd running there?"
                                  : why.message() + ": is libcles-strike.so among the plugins of a node?";
 }
 

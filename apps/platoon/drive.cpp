@@ -31,7 +31,7 @@ namespace {
 
 constexpr auto poll_interval = 20ms;
 constexpr auto discovery_time = 400ms;
-constexpr double shutdown_timeout = 10; // s
+constexpr double process_timeout = 10; // s
 
 class drive_supervisor {
   public:
@@ -130,7 +130,7 @@ class drive_supervisor {
             if (book_.has_ended(*missing)) {
                 throw cles::error(cles::errc::unavailable, *missing + " did not start: " + last_line(*missing));
             }
-            if (now() > shutdown_timeout) {
+            if (now() > process_timeout) {
                 throw cles::error(cles::errc::deadline, *missing + " is not received: check that " +
                                                             options_.group.interface + " supports multicast");
             }
@@ -250,7 +250,7 @@ class drive_supervisor {
         const auto running = [this] {
             return std::any_of(children_.begin(), children_.end(), [](auto& one) { return one.second.running(); });
         };
-        for (const double until = now() + shutdown_timeout; running() && now() < until;) {
+        for (const double until = now() + process_timeout; running() && now() < until;) {
             co_await pause(poll_interval);
         }
     }

@@ -265,7 +265,7 @@ asio::awaitable<void> vehicle_node::hear(std::string name) {
     while (driver_->needs(name)) {
         const auto item = co_await feed.async_next();
         if (item.has_value()) {
-            take(name, item.value, !first);
+            receive(name, item.value, !first);
             first = false;
         } else if (item.kind == cles::feed_event::gap) {
             report_.missed += item.missed;
