@@ -70,17 +70,28 @@ install(FILES "${PROJECT_BINARY_DIR}/package/cles.pc" DESTINATION "${CMAKE_INSTA
 
 # --- The programs ------------------------------------------------------------------------------------------------------
 
-foreach(program IN ITEMS cles_command clesd cles_dsgd cles_jadc2 cles_platoon)
+foreach(program IN ITEMS cles_command clesd)
     if(TARGET ${program})
         install(TARGETS ${program} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
     endif()
 endforeach()
 
-# --- Plugins that come along -------------------------------------------------------------------------------------------
+# --- Plugins -----------------------------------------------------------------------------------------------------------
 
-foreach(plugin IN ITEMS cles_plugin_system cles_plugin_primes cles_plugin_sgd cles_plugin_fmv cles_plugin_strike)
+foreach(plugin IN ITEMS cles_plugin_system cles_plugin_primes)
     if(TARGET ${plugin})
         install(TARGETS ${plugin} LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/cles")
+    endif()
+endforeach()
+
+# --- The case studies --------------------------------------------------------------------------------------------------
+
+# Only installed by `cmake --install BUILD --component case_studies`.
+foreach(target IN ITEMS cles_dsgd cles_jadc2 cles_platoon cles_plugin_sgd cles_plugin_fmv cles_plugin_strike)
+    if(TARGET ${target})
+        install(TARGETS ${target}
+            RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT case_studies EXCLUDE_FROM_ALL
+            LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/cles" COMPONENT case_studies EXCLUDE_FROM_ALL)
     endif()
 endforeach()
 

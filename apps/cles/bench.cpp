@@ -6,9 +6,8 @@
 
 #include "bench_arguments.hpp"
 #include "bench_run.hpp"
-#include "diagnostics.hpp"
-#include "exit_code.hpp"
-#include "output.hpp"
+#include "output/errors.hpp"
+#include "output/terminal.hpp"
 #include "perf/pinning.hpp"
 
 #include <CLI/CLI.hpp>

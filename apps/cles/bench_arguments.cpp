@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "bench_arguments.hpp"
 
-#include "duration.hpp"
-#include "failure.hpp"
+#include "options/duration.hpp"
+#include "output/errors.hpp"
 
 #include <CLI/CLI.hpp>
 

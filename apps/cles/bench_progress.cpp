@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "bench_progress.hpp"
 
-#include "terminal.hpp"
+#include "output/terminal.hpp"
 
 #include <cstdio>
 #include <string>

@@ -4,7 +4,7 @@
 #include "bench_latency.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
-#include "diagnostics.hpp"
+#include "output/errors.hpp"
 #include "perf/child_process.hpp"
 #include "perf/core_load.hpp"
 #include "perf/latency_recorder.hpp"

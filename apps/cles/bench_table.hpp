@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "statistics.hpp"
-#include "table.hpp"
+#include "output/statistics.hpp"
+#include "output/table.hpp"
 
 #include <cstdint>
 #include <optional>

@@ -73,8 +73,22 @@ def check_daemon(consumer: Consumer, clesd: Path) -> None:
     expect(daemon.returncode == 0 and "plugin system" in log, f"clesd ended with {daemon.returncode}:\n{log}")
 
 
+def check_case_studies(consumer: Consumer, prefix: Path) -> None:
+    """The programs and plugins of the case studies are only installed as a component."""
+    wanted = {"cles-dsgd", "cles-jadc2", "cles-platoon", "libcles-fmv.so", "libcles-sgd.so", "libcles-strike.so"}
+    by_default = wanted & {file.name for file in prefix.rglob("*")}
+    expect(not by_default, f"installed without being asked for: {by_default}")
+
+    component = consumer.scratch / "case_studies"
+    consumer.run(consumer.options.cmake, "--install", consumer.options.build, "--prefix", component,
+                 "--component", "case_studies")
+    installed = {file.name for file in component.rglob("*") if file.is_file()}
+    expect(installed == wanted, f"the component contains {installed}, not {wanted}")
+
+
 def install(consumer: Consumer) -> None:
     prefix = consumer.install()
+    check_case_studies(consumer, prefix)
     source = consumer.options.source
     for public in (source / "libcles" / "include").rglob("*.hpp"):
         name = public.relative_to(source / "libcles")
