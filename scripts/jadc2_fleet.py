@@ -15,7 +15,7 @@ import tempfile
 import threading
 import time
 
-sys.path.append(os.path.join(os.path.dirname(__file__), "..", "perf", "evaluate"))
+sys.path.append(os.path.join(os.path.dirname(__file__), "..", "perf", "evaluation"))
 from clean_environment import clean_environment  # noqa: E402
 from in_one_piece import InOnePiece  # noqa: E402
 

@@ -9,7 +9,7 @@
 #include "diagnostics.hpp"
 #include "exit_code.hpp"
 #include "output.hpp"
-#include "perf/pinning.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <CLI/CLI.hpp>
 

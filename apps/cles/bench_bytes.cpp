@@ -2,8 +2,8 @@
 #include "bench_medians.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
-#include "perf/icd_packet.hpp"
-#include "perf/wire_bytes.hpp"
+#include "perf/baseline/packet.hpp"
+#include "perf/messages/wire_bytes.hpp"
 
 #include <string>
 

@@ -2,10 +2,9 @@
 #include "bench_fan_out_ends.hpp"
 
 #include "bench_medians.hpp"
-#include "perf/cpu_clock.hpp"
-#include "perf/fan_out_binders.hpp"
-#include "perf/fan_out_publisher.hpp"
-#include "perf/icd_publisher.hpp"
+#include "perf/baseline/publisher.hpp"
+#include "perf/fan_out/fan_out_exchange.hpp"
+#include "perf/support/clock.hpp"
 
 #include <algorithm>
 

@@ -6,11 +6,11 @@
 
 #include "bench_fan_out_report.hpp"
 #include "bench_options.hpp"
-#include "perf/child_process.hpp"
-#include "perf/fan_out.hpp"
-#include "perf/icd_binders.hpp"
-#include "perf/latency_recorder.hpp"
-#include "perf/multicast_socket.hpp"
+#include "perf/baseline/binders.hpp"
+#include "perf/fan_out/fan_out.hpp"
+#include "perf/support/child_process.hpp"
+#include "perf/support/latency_recorder.hpp"
+#include "perf/support/multicast_socket.hpp"
 
 #include <boost/asio/io_context.hpp>
 

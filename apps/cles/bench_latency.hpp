@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "perf/latency_recorder.hpp"
+#include "perf/support/latency_recorder.hpp"
 
 #include <boost/describe/class.hpp>
 

@@ -3,8 +3,8 @@
 
 #include <cles/run.hpp>
 
-#include "perf/handler_style.hpp"
-#include "perf/pinning.hpp"
+#include "perf/support/handler_style.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <chrono>
 #include <cstddef>

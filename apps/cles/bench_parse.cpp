@@ -2,8 +2,8 @@
 #include "bench_medians.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
-#include "perf/line_costs.hpp"
-#include "perf/pinning.hpp"
+#include "perf/messages/line_costs.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <algorithm>
 #include <string>

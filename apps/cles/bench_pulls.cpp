@@ -4,14 +4,14 @@
 #include "bench_medians.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
-#include "perf/byte_tap.hpp"
-#include "perf/child_process.hpp"
-#include "perf/cpu_clock.hpp"
-#include "perf/icd_exchange.hpp"
-#include "perf/icd_packet.hpp"
-#include "perf/latency_recorder.hpp"
-#include "perf/pinning.hpp"
-#include "perf/pull_exchange.hpp"
+#include "perf/baseline/exchange.hpp"
+#include "perf/baseline/packet.hpp"
+#include "perf/messages/byte_tap.hpp"
+#include "perf/pull/pull_exchange.hpp"
+#include "perf/support/child_process.hpp"
+#include "perf/support/clock.hpp"
+#include "perf/support/latency_recorder.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <boost/asio/io_context.hpp>
 

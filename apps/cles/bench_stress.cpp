@@ -5,11 +5,11 @@
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
 #include "diagnostics.hpp"
-#include "perf/child_process.hpp"
-#include "perf/core_load.hpp"
-#include "perf/latency_recorder.hpp"
-#include "perf/pinning.hpp"
-#include "perf/pull_exchange.hpp"
+#include "perf/pull/core_load.hpp"
+#include "perf/pull/pull_exchange.hpp"
+#include "perf/support/child_process.hpp"
+#include "perf/support/latency_recorder.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <boost/asio/io_context.hpp>
 

@@ -4,11 +4,11 @@
 #include "bench_medians.hpp"
 #include "bench_progress.hpp"
 #include "bench_run.hpp"
-#include "perf/byte_tap.hpp"
-#include "perf/child_process.hpp"
-#include "perf/cpu_clock.hpp"
-#include "perf/pinning.hpp"
-#include "perf/update_exchange.hpp"
+#include "perf/fan_out/update_exchange.hpp"
+#include "perf/messages/byte_tap.hpp"
+#include "perf/support/child_process.hpp"
+#include "perf/support/clock.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <boost/asio/io_context.hpp>
 

@@ -2,8 +2,8 @@
 #include "broker.hpp"
 
 #include "peer.hpp"
-#include "perf/descriptor.hpp"
-#include "perf/pinning.hpp"
+#include "perf/support/descriptor.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <cstdlib>
 #include <stdexcept>

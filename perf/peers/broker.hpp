@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "perf/child_process.hpp"
+#include "perf/support/child_process.hpp"
 
 #include <cstdint>
 #include <filesystem>

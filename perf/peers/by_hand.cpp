@@ -2,10 +2,10 @@
 // The hand-written exchange, against which all others are held: packed structs on blocking sockets.
 #include "packets.hpp"
 #include "peer.hpp"
-#include "perf/bare_socket.hpp"
-#include "perf/icd_binders.hpp"
-#include "perf/icd_exchange.hpp"
-#include "perf/icd_publisher.hpp"
+#include "perf/baseline/binders.hpp"
+#include "perf/baseline/exchange.hpp"
+#include "perf/baseline/publisher.hpp"
+#include "perf/support/bare_socket.hpp"
 
 #include <array>
 #include <optional>

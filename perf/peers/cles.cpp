@@ -5,11 +5,10 @@
 #include <cles/version.hpp>
 
 #include "peer.hpp"
-#include "perf/delegate_load.hpp"
-#include "perf/fan_out_binders.hpp"
-#include "perf/fan_out_publisher.hpp"
-#include "perf/multicast_socket.hpp"
-#include "perf/pull_exchange.hpp"
+#include "perf/fan_out/fan_out_exchange.hpp"
+#include "perf/jobs/delegate_load.hpp"
+#include "perf/pull/pull_exchange.hpp"
+#include "perf/support/multicast_socket.hpp"
 
 #include <boost/asio/io_context.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "footprint.hpp"
+#include "figures.hpp"
 
 #include <algorithm>
 #include <array>

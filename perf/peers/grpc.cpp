@@ -2,8 +2,8 @@
 // gRPC: unary calls to an asynchronous server with one completion queue and one thread. One call at a time blocks; many
 // wait on a completion queue. All go through one channel. The fan-out is a stream to each subscriber, by the callback
 // API on both sides, each subscriber with a channel and a connection of its own. The transport sets TCP_NODELAY itself.
-#include "grpc_calls.hpp"
-#include "grpc_streams.hpp"
+#include "grpc.hpp"
+
 #include "ordered_fan_out.hpp"
 #include "peer.hpp"
 

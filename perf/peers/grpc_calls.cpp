@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "grpc_calls.hpp"
-
+#include "grpc.hpp"
 #include "localization.grpc.pb.h"
-#include "perf/localization.hpp"
+#include "perf/support/localization.hpp"
 
 #include <optional>
 #include <stdexcept>

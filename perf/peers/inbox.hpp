@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "perf/fan_out.hpp"
+#include "perf/fan_out/fan_out.hpp"
 
 #include <chrono>
 #include <condition_variable>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "figures.hpp"
-#include "perf/cpu_clock.hpp"
-#include "perf/pinning.hpp"
+#include "perf/support/clock.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <algorithm>
 #include <chrono>

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "ordered_fan_out.hpp"
 
-#include "perf/bare_socket.hpp"
-#include "perf/wait_until.hpp"
+#include "perf/support/bare_socket.hpp"
+#include "perf/support/clock.hpp"
 
 #include <array>
 #include <cstdint>

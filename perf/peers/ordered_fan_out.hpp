@@ -3,7 +3,7 @@
 
 #include "inbox.hpp"
 #include "peer.hpp"
-#include "perf/descriptor.hpp"
+#include "perf/support/descriptor.hpp"
 
 #include <chrono>
 #include <cstddef>

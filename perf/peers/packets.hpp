@@ -2,8 +2,8 @@
 #pragma once
 
 #include "peer.hpp"
-#include "perf/icd_packet.hpp"
-#include "perf/icd_update.hpp"
+#include "perf/baseline/packet.hpp"
+#include "perf/baseline/update_packet.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "perf/child_process.hpp"
-#include "perf/fan_out.hpp"
-#include "perf/latency_recorder.hpp"
+#include "perf/fan_out/fan_out.hpp"
+#include "perf/support/child_process.hpp"
+#include "perf/support/latency_recorder.hpp"
 
 #include <chrono>
 #include <cstddef>

@@ -42,7 +42,7 @@ def _of_figure(each):
 
 
 def _of_table(raw):
-    """Those of distributed stochastic gradient descent, as perf/evaluate/dsgd.py writes them."""
+    """Those of distributed stochastic gradient descent, as perf/evaluation/dsgd.py writes them."""
     checks = raw["checks"]
     for row in raw["rows"]:
         yield _summarised(row["elapsed_ms"], row["name"], row["meaning"] + ", elapsed", "ms", paper=row["paper_ms"])

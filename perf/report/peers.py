@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""What perf/evaluate/peers.py measured of other middleware: rows that can be read, and a picture."""
+"""What perf/evaluation/peers.py measured of other middleware: rows that can be read, and a picture."""
 
 from .gnuplot import Missing, block, draw, quoted
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""What is measured: a script of perf/evaluate for each section of the report, in the order in which they are told."""
+"""What is measured: a script of perf/evaluation for each section of the report, in the order in which they are told."""
 
 import os
 from dataclasses import dataclass

@@ -166,7 +166,7 @@ class Parse(unittest.TestCase):
     def test_the_plot_is_made_of_the_json(self):
         code, out, err = cles("bench", "--parse", "--requests", "2", "--rounds", "1", "-o", "json")
         self.assertEqual((code, err), (0, ""))
-        script = os.path.join(os.path.dirname(__file__), "..", "..", "perf", "plot_parse.py")
+        script = os.path.join(os.path.dirname(__file__), "..", "..", "perf", "messages", "plot_parse.py")
         plot = subprocess.run([sys.executable, script], input=out, capture_output=True, text=True, check=True).stdout
         lines = [each for each in ElementTree.fromstring(plot).iter() if each.tag.endswith("polyline")]
         self.assertEqual([len(each.get("points").split()) for each in lines], [8] * 6)

@@ -32,7 +32,7 @@ class Quick(unittest.TestCase):
             page = ElementTree.parse(Path(folder) / "index.html").getroot()
             raws = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (Path(folder) / "raw").glob("*.json")}
         for name, told in run["sections"].items():
-            there = (ROOT / "perf" / "evaluate" / f"{name}.py").exists()
+            there = (ROOT / "perf" / "evaluation" / f"{name}.py").exists()
             if name != "peers":  # which only a build that was asked for has programs for
                 self.assertEqual(told["state"], "ran" if there else "skipped", (name, told))
             if told["state"] == "ran":

@@ -24,7 +24,7 @@ sys.path[:0] = [str(ROOT / "perf")]
 from report.figures import figures_of, text_of  # noqa: E402
 
 FIGURE_FORM = {
-    "title": "Of the common form", "command": "perf/evaluate/latency.py", "date": "2026-01-02T03:04:05+00:00",
+    "title": "Of the common form", "command": "perf/evaluation/latency.py", "date": "2026-01-02T03:04:05+00:00",
     "machine": {"system": "Linux", "processor": "a <processor> & more", "cores": 2}, "skipped": [],
     "figures": [
         {"name": "one_way", "what": "one way & back <tagged>", "value": 12.5, "low": 11.25, "high": 13.75, "unit": "ms",
@@ -37,7 +37,7 @@ FIGURE_FORM = {
                "odd": {"neither": "nor"}},
     "pictures": [{"name": "own", "title": "Drawn by itself", "svg": '<svg xmlns="http://www.w3.org/2000/svg"/>'},
                  {"name": "broken", "title": "Not well-formed", "svg": "<svg><g></svg>"}]}
-ROWS = {"title": "Rows", "command": "perf/evaluate/rows.py", "machine": "a machine", "date": "2026-01-02",
+ROWS = {"title": "Rows", "command": "perf/evaluation/rows.py", "machine": "a machine", "date": "2026-01-02",
         "skipped": [{"name": "other", "reason": "it is not installed"}],
         "rows": [{"who": "by hand", "p50_us": {"median": 20.5, "low": 19.0, "high": 22.0}, "ratio": 1.0},
                  {"who": "a broker", "p50_us": None, "ratio": 2.25, "because": ["of", "this"]}]}

@@ -67,18 +67,18 @@ class Tree:
         self.root = Path(holder.name)
         self.build = self.root / "build" / "other"
         (self.build / "apps").mkdir(parents=True)
-        (self.root / "perf" / "evaluate").mkdir(parents=True)
+        (self.root / "perf" / "evaluation").mkdir(parents=True)
         (self.root / "scripts").mkdir()
         shutil.copy(ROOT / "scripts" / "evaluate", self.root / "scripts" / "evaluate")
         shutil.copytree(ROOT / "perf" / "report", self.root / "perf" / "report", ignore=shutil.ignore_patterns("__pycache__"))
-        shutil.copy(ROOT / "perf" / "evaluate" / "provenance.py", self.root / "perf" / "evaluate")
+        shutil.copy(ROOT / "perf" / "evaluation" / "provenance.py", self.root / "perf" / "evaluation")
         for name, text in scripts.items():
             path = self.script(name)
             path.write_text(text, encoding="utf-8")
             path.chmod(0o755)
 
     def script(self, name):
-        return self.root / "perf" / "evaluate" / f"{name}.py"
+        return self.root / "perf" / "evaluation" / f"{name}.py"
 
     def command(self, *arguments, build=True):
         chosen = ["--build", str(self.build)] if build else []
@@ -106,8 +106,8 @@ class Sections(unittest.TestCase):
         self.assertIn("half done", done.stderr)
         self.assertIn("dsgd: ran", done.stderr)
         page = tree.report("index.html").read_text(encoding="utf-8")
-        self.assertIn("perf/evaluate/bench.py ended with 7: the road is closed", page)
-        self.assertIn("there is no perf/evaluate/platoon.py", page)
+        self.assertIn("perf/evaluation/bench.py ended with 7: the road is closed", page)
+        self.assertIn("there is no perf/evaluation/platoon.py", page)
         self.assertIn("words --quick -o build/report/raw/later.json", page)
 
     def test_what_is_not_there_is_a_failure_only_if_asked(self):
