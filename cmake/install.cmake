@@ -70,7 +70,7 @@ install(FILES "${PROJECT_BINARY_DIR}/package/cles.pc" DESTINATION "${CMAKE_INSTA
 
 # --- The programs ------------------------------------------------------------------------------------------------------
 
-foreach(program IN ITEMS cles_command clesd cles_dsgd cles_jadc2 cles_platoon)
+foreach(program IN ITEMS cles_command cles_bench clesd cles_dsgd cles_jadc2 cles_platoon)
     if(TARGET ${program})
         install(TARGETS ${program} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
     endif()

@@ -24,5 +24,7 @@ void add_doctor(CLI::App& app, context& shared);
 void add_completion(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);
 void add_help(CLI::App& app, context& shared);
+/// `words` are the arguments of this program, ended by a null pointer. Those after "bench" are passed to `cles-bench`.
+void add_bench(CLI::App& app, char** words);
 
 } // namespace tool

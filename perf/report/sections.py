@@ -18,11 +18,11 @@ SECTIONS = (
     Section("bench", "Point to point against a hand-written exchange",
             "Section 4.1, Fig. 3: a PULL of the localization takes about 1.5 ms longer than the traditional packet by a "
             "minimal TCP client and server; its 132 bytes are three times as many, and fit into a frame of 1500. Parsing "
-            "is constant for a request whose length is, and O(n) of the message.", ("cles_command",)),
+            "is constant for a request whose length is, and O(n) of the message.", ("cles_command", "cles_bench")),
     Section("latency", "Latency across links, packet size and effort",
             "Section 4 and 4.1: at most 100 ms for platooning, of which the overhead should be within a tenth; BIND and UPDATE "
             "save half of the round trip; measured on one machine and across WiFi. 30 lines of code with CLES, a tenth of "
-            "what the packet with its own TCP client and server takes.", ("cles_command", "cles_link_*", "*_localization")),
+            "what the packet with its own TCP client and server takes.", ("cles_command", "cles_bench", "cles_link_*", "*_localization")),
     Section("dsgd", "Distributed stochastic gradient descent",
             "Section 4.2, Table 2: a classifier trained by threads, and by daemons to which shards are delegated; 10 ms of "
             "overhead on one machine, less than 0.5 % of the whole.", ("clesd", "cles_dsgd", "cles_plugin_sgd")),

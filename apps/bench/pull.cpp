@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
-#include "bench_medians.hpp"
-#include "bench_progress.hpp"
-#include "bench_run.hpp"
+#include "figures.hpp"
+#include "measurements.hpp"
 #include "perf/baseline/exchange.hpp"
 #include "perf/baseline/packet.hpp"
 #include "perf/messages/byte_tap.hpp"
@@ -12,6 +11,8 @@
 #include "perf/support/clock.hpp"
 #include "perf/support/latency_recorder.hpp"
 #include "perf/support/pinning.hpp"
+#include "progress.hpp"
+#include "pull_report.hpp"
 
 #include <boost/asio/io_context.hpp>
 
@@ -31,11 +32,11 @@ namespace {
 
 constexpr std::uint64_t requests_alone = 50'000;
 constexpr std::uint64_t requests_in_flight = 1'000'000;
-// The room for a pass that is bounded by time: more than can come in a second, and no more than memory bears.
-constexpr std::uint64_t most_per_second_alone = 1'000'000;
-constexpr std::uint64_t most_per_second_in_flight = 4'000'000;
-constexpr std::uint64_t most_recorded = 20'000'000;
-constexpr std::uint64_t pulls_whose_bytes_count = 5'000;
+// The capacity for a pass of limited duration: more than a second can bring, but limited by memory.
+constexpr std::uint64_t max_per_second_alone = 1'000'000;
+constexpr std::uint64_t max_per_second_in_flight = 4'000'000;
+constexpr std::uint64_t max_recorded = 20'000'000;
+constexpr std::uint64_t counted_pulls = 5'000;
 
 std::uint64_t requests_of(const bench_options& options) {
     if (options.requests != 0) {
@@ -44,7 +45,7 @@ std::uint64_t requests_of(const bench_options& options) {
     const bool alone = options.in_flight == 1;
     if (options.duration) {
         const auto ms = static_cast<std::uint64_t>(options.duration->count());
-        return std::min(most_recorded, ms * (alone ? most_per_second_alone : most_per_second_in_flight) / 1000);
+        return std::min(max_recorded, ms * (alone ? max_per_second_alone : max_per_second_in_flight) / 1000);
     }
     return alone ? requests_alone : requests_in_flight;
 }
@@ -105,11 +106,10 @@ void count_bytes(const std::string& url, const std::string& node, const std::str
     boost::asio::io_context io{1};
     cles::service client{io, {.name = "bench", .peers = {{node, tap.url()}}}};
     perf::pull_load load{io, client, noun, options.style, false};
-    perf::latency_recorder record{pulls_whose_bytes_count};
+    perf::latency_recorder record{counted_pulls};
     load.run(1, std::chrono::nanoseconds::max(), record);
-    figures.request_bytes =
-        rounded(static_cast<double>(tap.to_server()) / static_cast<double>(pulls_whose_bytes_count));
-    figures.reply_bytes = rounded(static_cast<double>(tap.to_client()) / static_cast<double>(pulls_whose_bytes_count));
+    figures.request_bytes = rounded(static_cast<double>(tap.to_server()) / static_cast<double>(counted_pulls));
+    figures.reply_bytes = rounded(static_cast<double>(tap.to_client()) / static_cast<double>(counted_pulls));
 }
 
 struct named_node {
@@ -150,14 +150,14 @@ class baseline {
 
 } // namespace
 
-pull_report bench_pulls(const bench_options& options) {
+std::string measure_pulls(const bench_options& options) {
     const bool remote = !options.against.empty();
     const bool inproc = !remote && options.transport == carrier::inproc;
     const auto cores = places_of(options);
 
-    // The children come first: before there is anything of ours that they would inherit.
+    // Before this process has anything that the children would inherit.
     std::unique_ptr<baseline> by_hand;
-    std::unique_ptr<baseline> by_hand_alike; // over what carries CLES: what the sockets themselves make of it
+    std::unique_ptr<baseline> by_hand_same; // over the transport of CLES, to see what the sockets cost
     std::unique_ptr<perf::child_process> server;
     std::string url = options.against;
     if (!remote) {
@@ -165,9 +165,9 @@ pull_report bench_pulls(const bench_options& options) {
         url = bench_url(options.transport);
     }
     if (!remote && options.transport == carrier::unix_socket) {
-        by_hand_alike = std::make_unique<baseline>(cores.server, url + "-by-hand");
+        by_hand_same = std::make_unique<baseline>(cores.server, url + "-by-hand");
     } else if (!remote && options.transport == carrier::udp) {
-        by_hand_alike = std::make_unique<baseline>(cores.server, url);
+        by_hand_same = std::make_unique<baseline>(cores.server, url);
     }
     if (!remote && !inproc) {
         server =
@@ -200,7 +200,7 @@ pull_report bench_pulls(const bench_options& options) {
     const pass_meter meter{server ? std::optional{server->id()} : std::nullopt};
 
     std::vector<exchange_figures> hand_written;
-    std::vector<exchange_figures> hand_written_alike;
+    std::vector<exchange_figures> hand_written_same;
     std::vector<exchange_figures> ours;
     pull_report report{.transport = remote ? cles::parse_url(url).scheme : to_string(options.transport),
                        .style = to_string(options.style),
@@ -209,7 +209,7 @@ pull_report bench_pulls(const bench_options& options) {
                        .busy_poll_us = options.how.busy_poll.count(),
                        .wake_within_us = wake_within_us(options),
                        .client_core = cores.client};
-    const std::size_t exchanges = 1U + (by_hand ? 1U : 0U) + (by_hand_alike ? 1U : 0U);
+    const std::size_t exchanges = 1U + (by_hand ? 1U : 0U) + (by_hand_same ? 1U : 0U);
     bench_progress progress{options.rounds * exchanges};
     for (std::size_t round = 0; round < options.rounds; ++round) {
         if (by_hand) {
@@ -217,10 +217,10 @@ pull_report bench_pulls(const bench_options& options) {
             by_hand->pass(limit, by_hand_warm_up);
             hand_written.push_back(by_hand->pass(limit, by_hand_record));
         }
-        if (by_hand_alike) {
+        if (by_hand_same) {
             progress.step("hand-written exchange over " + report.transport);
-            by_hand_alike->pass(limit, by_hand_warm_up);
-            hand_written_alike.push_back(by_hand_alike->pass(limit, by_hand_record));
+            by_hand_same->pass(limit, by_hand_warm_up);
+            hand_written_same.push_back(by_hand_same->pass(limit, by_hand_record));
         }
         progress.step("CLES");
         load.run(options.in_flight, limit, warm_up);
@@ -243,11 +243,11 @@ pull_report bench_pulls(const bench_options& options) {
         report.server_core = inproc ? std::nullopt : std::optional{cores.server};
         report.icd = median_of(hand_written);
         report.ratio = ratio_of(report.cles, *report.icd);
-        if (by_hand_alike) {
-            (options.transport == carrier::udp ? report.icd_udp : report.icd_unix) = median_of(hand_written_alike);
+        if (by_hand_same) {
+            (options.transport == carrier::udp ? report.icd_udp : report.icd_unix) = median_of(hand_written_same);
         }
     }
-    return report;
+    return text_of(report, options);
 }
 
 } // namespace tool

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
-#include "bench_latency.hpp"
-#include "bench_progress.hpp"
-#include "bench_run.hpp"
 #include "diagnostics.hpp"
+#include "figures.hpp"
+#include "measurements.hpp"
 #include "perf/pull/core_load.hpp"
 #include "perf/pull/pull_exchange.hpp"
 #include "perf/support/child_process.hpp"
 #include "perf/support/latency_recorder.hpp"
 #include "perf/support/pinning.hpp"
+#include "progress.hpp"
+#include "report_table.hpp"
 
 #include <boost/asio/io_context.hpp>
+#include <boost/describe/class.hpp>
 
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -24,9 +28,47 @@ namespace perf = cles::perf;
 
 namespace {
 
-constexpr std::uint64_t stressed_requests_unless_told = 20'000;
-constexpr int hogs_per_core = 2;
-constexpr int priority = 50; // in the middle: above what is normal, below what the kernel itself needs
+/// How steady PULL is while other processes use the cores. All times are in microseconds.
+struct stress_report {
+    std::string bench = "stress";
+    std::string transport{};
+    std::string style{};
+    std::size_t rounds = 0;
+    std::uint64_t requests = 0; ///< in each pass
+    std::int64_t busy_poll_us = 0;
+    std::optional<std::int64_t> wake_within_us{}; ///< nothing: as the host has it
+    std::size_t processes = 0;                    ///< that use the cores too
+    int client_core = 0;
+    int server_core = 0;
+    latency_figures idle{};
+    std::optional<latency_figures> idle_fifo{}; ///< nothing if the system does not permit it
+    latency_figures loaded{};
+    std::optional<latency_figures> loaded_fifo{};
+};
+BOOST_DESCRIBE_STRUCT(stress_report, (),
+                      (bench, transport, style, rounds, requests, busy_poll_us, wake_within_us, processes, client_core,
+                       server_core, idle, idle_fifo, loaded, loaded_fifo))
+
+std::string table_of(const stress_report& report) {
+    rows out{{"PULL localization", "p50 us", "p99 us", "p99.9 us", "max us"}};
+    out.add("idle cores", report.idle);
+    if (report.idle_fifo) {
+        out.add("idle cores, SCHED_FIFO", *report.idle_fifo);
+    }
+    out.add("loaded cores", report.loaded);
+    if (report.idle_fifo && report.loaded_fifo) {
+        out.add("loaded cores, SCHED_FIFO", *report.loaded_fifo);
+        out.add_ratio("loaded / idle, SCHED_FIFO", *report.loaded_fifo, *report.idle_fifo);
+    }
+    return out.text() + "medians of " + std::to_string(report.rounds) + " rounds over " + report.transport + ", " +
+           report.style + "s" + waiting(report.busy_poll_us, report.wake_within_us) +
+           "; load: " + std::to_string(report.processes) + " processes that never sleep; " +
+           cores(report.client_core, report.server_core) + "\n";
+}
+
+constexpr std::uint64_t default_stressed_requests = 20'000;
+constexpr int busy_processes_per_core = 2;
+constexpr int priority = 50; // above normal processes, below what the kernel itself needs
 
 /// A node, its client, and how both are scheduled.
 class pair_of_ends {
@@ -69,13 +111,13 @@ bool may_be_real_time(const cles::run_options& how) {
 
 } // namespace
 
-stress_report bench_stress(const bench_options& options) {
-    const auto all_cores = perf::usable_cores(); // as long as this thread is not bound to one
+std::string measure_stress(const bench_options& options) {
+    const auto all_cores = perf::usable_cores(); // before this thread is pinned to one
     const auto cores = places_of(options);
     auto urgent = options.how;
     urgent.fifo_priority = priority;
 
-    // The children come first: before there is anything of ours that they would inherit.
+    // Before this process has anything that the children would inherit.
     pair_of_ends normal{cores, options, options.how};
     std::unique_ptr<pair_of_ends> real_time;
     if (may_be_real_time(urgent)) {
@@ -89,7 +131,7 @@ stress_report bench_stress(const bench_options& options) {
         real_time->connect(io);
     }
 
-    const auto requests = options.requests != 0 ? options.requests : stressed_requests_unless_told;
+    const auto requests = options.requests != 0 ? options.requests : default_stressed_requests;
     perf::latency_recorder record{requests};
     std::vector<latency_figures> idle;
     std::vector<latency_figures> idle_fifo;
@@ -108,7 +150,7 @@ stress_report bench_stress(const bench_options& options) {
         progress.step("on idle cores");
         measure(idle, idle_fifo);
         progress.step("on cores that others want");
-        const perf::core_load others{all_cores, hogs_per_core};
+        const perf::core_load others{all_cores, busy_processes_per_core};
         measure(loaded, loaded_fifo);
     }
 
@@ -118,7 +160,7 @@ stress_report bench_stress(const bench_options& options) {
                          .requests = requests,
                          .busy_poll_us = options.how.busy_poll.count(),
                          .wake_within_us = wake_within_us(options),
-                         .processes = hogs_per_core * all_cores.size(),
+                         .processes = busy_processes_per_core * all_cores.size(),
                          .client_core = cores.client,
                          .server_core = cores.server,
                          .idle = median_of(idle),
@@ -127,7 +169,7 @@ stress_report bench_stress(const bench_options& options) {
         report.idle_fifo = median_of(idle_fifo);
         report.loaded_fifo = median_of(loaded_fifo);
     }
-    return report;
+    return text_of(report, options);
 }
 
 } // namespace tool

@@ -1,48 +1,65 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_arguments.hpp"
+#include "arguments.hpp"
 
-#include "duration.hpp"
 #include "failure.hpp"
 
 #include <CLI/CLI.hpp>
 
 #include <algorithm>
-#include <chrono>
 #include <map>
 
 namespace tool {
 namespace {
 
-constexpr std::size_t most_in_flight = 4096;
-constexpr std::size_t most_binders = 1024;
-constexpr int most_wait_us = 1'000'000;
+constexpr const char* bench_description =
+    "Measure PULL of a localization packet against a hand-written exchange of packed structs over\n"
+    "blocking TCP sockets, both in one run, in turn, each server in a process of its own on another\n"
+    "core. With --updates or --fan-out, measure BIND and UPDATE instead; with --stress, the steadiness\n"
+    "of PULL; with --urgent, what it takes beside large answers; with --bytes, what all verbs put on the wire; with "
+    "--parse, what a message costs by its\n"
+    "length.";
+
+constexpr const char* bench_examples = "Examples:\n"
+                                       "  cles bench\n"
+                                       "  cles bench --transport unix\n"
+                                       "  cles bench --in-flight 64 --style callback -o json\n"
+                                       "  cles bench --busy-poll 50\n"
+                                       "  cles bench --wake-within 0\n"
+                                       "  cles bench --stress\n"
+                                       "  cles bench --urgent\n"
+                                       "  cles bench --against tcp://10.0.0.2\n"
+                                       "  cles bench --updates --binders 8\n"
+                                       "  cles bench --fan-out --binders 1,64\n"
+                                       "  cles bench --bytes\n"
+                                       "  cles bench --parse -o json\n";
+
+constexpr std::size_t max_in_flight = 4096;
+constexpr std::size_t max_binders = 1024;
+constexpr int max_wait_us = 1'000'000;
 
 const std::map<std::string, carrier> carriers{{"tcp", carrier::tcp},
                                               {"udp", carrier::udp},
                                               {"unix", carrier::unix_socket},
                                               {"inproc", carrier::inproc},
                                               {"multicast", carrier::multicast}};
-const std::map<std::string, cles::perf::handler_style> styles{{"coroutine", cles::perf::handler_style::coroutine},
-                                                              {"callback", cles::perf::handler_style::callback}};
 
-template <class Map>
-std::vector<std::string> keys_of(const Map& choices) {
-    std::vector<std::string> keys;
-    keys.reserve(choices.size());
-    for (const auto& choice : choices) {
-        keys.push_back(choice.first);
+std::vector<std::string> carrier_names() {
+    std::vector<std::string> names;
+    names.reserve(carriers.size());
+    for (const auto& each : carriers) {
+        names.push_back(each.first);
     }
-    return keys;
+    return names;
 }
 
-/// A flag that asks for another measurement than that of PULLs, and what has no meaning beside it.
+/// A flag that selects another measurement than that of PULLs, and what it excludes.
 struct mode {
     const char* flag;
     const char* help;
     measurement what;
     std::vector<const char*> refused;
     std::vector<carrier> carried_by;
-    const char* carried_why; ///< and not by others
+    const char* carried_why; ///< why not by others
 };
 
 const std::vector<mode> modes{
@@ -91,69 +108,55 @@ bool is_given(const CLI::App& command, const char* option) { return command.coun
 
 [[noreturn]] void refuse(const std::string& option, const std::string& why) { throw usage_error(option + " " + why); }
 
-void settle_mode(const CLI::App& command, bench_arguments& given) {
-    const auto asked =
+measurement selected_mode(const CLI::App& command, carrier transport) {
+    const auto selected =
         std::find_if(modes.begin(), modes.end(), [&](const mode& each) { return is_given(command, each.flag); });
-    if (asked == modes.end()) {
+    if (selected == modes.end()) {
         for (const char* option : {"--binders", "--keep"}) {
             if (is_given(command, option)) {
                 refuse(option, "is for --updates and --fan-out");
             }
         }
-        if (given.options.transport == carrier::multicast) {
+        if (transport == carrier::multicast) {
             refuse("--transport multicast", "is for --fan-out");
         }
-        return;
+        return measurement::pulls;
     }
-    given.what = asked->what;
-    const std::string not_for = std::string{"is not for "} + asked->flag;
+    const std::string not_for = std::string{"is not for "} + selected->flag;
     for (const auto& other : modes) {
-        if (&other != &*asked && is_given(command, other.flag)) {
+        if (&other != &*selected && is_given(command, other.flag)) {
             refuse(other.flag, not_for);
         }
     }
-    for (const char* option : asked->refused) {
+    for (const char* option : selected->refused) {
         if (is_given(command, option)) {
             refuse(option, not_for);
         }
     }
-    const auto& fit = asked->carried_by;
-    if (std::find(fit.begin(), fit.end(), given.options.transport) == fit.end()) {
-        refuse(asked->flag, asked->carried_why);
+    const auto& accepted = selected->carried_by;
+    if (std::find(accepted.begin(), accepted.end(), transport) == accepted.end()) {
+        refuse(selected->flag, selected->carried_why);
     }
-}
-
-void settle_binders(bench_arguments& given) {
-    auto& binders = given.options.binders;
-    if (!given.binders.empty()) {
-        binders = given.binders;
-    } else if (given.what == measurement::fan_out) {
-        binders = {1, 8, 64};
-    }
-    if (given.options.transport == carrier::multicast && given.options.keep != 0) {
-        refuse("--keep", "has no effect by multicast");
-    }
-    if (given.what == measurement::updates && binders.size() != 1) {
-        refuse("--updates", "takes one number of --binders");
-    }
+    return selected->what;
 }
 
 } // namespace
 
 void add_bench_arguments(CLI::App& command, bench_arguments& given) {
-    auto& options = given.options;
+    command.description(bench_description);
+    command.footer(bench_examples);
     command
         .add_option("--transport", given.transport,
                     "What carries the CLES exchange: tcp, udp, unix or inproc; with --fan-out tcp, unix or multicast")
-        ->check(CLI::IsMember(keys_of(carriers)).description(""))
+        ->check(CLI::IsMember(carrier_names()).description(""))
         ->type_name("NAME");
-    command.add_option("--in-flight", options.in_flight, "PULLs in flight at once on one link (1)")
-        ->check(CLI::Range(std::size_t{1}, most_in_flight).description(""))
+    command.add_option("--in-flight", given.in_flight, "PULLs in flight at once on one link (1)")
+        ->check(CLI::Range(std::size_t{1}, max_in_flight).description(""))
         ->type_name("N");
-    command.add_option("--against", options.against, "A node that runs already and offers localization")
+    command.add_option("--against", given.against, "A node that runs already and offers localization")
         ->type_name("URL");
     auto* requests =
-        command.add_option("--requests", options.requests,
+        command.add_option("--requests", given.requests,
                            "Requests, or with --updates and --fan-out updates, in each pass (50000; "
                            "1000000 where many are in flight or published; the baseline at most 50000 "
                            "then; with --fan-out 1000 paced; with --bytes 2000; with --parse 8 MiB of them)");
@@ -161,24 +164,24 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     command.add_option("--duration", given.duration, "How long each pass takes, instead of --requests")
         ->excludes(requests)
         ->type_name("TIME");
-    command.add_option("--rounds", options.rounds, "Passes of each exchange, of which the medians are taken (5)")
+    command.add_option("--rounds", given.rounds, "Passes of each exchange, of which the medians are taken (5)")
         ->check(CLI::Range(std::size_t{1}, std::size_t{1000}).description(""))
         ->type_name("N");
     command.add_option("--style", given.style, "How results reach the caller's code: coroutine or callback")
-        ->check(CLI::IsMember(keys_of(styles)).description(""))
+        ->check(CLI::IsMember({"callback", "coroutine"}).description(""))
         ->type_name("NAME");
     command
         .add_option("--busy-poll", given.busy_poll_us,
                     "Let both ends of CLES look for work so long before they sleep, in microseconds (0)")
-        ->check(CLI::Range(0, most_wait_us).description(""))
+        ->check(CLI::Range(0, max_wait_us).description(""))
         ->type_name("US");
     command
         .add_option("--wake-within", given.wake_within_us,
                     "Let this host's cores, in all that is measured, sleep no deeper than they wake from in so many "
                     "microseconds; 0: not at all (it takes /dev/cpu_dma_latency)")
-        ->check(CLI::Range(0, most_wait_us).description(""))
+        ->check(CLI::Range(0, max_wait_us).description(""))
         ->type_name("US");
-    command.add_flag("--one-core", options.one_core, "Put both ends on one core");
+    command.add_flag("--one-core", given.one_core, "Put both ends on one core");
     for (const auto& each : modes) {
         command.add_flag(each.flag, each.help);
     }
@@ -186,9 +189,9 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
         .add_option("--binders", given.binders,
                     "Bindings, each on a link of its own (1); with --fan-out several numbers (1,8,64)")
         ->delimiter(',')
-        ->check(CLI::Range(std::size_t{1}, most_binders).description(""))
+        ->check(CLI::Range(std::size_t{1}, max_binders).description(""))
         ->type_name("N");
-    command.add_option("--keep", options.keep, "Updates that the publisher queues for each binder (64)")
+    command.add_option("--keep", given.keep, "Updates that the publisher queues for each binder (64)")
         ->check(CLI::Range(std::uint32_t{1}, std::uint32_t{65536}).description(""))
         ->type_name("N");
     command.add_option("-o,--output", given.form, "table or json (table)")
@@ -196,21 +199,21 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
         ->type_name("FORM");
 }
 
-void settle(const CLI::App& command, bench_arguments& given) {
-    given.options.transport = carriers.at(given.transport);
-    given.options.style = styles.at(given.style);
-    given.options.how.busy_poll = std::chrono::microseconds{given.busy_poll_us};
-    if (given.wake_within_us) {
-        given.options.wake_within = std::chrono::microseconds{*given.wake_within_us};
+measurement selected_measurement(const CLI::App& command, const bench_arguments& given) {
+    const auto transport = carrier_of(given.transport);
+    const auto what = selected_mode(command, transport);
+    if (transport == carrier::multicast && given.keep != 0) {
+        refuse("--keep", "has no effect by multicast");
     }
-    settle_mode(command, given);
-    settle_binders(given);
-    if (!given.options.against.empty() && is_given(command, "--transport")) {
+    if (what == measurement::updates && given.binders.size() > 1) {
+        refuse("--updates", "takes one number of --binders");
+    }
+    if (!given.against.empty() && is_given(command, "--transport")) {
         refuse("--transport", "is told by the URL of --against");
     }
-    if (!given.duration.empty()) {
-        given.options.duration = parse_positive_duration(given.duration);
-    }
+    return what;
 }
+
+carrier carrier_of(const std::string& name) { return carriers.at(name); }
 
 } // namespace tool

@@ -1,9 +1,37 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_options.hpp"
+#include "options.hpp"
+
+#include "duration.hpp"
 
 #include <unistd.h>
 
 namespace tool {
+
+bench_options to_options(const bench_arguments& given, measurement what) {
+    bench_options options{.transport = carrier_of(given.transport),
+                          .style = given.style == "callback" ? cles::perf::handler_style::callback
+                                                             : cles::perf::handler_style::coroutine,
+                          .rounds = given.rounds,
+                          .requests = given.requests,
+                          .against = given.against,
+                          .in_flight = given.in_flight,
+                          .one_core = given.one_core,
+                          .keep = given.keep,
+                          .as_json = given.form == "json"};
+    if (!given.duration.empty()) {
+        options.duration = parse_positive_duration(given.duration);
+    }
+    options.how.busy_poll = std::chrono::microseconds{given.busy_poll_us};
+    if (given.wake_within_us) {
+        options.wake_within = std::chrono::microseconds{*given.wake_within_us};
+    }
+    if (!given.binders.empty()) {
+        options.binders = given.binders;
+    } else if (what == measurement::fan_out) {
+        options.binders = {1, 8, 64};
+    }
+    return options;
+}
 
 cles::perf::placement places_of(const bench_options& options) {
     auto cores = cles::perf::place_ends();

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_latency.hpp"
-
-#include "bench_medians.hpp"
+#include "figures.hpp"
 
 namespace tool {
 

@@ -4,8 +4,8 @@
 #include <cles/multicast.hpp>
 #include <cles/service.hpp>
 
-#include "bench_fan_out_report.hpp"
-#include "bench_options.hpp"
+#include "fan_out_report.hpp"
+#include "options.hpp"
 #include "perf/baseline/binders.hpp"
 #include "perf/fan_out/fan_out.hpp"
 #include "perf/support/child_process.hpp"
@@ -20,8 +20,8 @@
 #include <string>
 #include <vector>
 
-/// A publisher in a process of its own, and its binders in this one. To be made before anything else of this process
-/// that its children would inherit. By multicast each exchange has a port of its own, so that they do not mix.
+/// A publisher in a process of its own, and its binders in this one. Create them before anything else that the child
+/// processes would inherit. By multicast each exchange has a port of its own, so that they do not mix.
 namespace tool {
 
 /// The passes of one round: one that is paced, one as fast as possible.
@@ -49,8 +49,7 @@ class fan_out_by_cles {
   public:
     fan_out_by_cles(const bench_options& options, int core);
 
-    /// Makes room for so many binders. One client opens a link for each of its feeds; by multicast a client has one
-    /// socket, so that each binder is a client of its own. After all processes have been forked.
+    /// Prepares for this number of binders, each a client of its own. Call it after all processes have been forked.
     void connect(std::size_t binders);
     fan_out_figures run(const fan_out_orders& orders, cles::perf::latency_recorder& record);
 

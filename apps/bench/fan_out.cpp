@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_fan_out_ends.hpp"
-#include "bench_progress.hpp"
-#include "bench_run.hpp"
+#include "fan_out_ends.hpp"
+#include "measurements.hpp"
+#include "progress.hpp"
 
 #include <algorithm>
 
@@ -12,22 +12,22 @@ namespace perf = cles::perf;
 namespace {
 
 constexpr std::uint64_t rate_hz = 1000;
-constexpr std::uint64_t paced_unless_told = 1000;
-constexpr std::uint64_t deliveries_of_a_fan_out = 200'000;
-constexpr std::uint64_t most_of_a_fan_out = 40'000;
+constexpr std::uint64_t default_paced_updates = 1000;
+constexpr std::uint64_t default_flat_out_deliveries = 200'000;
+constexpr std::uint64_t max_flat_out_updates = 40'000;
 
 fan_out_orders orders_of(std::size_t binders, const bench_options& options) {
     const auto told = options.requests;
-    const auto suits = std::clamp<std::uint64_t>(deliveries_of_a_fan_out / binders, 1, most_of_a_fan_out);
+    const auto suits = std::clamp<std::uint64_t>(default_flat_out_deliveries / binders, 1, max_flat_out_updates);
     return {.paced = {.binders = binders,
-                      .updates = told != 0 ? told : paced_unless_told,
+                      .updates = told != 0 ? told : default_paced_updates,
                       .interval_ns = 1'000'000'000 / rate_hz},
             .flat_out = {.binders = binders, .updates = told != 0 ? told : suits}};
 }
 
 } // namespace
 
-fan_out_report bench_fan_out(const bench_options& options) {
+std::string measure_fan_out(const bench_options& options) {
     const auto cores = places_of(options);
     fan_out_by_hand by_hand{options, cores.server};
     fan_out_by_cles by_cles{options, cores.server};
@@ -62,7 +62,7 @@ fan_out_report bench_fan_out(const bench_options& options) {
         row.ratio = ratio_of(row.cles, row.icd);
         report.rows.push_back(row);
     }
-    return report;
+    return text_of(report, options);
 }
 
 } // namespace tool

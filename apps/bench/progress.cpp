@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_progress.hpp"
+#include "progress.hpp"
 
 #include "terminal.hpp"
 
@@ -9,7 +9,7 @@
 namespace tool {
 namespace {
 
-constexpr std::size_t width = 30;
+constexpr std::size_t bar_width = 30;
 constexpr const char* erase_line = "\r\x1b[K";
 
 } // namespace
@@ -26,9 +26,9 @@ void bench_progress::step(std::string_view what) {
     if (!shown_) {
         return;
     }
-    const std::size_t filled = steps_ == 0 ? width : width * done_ / steps_;
+    const std::size_t filled = steps_ == 0 ? bar_width : bar_width * done_ / steps_;
     std::string line{erase_line};
-    line.append("[").append(filled, '#').append(width - filled, '.').append("] ");
+    line.append("[").append(filled, '#').append(bar_width - filled, '.').append("] ");
     line.append(std::to_string(++done_)).append("/").append(std::to_string(steps_)).append(" ").append(what);
     std::fputs(line.c_str(), stderr);
     std::fflush(stderr);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_fan_out_report.hpp"
+#include "fan_out_report.hpp"
 
-#include "bench_medians.hpp"
-#include "bench_table.hpp"
+#include "figures.hpp"
+#include "report_table.hpp"
 
 #include <numeric>
 #include <utility>

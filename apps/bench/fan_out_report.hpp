@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "bench_latency.hpp"
+#include "figures.hpp"
 
 #include <boost/describe/class.hpp>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_fan_out_ends.hpp"
+#include "fan_out_ends.hpp"
 
-#include "bench_medians.hpp"
+#include "figures.hpp"
 #include "perf/baseline/publisher.hpp"
 #include "perf/fan_out/fan_out_exchange.hpp"
 #include "perf/support/clock.hpp"

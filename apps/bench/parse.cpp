@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_medians.hpp"
-#include "bench_progress.hpp"
-#include "bench_run.hpp"
+#include "figures.hpp"
+#include "measurements.hpp"
 #include "perf/messages/line_costs.hpp"
 #include "perf/support/pinning.hpp"
+#include "progress.hpp"
+#include "report_table.hpp"
+
+#include <boost/describe/class.hpp>
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -14,6 +19,50 @@ namespace tool {
 namespace perf = cles::perf;
 
 namespace {
+
+/// What a message costs by its length.
+struct parse_figure {
+    double ns = 0;
+    double ns_per_byte = 0; ///< of the message
+};
+BOOST_DESCRIBE_STRUCT(parse_figure, (), (ns, ns_per_byte))
+
+struct parse_row {
+    std::size_t bytes = 0; ///< of the message, at most
+    std::uint64_t repetitions = 0;
+    parse_figure head{};            ///< a request that is all head
+    parse_figure validated{};       ///< a request whose body is checked, but not read
+    parse_figure typed{};           ///< the same, read into a C++ type
+    parse_figure reply_validated{}; ///< a reply, as text
+    parse_figure reply_typed{};     ///< a reply, read into a C++ type
+    std::size_t packed_bytes = 0;   ///< of the struct that holds the same numbers
+    parse_figure packed{};          ///< the struct; per byte of its own
+};
+BOOST_DESCRIBE_STRUCT(parse_row, (),
+                      (bytes, repetitions, head, validated, typed, reply_validated, reply_typed, packed_bytes, packed))
+
+struct parse_report {
+    std::string bench = "parse";
+    std::size_t rounds = 0;
+    int core = 0;
+    std::vector<parse_row> rows{};
+};
+BOOST_DESCRIBE_STRUCT(parse_report, (), (bench, rounds, core, rows))
+
+/// "4096 (1.00)"
+std::string cell(const parse_figure& figure) { return fixed(figure.ns, 0) + " (" + fixed(figure.ns_per_byte, 2) + ")"; }
+
+std::string table_of(const parse_report& report) {
+    rows out{{"bytes", "head", "validated", "typed", "reply", "reply typed", "struct bytes", "struct"}};
+    for (const auto& row : report.rows) {
+        out.add({std::to_string(row.bytes), cell(row.head), cell(row.validated), cell(row.typed),
+                 cell(row.reply_validated), cell(row.reply_typed), std::to_string(row.packed_bytes), cell(row.packed)});
+    }
+    return out.text() + "ns (ns per byte), medians of " + std::to_string(report.rounds) + " rounds on core " +
+           std::to_string(report.core) +
+           ", without sockets: from the line to the handler and its reply; from a reply to the caller;\n"
+           "from a struct in network order to the same numbers\n";
+}
 
 constexpr std::size_t smallest = 64;
 constexpr std::size_t largest = std::size_t{1} << 20U; // what a line may have
@@ -44,7 +93,7 @@ parse_row row_of(std::size_t bytes, std::uint64_t repetitions, const std::vector
 
 } // namespace
 
-parse_report bench_parse(const bench_options& options) {
+std::string measure_parsing(const bench_options& options) {
     const auto core = perf::place_ends().client;
     perf::pin_to(core);
     perf::line_costs costs;
@@ -68,7 +117,7 @@ parse_report bench_parse(const bench_options& options) {
     for (std::size_t i = 0; i < sizes.size(); ++i) {
         report.rows.push_back(row_of(sizes[i], repetitions_of(sizes[i], options), passes[i]));
     }
-    return report;
+    return text_of(report, options);
 }
 
 } // namespace tool

@@ -3,6 +3,7 @@
 
 #include <cles/run.hpp>
 
+#include "arguments.hpp"
 #include "perf/support/handler_style.hpp"
 #include "perf/support/pinning.hpp"
 
@@ -15,26 +16,29 @@
 
 namespace tool {
 
-enum class carrier : std::uint8_t { tcp, udp, unix_socket, inproc, multicast };
-
+/// How to measure.
 struct bench_options {
     carrier transport = carrier::tcp;
     cles::perf::handler_style style = cles::perf::handler_style::coroutine;
     std::size_t rounds = 5;
-    std::uint64_t requests = 0;                          ///< in a pass; 0: what suits the measurement
+    std::uint64_t requests = 0;                          ///< in a pass; 0: the default of the measurement
     std::optional<std::chrono::milliseconds> duration{}; ///< of a pass, instead
-    std::string against{};                               ///< a node that runs already
+    std::string against{};                               ///< a node that is already running
 
     std::size_t in_flight = 1;
     cles::run_options how{};                                ///< of both ends
     bool one_core = false;                                  ///< for both ends
     std::optional<std::chrono::microseconds> wake_within{}; ///< asked of the host for all that is measured
 
-    std::vector<std::size_t> binders{1}; ///< one number, but for the fan-out
+    std::vector<std::size_t> binders{1}; ///< one number, except for the fan-out
     std::uint32_t keep = 0;
+    bool as_json = false;
 };
 
-/// The cores that the ends are to run on.
+/// \throws usage_error for a duration that cannot be read
+bench_options to_options(const bench_arguments& given, measurement what);
+
+/// The cores for the two ends.
 cles::perf::placement places_of(const bench_options& options);
 
 /// How long a pass may take.
@@ -47,7 +51,7 @@ std::optional<std::int64_t> wake_within_us(const bench_options& options);
 const char* to_string(carrier c);
 const char* to_string(cles::perf::handler_style s);
 
-/// Where the child is to listen; where updates go by multicast, for all else.
+/// Where the child process listens. By multicast only updates are sent, so it is a URL of TCP then.
 std::string bench_url(carrier c);
 
 } // namespace tool

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "figures.hpp"
 #include "statistics.hpp"
 #include "table.hpp"
 
@@ -9,7 +10,7 @@
 #include <string>
 #include <vector>
 
-/// How figures are put into a table, and the words for what they were measured on.
+/// How reports are printed as tables.
 namespace tool {
 
 /// "-" where there is nothing.
@@ -18,7 +19,7 @@ std::string fixed(std::optional<double> value, int digits);
 std::string times(double ratio);
 std::string times(std::optional<double> ratio);
 
-/// A name and its figures, line by line.
+/// Lines of a name and its figures.
 class rows {
   public:
     explicit rows(const std::vector<std::string>& titles) {
@@ -32,6 +33,8 @@ class rows {
             table_.set(i, cells[i], i != 0);
         }
     }
+    void add(const std::string& name, const latency_figures& figures);
+    void add_ratio(const std::string& name, const latency_figures& of, const latency_figures& to);
     [[nodiscard]] std::string text() const { return table_.text(); }
 
   private:
@@ -39,7 +42,7 @@ class rows {
 };
 
 std::string cores(int client, std::optional<int> server);
-/// How those who wait for work do so.
+/// How the ends wait for work.
 std::string waiting(std::int64_t busy_poll_us, std::optional<std::int64_t> wake_within_us);
 
 } // namespace tool

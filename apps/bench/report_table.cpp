@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_table.hpp"
+#include "report_table.hpp"
 
 namespace tool {
 
@@ -7,6 +7,16 @@ std::string fixed(std::optional<double> value, int digits) { return value ? fixe
 
 std::string times(double ratio) { return fixed(ratio, 2) + "x"; }
 std::string times(std::optional<double> ratio) { return ratio ? times(*ratio) : "-"; }
+
+void rows::add(const std::string& name, const latency_figures& figures) {
+    add({name, fixed(figures.p50_us, 1), fixed(figures.p99_us, 1), fixed(figures.p999_us, 1),
+         fixed(figures.max_us, 1)});
+}
+
+void rows::add_ratio(const std::string& name, const latency_figures& of, const latency_figures& to) {
+    add({name, times(over(of.p50_us, to.p50_us)), times(over(of.p99_us, to.p99_us)),
+         times(over(of.p999_us, to.p999_us)), times(over(of.max_us, to.max_us))});
+}
 
 std::string cores(int client, std::optional<int> server) {
     if (!server) {

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "bench_medians.hpp"
-#include "bench_progress.hpp"
-#include "bench_run.hpp"
+#include "figures.hpp"
+#include "measurements.hpp"
 #include "perf/baseline/packet.hpp"
 #include "perf/messages/wire_bytes.hpp"
+#include "progress.hpp"
+#include "report_table.hpp"
 
+#include <boost/describe/class.hpp>
+
+#include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace tool {
 
@@ -13,7 +19,71 @@ namespace perf = cles::perf;
 
 namespace {
 
-constexpr std::uint64_t exchanges_unless_told = 2000;
+/// The headers of a message that is sent in a packet of its own.
+struct header_bytes {
+    std::uint64_t ethernet = 14;
+    std::uint64_t ipv4 = 20;
+    std::uint64_t tcp = 32; ///< 20, and 12 of timestamps
+    std::uint64_t udp = 8;
+    std::uint64_t mtu = 1500; ///< of an Ethernet frame, from the IP header on
+};
+BOOST_DESCRIBE_STRUCT(header_bytes, (), (ethernet, ipv4, tcp, udp, mtu))
+
+/// Bytes of a message, alone and in a frame of its own.
+struct message_size {
+    double bytes = 0;
+    double frame = 0;
+};
+BOOST_DESCRIBE_STRUCT(message_size, (), (bytes, frame))
+
+struct bytes_row {
+    std::string message{}; ///< "PULL request"
+    message_size icd_tcp{};
+    message_size icd_udp{};
+    message_size tcp{};
+    message_size udp{};
+    double ratio_tcp = 0; ///< of the frames
+    double ratio_udp = 0;
+};
+BOOST_DESCRIBE_STRUCT(bytes_row, (), (message, icd_tcp, icd_udp, tcp, udp, ratio_tcp, ratio_udp))
+
+/// How many published packets one full frame holds.
+struct updates_per_frame {
+    std::uint64_t icd_tcp = 0;
+    std::uint64_t icd_udp = 0;
+    std::uint64_t tcp = 0;
+    std::uint64_t udp = 1; ///< a datagram holds exactly one message
+};
+BOOST_DESCRIBE_STRUCT(updates_per_frame, (), (icd_tcp, icd_udp, tcp, udp))
+
+struct bytes_report {
+    std::string bench = "bytes";
+    std::uint64_t exchanges = 0; ///< of each verb
+    header_bytes headers{};
+    std::vector<bytes_row> rows{};
+    updates_per_frame in_a_frame{};
+};
+BOOST_DESCRIBE_STRUCT(bytes_report, (), (bench, exchanges, headers, rows, in_a_frame))
+
+std::string table_of(const bytes_report& report) {
+    rows out{{"localization", "struct", "CLES tcp", "CLES udp", "struct tcp frame", "CLES tcp frame", "ratio",
+              "struct udp frame", "CLES udp frame", "ratio udp"}};
+    for (const auto& row : report.rows) {
+        out.add({row.message, fixed(row.icd_tcp.bytes, 0), fixed(row.tcp.bytes, 1), fixed(row.udp.bytes, 1),
+                 fixed(row.icd_tcp.frame, 0), fixed(row.tcp.frame, 1), times(row.ratio_tcp),
+                 fixed(row.icd_udp.frame, 0), fixed(row.udp.frame, 1), times(row.ratio_udp)});
+    }
+    const auto& with = report.headers;
+    const auto& fit = report.in_a_frame;
+    return out.text() + "bytes, means of " + std::to_string(report.exchanges) +
+           " exchanges, measured between the ends; frames with Ethernet " + std::to_string(with.ethernet) + ", IPv4 " +
+           std::to_string(with.ipv4) + " and TCP " + std::to_string(with.tcp) + " (with timestamps) or UDP " +
+           std::to_string(with.udp) + "\nupdates in one frame of " + std::to_string(with.mtu) + " bytes: TCP, struct " +
+           std::to_string(fit.icd_tcp) + ", CLES " + std::to_string(fit.tcp) + "; UDP, struct " +
+           std::to_string(fit.icd_udp) + ", CLES " + std::to_string(fit.udp) + " (one to a datagram)\n";
+}
+
+constexpr std::uint64_t default_exchanges = 2000;
 
 // The struct's messages: one without the packet, and one with it.
 constexpr double word = sizeof(perf::icd::request_packet);
@@ -25,7 +95,7 @@ constexpr perf::verb_bytes interface_control_document{.pull = {word, packet},
                                                       .bind = {word, packet},
                                                       .update = packet};
 
-/// Puts messages into frames and beside each other.
+/// Calculates the frames of messages, and compares them.
 class framing {
   public:
     explicit framing(const header_bytes& headers) : headers_(headers) {}
@@ -60,8 +130,8 @@ class framing {
 
 } // namespace
 
-bytes_report bench_bytes(const bench_options& options) {
-    const auto exchanges = options.requests != 0 ? options.requests : exchanges_unless_told;
+std::string measure_bytes(const bench_options& options) {
+    const auto exchanges = options.requests != 0 ? options.requests : default_exchanges;
     bench_progress progress{2};
     progress.step("over TCP");
     const auto tcp = perf::measure_bytes("tcp", exchanges);
@@ -85,7 +155,7 @@ bytes_report bench_bytes(const bench_options& options) {
     report.in_a_frame = {.icd_tcp = frames.fit_tcp(interface_control_document.update),
                          .icd_udp = frames.fit_udp(interface_control_document.update),
                          .tcp = frames.fit_tcp(tcp.update)};
-    return report;
+    return text_of(report, options);
 }
 
 } // namespace tool

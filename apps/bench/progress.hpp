@@ -6,7 +6,7 @@
 
 namespace tool {
 
-/// A bar on stderr where that is a terminal, else nothing. It moves between passes alone, so as not to disturb them.
+/// A progress bar on stderr if that is a terminal. It changes only between passes, so that it does not disturb them.
 class bench_progress {
   public:
     explicit bench_progress(std::size_t steps);
