@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::size_t packet_size = sizeof(update_packet);
 
-/// False where nothing was there.
+/// False if nothing could be read.
 bool has_come(ssize_t result, const char* attempted) {
     if (result < 0 && (errno == EAGAIN || errno == EINTR)) {
         return false;
@@ -39,16 +39,16 @@ class binder {
 
     [[nodiscard]] int socket() const noexcept { return socket_.get(); }
     [[nodiscard]] bool complete() const noexcept { return last_ == updates_; }
-    /// Takes what is there, within bounds.
+    /// Reads what has arrived, up to a limit.
     virtual void read() = 0;
 
   protected:
     void take(std::span<const std::byte> packet) {
         const auto update = unpack_update(packet);
         if (!update) {
-            throw std::runtime_error("the hand-written publisher sent what is no update");
+            throw std::runtime_error("the hand-written publisher sent something that is not an update");
         }
-        if (update->number > last_) { // else it came twice, or was overtaken
+        if (update->number > last_) { // otherwise a duplicate, or out of order
             last_ = update->number;
             all_.take(update->value);
         }
@@ -104,7 +104,7 @@ class datagram_binder final : public binder {
             return;
         }
         for (std::size_t i = 0; i < static_cast<std::size_t>(got); ++i) {
-            if (headers_[i].msg_len == packet_size) { // on a group's port anybody may say something
+            if (headers_[i].msg_len == packet_size) { // any program may send to the port of a group
                 take(packets_[i]);
             }
         }
@@ -157,7 +157,7 @@ fan_out_tally binders::run(const fan_out_order& order, latency_recorder* record)
             if (from == nullptr) {
                 published = receive_all(control_.get(), word);
                 if (!published) {
-                    throw std::runtime_error("the hand-written publisher has gone");
+                    throw std::runtime_error("the hand-written publisher closed the connection");
                 }
                 continue;
             }

@@ -10,15 +10,15 @@
 namespace cles::perf::icd {
 
 /// The other side of `publisher`: all binders in one process, each with a socket of its own. One thread waits for all
-/// of them by `epoll`, since as many blocking threads would have to take turns on the core; it takes as many packets
-/// with one system call as are there.
+/// of them by `epoll`, because that many blocking threads would compete for the core; one system call reads as many
+/// packets as have arrived.
 class binders {
   public:
     binders(const url& publisher, std::optional<multicast_group> group)
         : publisher_(publisher), group_(std::move(group)), control_(perf::connect_to(publisher)) {}
 
-    /// Has the order published, and takes what comes. Latencies are recorded where there is a recorder.
-    /// \throws std::system_error, or std::runtime_error where something came changed
+    /// Orders a publication, and receives the updates. Latencies are recorded if there is a recorder.
+    /// \throws std::system_error, or std::runtime_error if a value was changed
     fan_out_tally run(const fan_out_order& order, latency_recorder* record);
 
   private:

@@ -19,7 +19,7 @@ void server::run() {
         try {
             serve(client.get());
         } catch (const std::exception&) {
-            continue; // that client is gone or speaks something else: the next one
+            continue; // the client has disconnected or uses another protocol
         }
     }
 }
@@ -41,7 +41,7 @@ void server::serve_datagrams() {
         const auto got = ::recvfrom(socket, request.data(), request.size(), MSG_TRUNC, whom, &length);
         if (got == static_cast<ssize_t>(request.size()) && is_request(request)) {
             const auto reply = pack_reply(sample(served_++));
-            ::sendto(socket, reply.data(), reply.size(), 0, whom, length); // what is lost ends the measurement
+            ::sendto(socket, reply.data(), reply.size(), 0, whom, length); // a lost reply ends the measurement
         }
     }
 }
@@ -54,7 +54,7 @@ localization client::pull() {
     }
     const auto value = unpack_reply(reply);
     if (!value) {
-        throw std::runtime_error("the hand-written server sent what is no reply");
+        throw std::runtime_error("the hand-written server sent something that is not a reply");
     }
     return *value;
 }

@@ -14,7 +14,7 @@ class server {
   public:
     explicit server(const url& where) : listener_(listen_on(where)) {}
     [[nodiscard]] const url& where() const noexcept { return listener_.where; }
-    /// Serves one client after the other, for ever; by datagrams all of them.
+    /// Serves one client after the other, or by datagrams all of them. Does not return.
     [[noreturn]] void run();
 
   private:
@@ -29,7 +29,7 @@ class client {
   public:
     explicit client(const url& where) : socket_(connect_to(where)) {}
     /// Sends the request and waits for the reply.
-    /// \throws std::system_error, or std::runtime_error where the reply is none
+    /// \throws std::system_error, or std::runtime_error if it is not a valid reply
     localization pull();
 
   private:

@@ -12,7 +12,7 @@
 
 #include <endian.h>
 
-/// The packets of a fictitious interface control document, in network order, as one writes them by hand:
+/// The packets of a fictitious interface control document, in network order, as they are written by hand:
 ///
 /// | bytes | request         | reply                                         |
 /// | ----- | --------------- | --------------------------------------------- |
@@ -58,7 +58,7 @@ inline reply_bytes pack_reply(const localization& value) noexcept {
                                                     to_network(value.velocity), to_network(value.acceleration)}});
 }
 
-/// Nothing where the bytes are no reply.
+/// Empty if the bytes are not a reply.
 inline std::optional<localization> unpack_reply(const reply_bytes& bytes) noexcept {
     const auto packet = std::bit_cast<reply_packet>(bytes);
     if (be16toh(packet.type) != reply_type || be16toh(packet.length) != sizeof(reply_packet)) {

@@ -30,7 +30,7 @@ void publisher::run() {
     const auto control = accept_from(listener_);
     fan_out_order order;
     std::array<std::byte, 1> word{};
-    std::vector<descriptor> sockets; // until the next order, so that nobody who still reads finds his at an end
+    std::vector<descriptor> sockets; // kept until the next order, because binders may still be reading
     while (receive_all(control.get(), std::as_writable_bytes(std::span{&order, 1}))) {
         sockets = sockets_for(order);
         if (!receive_all(control.get(), word)) {

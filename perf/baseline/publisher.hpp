@@ -10,17 +10,17 @@
 
 namespace cles::perf::icd {
 
-/// Publishes the packed struct, as one writes it by hand: to each binder's socket in turn, blocking where its buffer is
+/// Publishes the packed struct, as it is written by hand: to each binder's socket in turn, blocking if its buffer is
 /// full, or once to a multicast group.
 ///
-/// The first connection that comes in gives the orders: an order, and a byte when all binders are ready; a byte comes
-/// back when all has been published.
+/// The first connection is the control connection: it sends an order, and a byte when all binders are ready; the
+/// publisher sends a byte back when all has been published.
 class publisher {
   public:
     publisher(const url& where, std::optional<multicast_group> group)
         : listener_(listen_on(where)), group_(std::move(group)) {}
     [[nodiscard]] const url& where() const noexcept { return listener_.where; }
-    /// Serves until the one who gives the orders has gone.
+    /// Serves until the control connection is closed.
     void run();
 
   private:

@@ -11,13 +11,13 @@
 #include <optional>
 #include <span>
 
-/// The packet that the fictitious interface control document has for what is published, in network order:
+/// The packet of the fictitious interface control document for a publication, in network order:
 ///
 /// | bytes | update                                             |
 /// | ----- | -------------------------------------------------- |
 /// | 2     | message type, 3                                    |
 /// | 2     | total length, 56                                   |
-/// | 4     | number, counted from 1: what is missing shows      |
+/// | 4     | number, from 1, to detect missing updates          |
 /// | 8     | when it was published, in nanoseconds              |
 /// | 5 x 8 | utc, lat, lon, velocity, acceleration (IEEE)       |
 namespace cles::perf::icd {
@@ -50,7 +50,7 @@ inline update_bytes pack_update(std::uint32_t number, const publication& value) 
                        to_network(value.acceleration)}});
 }
 
-/// Nothing where the bytes are no update. At least as many as one takes.
+/// Empty if the bytes are not an update. \pre there are at least as many as an update has
 inline std::optional<update> unpack_update(std::span<const std::byte> bytes) noexcept {
     update_packet packet{};
     std::memcpy(&packet, bytes.data(), sizeof packet);

@@ -9,7 +9,7 @@ namespace cles::perf {
 void arrivals::take(const publication& value) {
     last_ = monotonic_ns();
     if (!is_sample(value)) {
-        throw std::runtime_error("the values that came are not those that were published");
+        throw std::runtime_error("the received values are not those that were published");
     }
     first_published_ = count_ == 0 ? value.published_ns : std::min(first_published_, value.published_ns);
     ++count_;

@@ -11,18 +11,17 @@
 #include <cstddef>
 #include <cstdint>
 
-/// One publisher and many binders: what both exchanges, by hand and by the library, are measured by.
+/// One publisher and many binders: what the exchanges by hand and by the library have in common.
 namespace cles::perf {
 
-/// The localization packet with the time at which it was published: what is timed on its way to many.
-///
-/// Both ends read the host's one monotonic clock, so that the time of one way is known exactly.
+/// The localization packet with the time of its publication. Both ends read the same monotonic clock, so that the time
+/// of one way is exact.
 struct publication : localization {
     std::int64_t published_ns = 0;
 };
 BOOST_DESCRIBE_STRUCT(publication, (localization), (published_ns))
 
-/// The values in turn, published now.
+/// The nth sample, published now.
 inline publication publish_sample(std::uint64_t n) noexcept {
     publication value;
     static_cast<localization&>(value) = sample(n);
@@ -34,7 +33,7 @@ inline publication publish_sample(std::uint64_t n) noexcept {
 struct fan_out_order {
     std::uint64_t binders = 1;
     std::uint64_t updates = 0;
-    std::uint64_t interval_ns = 0; ///< from one publication to the next; 0: as fast as they are taken
+    std::uint64_t interval_ns = 0; ///< from one publication to the next; 0: as fast as the binders accept them
 };
 BOOST_DESCRIBE_STRUCT(fan_out_order, (), (binders, updates, interval_ns))
 
@@ -43,21 +42,21 @@ struct fan_out_tally {
     std::chrono::nanoseconds took{}; ///< from the first publication to the last delivery
 };
 
-/// A pass ends when every binder has had the last update, or, since datagrams may be lost, when the publisher has said
-/// that it has published all and nothing has come for so long.
+/// A pass ends when every binder has received the last update, or, since datagrams may be lost, when all has been
+/// published and nothing has arrived for this long.
 inline constexpr std::chrono::milliseconds silence{100};
 
-/// Keeps account of what comes in during a pass, in the code of all binders.
+/// Counts what the code of all binders receives in a pass.
 class arrivals {
   public:
-    /// Latencies are recorded where there is a recorder; it must hold as many as can come.
+    /// Latencies are recorded if there is a recorder, which must have room for all.
     explicit arrivals(latency_recorder* record) : record_(record) {
         if (record_ != nullptr) {
             record_->clear();
         }
     }
 
-    /// \throws std::runtime_error where the values are not those that were published
+    /// \throws std::runtime_error if the values are not those that were published
     void take(const publication& value);
 
     [[nodiscard]] std::uint64_t count() const noexcept { return count_; }

@@ -36,22 +36,22 @@ asio::awaitable<void> publish_flat_out(cles::service& car, std::uint64_t updates
     }
 }
 
-constexpr std::chrono::seconds patience{60}; // beyond what publishing takes by the clock
+constexpr std::chrono::seconds patience{60}; // longer than publishing takes
 constexpr std::chrono::hours longest_deadline{24};
 constexpr std::chrono::milliseconds between_attempts{10};
 constexpr auto not_yet = std::numeric_limits<std::int64_t>::max();
 
 /// What the binders of one pass share.
-class gathering {
+class fan_out_pass {
   public:
-    gathering(asio::io_context& io, cles::service& client, const fan_out_order& order, bool by_group,
-              latency_recorder* record)
+    fan_out_pass(asio::io_context& io, cles::service& client, const fan_out_order& order, bool by_group,
+                 latency_recorder* record)
         : all(record), io_(io), client_(client), order_(order), by_group_(by_group), timer_(io) {}
 
     arrivals all;
 
     [[nodiscard]] std::uint64_t updates() const noexcept { return order_.updates; }
-    /// Whether it was published in this pass; what was published before may still come.
+    /// Whether it was published in this pass; earlier updates may still arrive.
     [[nodiscard]] bool is_new(const publication& value) const noexcept { return value.published_ns >= began_; }
 
     void bound() {
@@ -64,18 +64,18 @@ class gathering {
         }
     }
 
-    /// A binder has had something.
+    /// A binder has received its first update.
     void reached() { ++reached_; }
 
     void complete() {
         if (++complete_ == order_.binders) {
-            timer_.cancel(); // in case that somebody waits for silence
+            timer_.cancel(); // ends a wait for silence
         }
     }
 
     void fail(std::exception_ptr failure) {
         if (over_) {
-            return; // feeds that still wait are closed; and what follows from a first failure
+            return; // feeds that are still waiting were closed, or it follows from the first failure
         }
         over_ = true;
         failure_ = std::move(failure);
@@ -102,7 +102,7 @@ class gathering {
         io_.stop();
     }
 
-    // Nobody answers a BIND by the group: that it was heard shows when updates come.
+    // A BIND by the group has no reply: the first update shows that it has taken effect.
     asio::awaitable<void> reach_all() {
         const fan_out_order one{.binders = order_.binders, .updates = 1};
         while (reached_ < order_.binders) {
@@ -112,7 +112,7 @@ class gathering {
         }
     }
 
-    // Until all is complete, or nothing comes any more.
+    // Until the pass is complete, or nothing arrives any more.
     asio::awaitable<void> wait_for_silence() {
         for (auto before = all.count(); complete_ < order_.binders; before = all.count()) {
             timer_.expires_after(silence);
@@ -139,7 +139,7 @@ class gathering {
 
 class binder {
   public:
-    binder(gathering& all, const fan_out_binding& binding) : all_(all), binding_(binding) {}
+    binder(fan_out_pass& all, const fan_out_binding& binding) : all_(all), binding_(binding) {}
 
     void start(asio::io_context& io, cles::service& client) {
         asio::co_spawn(io, bind(client), [this](std::exception_ptr failure) {
@@ -186,7 +186,7 @@ class binder {
         });
     }
 
-    /// False once the last update has come, or is known to be lost.
+    /// False when the last update has arrived, or is known to be lost.
     bool take(const feed_item<publication>& item) {
         if (item.kind == feed_event::lost) {
             throw std::runtime_error("the publisher was lost: " + item.text);
@@ -208,7 +208,7 @@ class binder {
         return false;
     }
 
-    gathering& all_;
+    fan_out_pass& all_;
     const fan_out_binding& binding_;
     feed<publication> feed_;
     bool reached_ = false;
@@ -230,7 +230,7 @@ void serve_fan_out(service_options options, const run_options& how, const child_
 
 fan_out_tally take_fan_out(asio::io_context& io, const std::vector<cles::service*>& clients, const fan_out_order& order,
                            const fan_out_binding& binding, latency_recorder* record) {
-    gathering all{io, *clients.front(), order, binding.multicast, record};
+    fan_out_pass all{io, *clients.front(), order, binding.multicast, record};
     std::vector<std::unique_ptr<binder>> binders;
     for (std::uint64_t i = 0; i < order.binders; ++i) {
         binders.push_back(std::make_unique<binder>(all, binding));
@@ -238,7 +238,7 @@ fan_out_tally take_fan_out(asio::io_context& io, const std::vector<cles::service
     }
     io.restart();
     run(io, binding.how);
-    // What is still under way refers to the binders.
+    // Operations in progress refer to the binders.
     if (all.failure()) {
         for (auto* const each : clients) {
             each->stop();

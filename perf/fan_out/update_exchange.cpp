@@ -34,9 +34,9 @@ void rethrow(const std::exception_ptr& failure) {
 }
 
 /// What the binders of one run share.
-class gathering {
+class update_pass {
   public:
-    gathering(asio::io_context& io, cles::service& client, const update_load& load)
+    update_pass(asio::io_context& io, cles::service& client, const update_load& load)
         : io_(io), client_(client), load_(load) {}
 
     [[nodiscard]] const update_load& load() const noexcept { return load_; }
@@ -88,7 +88,7 @@ class gathering {
 template <class T>
 class binder {
   public:
-    explicit binder(gathering& all) : all_(all) {}
+    explicit binder(update_pass& all) : all_(all) {}
 
     void start(asio::io_context& io, cles::service& client) {
         asio::co_spawn(io, bind(client), [this](std::exception_ptr failure) {
@@ -134,7 +134,7 @@ class binder {
         });
     }
 
-    /// False once the last update has come.
+    /// False when the last update has arrived.
     bool take(const feed_item<T>& item) {
         if (item.kind == feed_event::lost) {
             throw std::runtime_error("the publisher was lost: " + item.text);
@@ -143,10 +143,10 @@ class binder {
         if (item.kind == feed_event::update) {
             if constexpr (std::is_same_v<T, localization>) {
                 if (!is_sample(item.value)) {
-                    throw std::runtime_error("the values that came are not those that were published");
+                    throw std::runtime_error("the received values are not those that were published");
                 }
             }
-            // The gaps that the feed reports, checked by the numbers that came.
+            // The gaps that the feed reports, checked against the numbers of the updates.
             if (last_seq_ != 0 && item.seq != last_seq_ + 1) {
                 holes_ += item.seq - last_seq_ - 1;
             }
@@ -161,7 +161,7 @@ class binder {
         return false;
     }
 
-    gathering& all_;
+    update_pass& all_;
     feed<T> feed_;
     std::uint64_t delivered_ = 0;
     std::uint64_t missed_ = 0;
@@ -172,7 +172,7 @@ class binder {
 template <class T>
 update_tally take(asio::io_context& io, const std::vector<std::unique_ptr<cles::service>>& clients,
                   const update_load& load) {
-    gathering all{io, *clients.front(), load};
+    update_pass all{io, *clients.front(), load};
     std::vector<std::unique_ptr<binder<T>>> binders;
     for (std::size_t i = 0; i < load.binders; ++i) {
         binders.push_back(std::make_unique<binder<T>>(all));
@@ -180,7 +180,7 @@ update_tally take(asio::io_context& io, const std::vector<std::unique_ptr<cles::
     }
     io.restart();
     run(io, load.how);
-    // What is still under way refers to the binders.
+    // Operations in progress refer to the binders.
     if (all.failed()) {
         for (const auto& each : clients) {
             each->stop();

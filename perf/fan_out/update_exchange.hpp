@@ -16,19 +16,19 @@
 #include <string_view>
 #include <vector>
 
-/// BIND and UPDATE of the localization packet, published as fast as all binders can take it.
+/// BIND and UPDATE of the localization packet, published as fast as all binders accept it.
 namespace cles::perf {
 
-/// What the binders want: sent as a PUSH, answered at once.
+/// What to publish: sent as a PUSH, which is answered at once.
 struct publish_order {
     std::uint64_t updates = 0;
 };
 BOOST_DESCRIBE_STRUCT(publish_order, (), (updates))
 
-/// A node that publishes when it is told to, for ever.
+/// A node that publishes when it receives a `publish_order`. Does not return.
 void serve_updates(std::string_view url, const run_options& how, const child_process::announce& announce);
 
-/// In what form a binder takes a value.
+/// As what a binder receives a value.
 enum class value_form : std::uint8_t {
     raw,   ///< `json_text`: checked, but not read
     typed, ///< the described struct
@@ -49,10 +49,9 @@ struct update_load {
     std::uint32_t keep = 0; ///< updates that the publisher queues for a slow binder; 0: the protocol's default
 };
 
-/// Binds all, each at a client of its own, since feeds of one would share a link; has the updates published, and takes
-/// them until every binder has had the last one.
-/// \pre there are as many clients as binders
-/// \throws cles::error, std::runtime_error where a value came changed
+/// Binds all, each at a client of its own, because feeds of one client would share a link; has the updates published,
+/// and receives them until every binder has the last one. \pre there are as many clients as binders \throws
+/// cles::error, std::runtime_error if a value was changed
 update_tally take_updates(boost::asio::io_context& io, const std::vector<std::unique_ptr<cles::service>>& clients,
                           const update_load& load);
 

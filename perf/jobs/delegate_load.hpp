@@ -18,11 +18,11 @@ namespace cles::perf {
 /// Keeps a number of DELEGATEs with an empty body in flight from one client.
 class delegate_load {
   public:
-    /// `noun` names the task at a node to which the client must know the way; `how` the client's loop runs.
+    /// `how` the client's loop runs. \pre the client can reach the node of `noun`
     delegate_load(boost::asio::io_context& io, cles::service& client, std::string noun, const run_options& how);
 
     /// Runs until the recorder is full. Returns how long that took.
-    /// \throws cles::error as the first request that fails, after which the client is of no further use
+    /// \throws cles::error of the first request that fails; the client cannot be used afterwards
     std::chrono::nanoseconds run(std::size_t in_flight, latency_recorder& record);
 
   private:

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/plugin.hpp>
 
-// A job that does nothing, so that what is measured is the way to it and back.
+// A job that does nothing, to measure what surrounds it.
 static void register_tasks(cles::registrar& to) {
     to.on_delegate("empty", [] {});
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a job costs that does nothing: DELEGATE to the task of a plugin on a daemon's workers, over TCP, beside the
-// hand-written exchange in the same round. Prints medians of the rounds.
+// What an empty job costs: DELEGATE to the task of a plugin on a daemon's workers over TCP, and the hand-written
+// exchange in the same round. Prints medians of the rounds.
 //
 //   cles_job_cost PLUGIN [--workers N] [--rounds N] [--spread] [--busy-poll US]
 //
@@ -51,21 +51,22 @@ struct options {
 options read(std::span<char*> arguments) {
     options o;
     for (std::size_t i = 1; i < arguments.size(); ++i) {
-        const std::string_view word = arguments[i];
-        if (word == "--spread") {
+        const std::string_view option = arguments[i];
+        if (option == "--spread") {
             o.spread = true;
-        } else if ((word == "--workers" || word == "--rounds" || word == "--busy-poll") && i + 1 < arguments.size()) {
+        } else if ((option == "--workers" || option == "--rounds" || option == "--busy-poll") &&
+                   i + 1 < arguments.size()) {
             const std::string_view text = arguments[++i];
-            auto& number = word == "--workers" ? o.workers : word == "--rounds" ? o.rounds : o.busy_poll_us;
+            auto& number = option == "--workers" ? o.workers : option == "--rounds" ? o.rounds : o.busy_poll_us;
             const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), number);
             if (wrong != std::errc{} || end != text.data() + text.size() || number > 1000 ||
-                (number == 0 && word != "--busy-poll")) {
-                throw std::invalid_argument(std::string{word} + " takes a number up to 1000");
+                (number == 0 && option != "--busy-poll")) {
+                throw std::invalid_argument(std::string{option} + " takes a number up to 1000");
             }
-        } else if (!word.starts_with('-') && o.plugin.empty()) {
-            o.plugin = word;
+        } else if (!option.starts_with('-') && o.plugin.empty()) {
+            o.plugin = option;
         } else {
-            throw std::invalid_argument("'" + std::string{word} + "' is not known");
+            throw std::invalid_argument("'" + std::string{option} + "' is not an option");
         }
     }
     if (o.plugin.empty()) {

@@ -26,7 +26,7 @@ namespace asio = boost::asio;
 namespace {
 
 using clock_type = std::chrono::steady_clock;
-constexpr std::size_t passed_over = 5;
+constexpr std::size_t ignored_results = 5;
 
 double microseconds_since(clock_type::time_point began) {
     return std::chrono::duration<double, std::micro>(clock_type::now() - began).count();
@@ -34,11 +34,11 @@ double microseconds_since(clock_type::time_point began) {
 
 void check(const localization& value) {
     if (!is_sample(value)) {
-        throw std::runtime_error("the values that came are not those that were sent");
+        throw std::runtime_error("the received values are not those that were sent");
     }
 }
 
-/// When to ask next: as time passes, or at once where the last answer was late.
+/// When to send the next request: at fixed intervals, or at once if the last answer was late.
 clock_type::time_point after(clock_type::time_point last, pace how) {
     return std::max(last + how.interval, clock_type::now());
 }
@@ -46,14 +46,14 @@ clock_type::time_point after(clock_type::time_point last, pace how) {
 asio::awaitable<void> ask_for_pulls(cles::service& client, pace how, std::vector<double>& times) {
     asio::steady_timer timer{client.get_executor()};
     auto began = clock_type::now();
-    for (std::size_t i = 0; i < passed_over + how.count; ++i) {
+    for (std::size_t i = 0; i < ignored_results + how.count; ++i) {
         timer.expires_at(after(began, how));
         co_await timer.async_wait(asio::use_awaitable);
         began = clock_type::now();
         const auto value = co_await client.async_pull<localization>("car1:localization");
         const double took = microseconds_since(began);
         check(value);
-        if (i >= passed_over) {
+        if (i >= ignored_results) {
             times.push_back(took);
         }
     }
@@ -62,18 +62,18 @@ asio::awaitable<void> ask_for_pulls(cles::service& client, pace how, std::vector
 asio::awaitable<void> take_updates(cles::service& client, cles::bind_options binding, pace how,
                                    std::vector<double>& ages) {
     auto feed = co_await client.async_bind<localization>("car1:localization", binding);
-    for (std::size_t taken = 0; taken < passed_over + how.count;) {
+    for (std::size_t taken = 0; taken < ignored_results + how.count;) {
         const auto item = co_await feed.async_next();
         if (item.kind == feed_event::lost) {
             throw std::runtime_error("the publisher was lost: " + item.text);
         }
-        if (item.kind == feed_event::update && taken++ >= passed_over) {
+        if (item.kind == feed_event::update && taken++ >= ignored_results) {
             ages.push_back(age_of(item.value));
         }
     }
 }
 
-/// Runs what `work` gives, with a client of that setup, until it has ended.
+/// Runs the coroutine that `work` returns, with a client with these options.
 template <class F>
 void by_cles(cles::service_options setup, F work) {
     asio::io_context io{1};
@@ -96,13 +96,13 @@ std::vector<double> time_pulls_by_hand(const std::string& url, pace how) {
     icd::client client{parse_url(url)};
     std::vector<double> times;
     auto began = clock_type::now();
-    for (std::size_t i = 0; i < passed_over + how.count; ++i) {
+    for (std::size_t i = 0; i < ignored_results + how.count; ++i) {
         std::this_thread::sleep_until(after(began, how));
         began = clock_type::now();
         const auto value = client.pull();
         const double took = microseconds_since(began);
         check(value);
-        if (i >= passed_over) {
+        if (i >= ignored_results) {
             times.push_back(took);
         }
     }
@@ -112,16 +112,16 @@ std::vector<double> time_pulls_by_hand(const std::string& url, pace how) {
 std::vector<double> time_updates_by_hand(const std::string& url, pace how) {
     const auto socket = connect_to(parse_url(url));
     std::vector<double> ages;
-    for (std::size_t i = 0; i < passed_over + how.count; ++i) {
+    for (std::size_t i = 0; i < ignored_results + how.count; ++i) {
         icd::reply_bytes bytes;
         if (!receive_all(socket.get(), bytes)) {
-            throw std::runtime_error("the hand-written publisher has gone");
+            throw std::runtime_error("the hand-written publisher closed the connection");
         }
         const auto value = icd::unpack_reply(bytes);
         if (!value) {
-            throw std::runtime_error("the hand-written publisher sent what is no packet");
+            throw std::runtime_error("the hand-written publisher sent something that is not a packet");
         }
-        if (i >= passed_over) {
+        if (i >= ignored_results) {
             ages.push_back(age_of(*value));
         }
     }

@@ -16,13 +16,13 @@ namespace cles::perf {
 /// Called with the URL once the server listens.
 using announcement = std::function<void(std::string_view)>;
 
-/// By the library: a node "car1" that answers PULL of "localization", and publishes it as time passes.
-/// \param interface by which it takes part in multicast; empty: it does not
+/// By the library: a node "car1" that answers PULL of "localization", and publishes it at each interval.
+/// \param interface the interface for multicast; empty: no multicast
 void serve_car(std::string_view url, std::string_view interface, std::chrono::milliseconds interval,
                const announcement& announce);
 /// By hand: answers each request.
 void serve_replies_by_hand(std::string_view url, const announcement& announce);
-/// By hand: the packet of a reply, sent unasked as time passes, to one client after the other.
+/// By hand: sends the packet of a reply at each interval, to one client after the other.
 void serve_updates_by_hand(std::string_view url, std::chrono::milliseconds interval, const announcement& announce);
 
 // The client wants the data. Each function connects, ignores the first few results, and returns latencies in
@@ -30,17 +30,17 @@ void serve_updates_by_hand(std::string_view url, std::chrono::milliseconds inter
 
 struct pace {
     std::size_t count = 1;
-    std::chrono::milliseconds interval{}; ///< from one question to the next; updates come as they are published
+    std::chrono::milliseconds interval{}; ///< between requests; updates arrive as they are published
 };
 
-/// From the request to the values: one after the other.
+/// From the request to the values, one request after the other.
 std::vector<double> time_pulls_by_hand(const std::string& url, pace how);
 std::vector<double> time_pulls(const std::string& url, pace how);
 
 /// One way, from the publication to the values.
 std::vector<double> time_updates_by_hand(const std::string& url, pace how);
 std::vector<double> time_updates(const std::string& url, pace how);
-/// Those of the car that is heard by multicast at that interface; what the link loses is passed over.
+/// From the node that is found by multicast at that interface. Lost updates are ignored.
 std::vector<double> time_updates_by_multicast(const std::string& interface, pace how);
 
 } // namespace cles::perf

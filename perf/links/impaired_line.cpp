@@ -8,7 +8,7 @@ namespace cles::perf {
 namespace {
 
 constexpr double bits_per_byte = 8;
-constexpr double most_jitter = 20; // times the average, so that nothing waits for ever
+constexpr double max_jitter = 20; // times the average
 
 } // namespace
 
@@ -17,7 +17,7 @@ void impaired_line::send(clock::time_point now, frame sent) {
         ++overflown_;
         return;
     }
-    // The line is taken for as long as the frame is, whether or not it arrives.
+    // The line is occupied for the transmission time of the frame, even if the frame is lost.
     auto sent_by = std::max(now, free_);
     if (how_.bits_per_s != 0) {
         const double seconds = static_cast<double>(sent.size()) * bits_per_byte / static_cast<double>(how_.bits_per_s);
@@ -51,7 +51,7 @@ impaired_line::clock::duration impaired_line::draw_jitter() {
     if (how_.jitter <= clock::duration::zero()) {
         return {};
     }
-    const double times = std::min(std::exponential_distribution<>{}(chance_), most_jitter);
+    const double times = std::min(std::exponential_distribution<>{}(chance_), max_jitter);
     return std::chrono::duration_cast<clock::duration>(std::chrono::duration<double, std::nano>(
         static_cast<double>(std::chrono::nanoseconds{how_.jitter}.count()) * times));
 }

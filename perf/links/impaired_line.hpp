@@ -11,20 +11,19 @@
 
 namespace cles::perf {
 
-/// How bad a link is.
+/// The properties of a bad link.
 struct impairment {
-    std::chrono::nanoseconds delay{}; ///< of every frame
-    std::chrono::nanoseconds
-        jitter{};                 ///< on average, on top of the delay: often less, now and then several times as much
-    double loss = 0;              ///< share of the frames, each lost apart from the others
-    std::uint64_t bits_per_s = 0; ///< what it carries; 0: as much as comes
-    std::size_t queue = 1000;     ///< frames under way at most; one that comes when there are as many is dropped
+    std::chrono::nanoseconds delay{};  ///< of every frame
+    std::chrono::nanoseconds jitter{}; ///< on average, on top of the delay: often less, sometimes several times as much
+    double loss = 0;                   ///< share of the frames, each independently
+    std::uint64_t bits_per_s = 0;      ///< bandwidth; 0: unlimited
+    std::size_t queue = 1000;          ///< most frames in flight; further ones are dropped
 };
 
-/// One direction of a link: takes frames, and says when each arrives, if it does. Frames stay in order, as on a radio
-/// link that repeats what was not acknowledged: one that is late holds up those behind it.
+/// One direction of a link: determines when each frame arrives, or that it is lost. Frames stay in order, as on a radio
+/// link that retransmits what was not acknowledged: a late frame delays those behind it.
 ///
-/// Decides without a clock or a network; chance comes from the seed alone.
+/// It uses no clock and no network, and random numbers only from the seed.
 class impaired_line {
   public:
     using clock = std::chrono::steady_clock;
@@ -32,11 +31,11 @@ class impaired_line {
 
     impaired_line(const impairment& how, std::uint64_t seed) : how_(how), chance_(seed) {}
 
-    /// A frame is put on the line.
+    /// Sends a frame.
     void send(clock::time_point now, frame sent);
-    /// When the next frame arrives; nothing where none is under way.
+    /// When the next frame arrives; empty if none is in flight.
     [[nodiscard]] std::optional<clock::time_point> next_arrival() const;
-    /// The next frame that has arrived by now; nothing where none has.
+    /// The next frame that has arrived by now, if there is one.
     std::optional<frame> receive(clock::time_point now);
 
     [[nodiscard]] std::uint64_t carried() const noexcept { return carried_; }
@@ -54,7 +53,7 @@ class impaired_line {
     impairment how_;
     std::mt19937_64 chance_;
     std::deque<travelling> under_way_;
-    clock::time_point free_{};         // when the sender has the line for itself again
+    clock::time_point free_{};         // when the sender can send again
     clock::time_point last_arrival_{}; // nothing arrives before what was sent earlier
     std::uint64_t carried_ = 0;
     std::uint64_t lost_ = 0;

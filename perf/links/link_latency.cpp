@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The localization packet across a link, by CLES and by hand: each end is a process of its own, wherever it is to be.
+// The localization packet across a link, by CLES and by hand: each end is a process of its own, on any host.
 #include <cles/convert.hpp>
 
 #include "ends.hpp"
@@ -26,15 +26,15 @@ struct settings {
     std::size_t count = 100;
 };
 
-void tell(std::string_view url) { std::cout << url << std::endl; }
+void print(std::string_view url) { std::cout << url << std::endl; }
 
 void serve(const settings& given, std::chrono::milliseconds interval) {
     if (given.what == "car") {
-        perf::serve_car(given.url, given.interface, interval, tell);
+        perf::serve_car(given.url, given.interface, interval, print);
     } else if (given.what == "icd-pull") {
-        perf::serve_replies_by_hand(given.url, tell);
+        perf::serve_replies_by_hand(given.url, print);
     } else {
-        perf::serve_updates_by_hand(given.url, interval, tell);
+        perf::serve_updates_by_hand(given.url, interval, print);
     }
 }
 
@@ -55,9 +55,10 @@ int main(int argc, char** argv) {
     serving->add_option("what", given.what, "car (CLES), icd-pull or icd-update")
         ->required()
         ->check(CLI::IsMember({"car", "icd-pull", "icd-update"}));
-    serving->add_option("url", given.url, "Where to listen, as tcp://10.0.0.1:0")->required();
-    serving->add_option("--multicast", given.interface, "By which interface the car takes part in multicast");
-    auto* asking = program.add_subcommand("time", "The end that wants it; prints microseconds as a JSON array");
+    serving->add_option("url", given.url, "Where to listen, such as tcp://10.0.0.1:0")->required();
+    serving->add_option("--multicast", given.interface, "The interface for multicast");
+    auto* asking =
+        program.add_subcommand("time", "The end that requests the data; prints microseconds as a JSON array");
     asking->add_option("what", given.what, "pull, update, update-multicast, icd-pull or icd-update")
         ->required()
         ->check(CLI::IsMember({"pull", "update", "update-multicast", "icd-pull", "icd-update"}));

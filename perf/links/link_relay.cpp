@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
-// Two network devices with a bad link between them: what is sent by one arrives at the other late, or not at all.
+// Two network devices with a bad link between them: frames that one sends reach the other late, or not at all.
 //
-// It makes both devices in the network namespace that it runs in; one of them, or both, can be moved to another. Unlike
-// a proxy of bytes it can lose packets of TCP, and unlike a token bucket it takes its time for every frame.
+// It creates both devices in its own network namespace; they can be moved to others. Unlike a proxy it can lose packets
+// of TCP, and unlike a token bucket it delays every frame by its transmission time.
 #include "impaired_line.hpp"
 #include "perf/support/descriptor.hpp"
 
@@ -35,9 +35,9 @@ using cles::perf::impaired_line;
 
 constexpr std::size_t largest_frame = 65536;
 
-/// Makes a network device of that name whose frames this process carries: what the system sends by it can be read, and
-/// what is written arrives there. It goes with the descriptor, whatever network namespace it was moved to.
-/// \throws std::system_error if it may not be made, or the name is taken
+/// Creates a network device whose frames this process carries: what the system sends through it can be read, and what
+/// is written arrives there. The device is removed when the descriptor is closed, in any network namespace. \throws
+/// std::system_error if it cannot be created, or the name is in use
 asio::posix::stream_descriptor open_device(asio::io_context& io, const std::string& name) {
     ifreq request{};
     if (name.empty() || name.size() >= sizeof request.ifr_name) {
@@ -126,8 +126,8 @@ cles::perf::impairment to_impairment(const settings& given) {
             .queue = given.queue};
 }
 
-void tell(const char* which, const impaired_line& line) {
-    std::printf("%s: %llu frames carried, %llu lost, %llu dropped where too many waited\n", which,
+void print_totals(const char* which, const impaired_line& line) {
+    std::printf("%s: %llu frames carried, %llu lost, %llu dropped because the queue was full\n", which,
                 static_cast<unsigned long long>(line.carried()), static_cast<unsigned long long>(line.lost()),
                 static_cast<unsigned long long>(line.overflown()));
 }
@@ -145,29 +145,29 @@ void relay(const settings& given) {
     signals.async_wait([&](boost::system::error_code, int) { io.stop(); });
     std::cout << "relaying between " << given.near << " and " << given.far << std::endl;
     io.run();
-    tell("there", there.line());
-    tell("back", back.line());
+    print_totals("there", there.line());
+    print_totals("back", back.line());
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
-    CLI::App program{"Two network devices with a bad link between them. It takes the right to make devices."};
+    CLI::App program{"Two network devices with a bad link between them. It requires the right to create devices."};
     settings given;
     program.add_option("--near", given.near, "Name of the one device")->capture_default_str();
     program.add_option("--far", given.far, "Name of the other")->capture_default_str();
     program.add_option("--delay", given.delay_ms, "Milliseconds that each frame takes")
         ->check(CLI::Range(0.0, 10'000.0));
-    program.add_option("--jitter", given.jitter_ms, "Milliseconds on top of it, on average; frames stay in order")
+    program.add_option("--jitter", given.jitter_ms, "Additional milliseconds, on average; frames stay in order")
         ->check(CLI::Range(0.0, 1'000.0));
     program.add_option("--loss", given.loss_percent, "Per cent of the frames that are lost")
         ->check(CLI::Range(0.0, 100.0));
     program.add_option("--rate", given.rate_kbit, "Kilobits a second in each direction; 0: no limit")
         ->check(CLI::Range(0.0, 1e7));
-    program.add_option("--queue", given.queue, "Frames under way at most, in each direction")
+    program.add_option("--queue", given.queue, "Most frames in flight, in each direction")
         ->check(CLI::Range(std::size_t{1}, std::size_t{100'000}))
         ->capture_default_str();
-    program.add_option("--seed", given.seed, "Of all chance")->capture_default_str();
+    program.add_option("--seed", given.seed, "Of all random numbers")->capture_default_str();
     CLI11_PARSE(program, argc, argv);
     try {
         relay(given);

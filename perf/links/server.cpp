@@ -80,7 +80,7 @@ void serve_updates_by_hand(std::string_view url, std::chrono::milliseconds inter
         try {
             send_updates(client.get(), interval);
         } catch (const std::system_error&) {
-            continue; // that client has gone: the next one
+            continue; // the client has disconnected
         }
     }
 }

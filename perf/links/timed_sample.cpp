@@ -33,7 +33,7 @@ double age_of(const localization& value) {
         sample(static_cast<std::uint64_t>(std::max(0L, std::lround((value.velocity - first.velocity) / step))));
     wanted.utc = value.utc;
     if (value != wanted) {
-        throw std::runtime_error("the values that came are not those that were sent");
+        throw std::runtime_error("the received values are not those that were sent");
     }
     return now_us() - std::round(value.utc * per_second);
 }

@@ -7,12 +7,12 @@
 
 namespace cles::perf {
 
-/// The values in turn, with the host's time as their `utc`, to the microsecond: what the packet is for, so that one way
-/// is timed without a byte more on the link. Both ends have one host's clock.
+/// The nth sample, with the host's time as its `utc`, to the microsecond. So one way can be timed without additional
+/// bytes on the link, because both ends read the clock of the same host.
 localization timed_sample(std::uint64_t n) noexcept;
 
-/// How long ago such a sample was taken, in microseconds.
-/// \throws std::runtime_error where it is none
+/// The age of such a sample in microseconds.
+/// \throws std::runtime_error if it is not one
 double age_of(const localization& value);
 
 } // namespace cles::perf

@@ -15,13 +15,13 @@ namespace {
 
 using buffer = std::array<std::byte, 65536>;
 
-/// Passes on what there is; false at the end of the stream.
+/// Forwards what has arrived; false at the end of the stream.
 bool pass(int from, int to, std::atomic<std::uint64_t>& count, buffer& space) {
     const auto got = ::recv(from, space.data(), space.size(), 0);
     if (got <= 0) {
         return false;
     }
-    // Counted first: who has the answer in hand finds it counted.
+    // Counted first, so that whoever has received the answer finds it counted.
     count += static_cast<std::uint64_t>(got);
     send_all(to, std::span{space}.first(static_cast<std::size_t>(got)));
     return true;
@@ -67,7 +67,7 @@ void byte_tap::run() {
             }
         }
     } catch (const std::exception&) {
-        return; // one of the ends is gone, as the other will notice
+        return; // one of the ends has closed its connection; the other will notice
     }
 }
 

@@ -12,12 +12,12 @@
 
 namespace cles::perf {
 
-/// Stands between the two ends of one link and counts what crosses it, so that no figure rests on what an end believes
-/// that it sent. Counted are the stream's bytes, without the headers of TCP and IP.
+/// A relay between the two ends of one link that counts the bytes of the stream, without the headers of TCP and IP. So
+/// figures do not depend on what an end reports.
 class byte_tap {
   public:
-    /// Listens for the one link that it passes on to a `tcp` or `unix` URL.
-    /// \throws std::system_error, std::runtime_error where the URL cannot be reached
+    /// Listens for the link that it forwards to a `tcp` or `unix` URL.
+    /// \throws std::system_error, std::runtime_error if the URL cannot be reached
     explicit byte_tap(const cles::url& target);
     byte_tap(const byte_tap&) = delete;
     byte_tap& operator=(const byte_tap&) = delete;

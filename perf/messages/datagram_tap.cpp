@@ -52,7 +52,7 @@ std::string datagram_tap::url() const {
     return to_string(cles::url{.scheme = "udp", .host = "127.0.0.1", .port = ntohs(address.sin_port), .path = {}});
 }
 
-// What cannot be passed on is lost, as datagrams may be.
+// What cannot be forwarded is lost, as datagrams may be.
 void datagram_tap::run() {
     std::array<std::byte, 65536> space{};
     sockaddr_in client{};
@@ -64,7 +64,7 @@ void datagram_tap::run() {
             socklen_t length = sizeof client;
             const auto got = ::recvfrom(client_.get(), space.data(), space.size(), 0, generic(client), &length);
             if (got > 0) {
-                // Counted first: who has the answer in hand finds it counted.
+                // Counted first, so that whoever has received the answer finds it counted.
                 to_server_ += static_cast<std::uint64_t>(got);
                 ::send(server_.get(), space.data(), static_cast<std::size_t>(got), 0);
             }

@@ -12,8 +12,8 @@
 
 namespace cles::perf {
 
-/// What `byte_tap` is for streams, for datagrams: stands between one client and a node at a `udp` URL on the loopback,
-/// and counts what crosses it, without the headers of UDP and IP.
+/// The same as `byte_tap` for datagrams: a relay between one client and a node at a `udp` URL on loopback that counts
+/// bytes without the headers of UDP and IP.
 class datagram_tap {
   public:
     /// \throws std::system_error

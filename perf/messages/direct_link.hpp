@@ -10,15 +10,15 @@
 
 namespace cles::perf {
 
-/// A link without a carrier: lines are handed to the service, and its own taken, by calls of functions. So what a line
-/// costs can be measured apart from sockets and without a look inside the library.
+/// A link without a transport: lines to and from the service are passed by function calls. So the cost of a line is
+/// measured without sockets, and without access to the library's internals.
 class direct_link final : public link {
   public:
     explicit direct_link(std::string where);
 
-    /// Hands over a line, as a read that brought this one line would.
+    /// Delivers a line, like a read that returned this one line.
     void deliver(std::string_view line);
-    /// What the service wrote last.
+    /// What the service has written last.
     [[nodiscard]] const std::string& written() const noexcept { return written_; }
 
     void start(std::shared_ptr<link_events> owner) override { owner_ = std::move(owner); }
@@ -41,12 +41,12 @@ class direct_link final : public link {
     std::uint64_t received_ = 0;
 };
 
-/// The one place where direct links are made: a service listens at `url`, or has its peer there.
+/// Creates direct links: a service listens at `url`, or has its peer there.
 class direct_exchange {
   public:
     static constexpr const char* url = "direct://here:1";
 
-    /// Registers the scheme "direct". There may be one at a time, and a service of each kind.
+    /// Registers the scheme "direct". \pre there is no other one, and only one service of each kind
     direct_exchange();
 
     /// A link into the service that listens.

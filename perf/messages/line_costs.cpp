@@ -14,11 +14,11 @@ namespace {
 
 using clock = std::chrono::steady_clock;
 
-constexpr std::string_view wanted = "id=1 {}\n";
+constexpr std::string_view expected_reply = "id=1 {}\n";
 
 double nanoseconds(clock::duration span) { return static_cast<double>(std::chrono::nanoseconds{span}.count()); }
 
-/// `{"samples":[...]}` of so many bytes, or a few less.
+/// `{"samples":[...]}` of this number of bytes, or a few less.
 std::string series_text(std::size_t bytes) {
     constexpr std::string_view end = "]}";
     std::string text = R"({"samples":[)";
@@ -32,7 +32,7 @@ std::string series_text(std::size_t bytes) {
     return text.append(end);
 }
 
-/// The same numbers as one writes them by hand: a type and a length of 4 bytes each, and the numbers, in network order.
+/// The same numbers in a packed struct: a type and a length of 4 bytes each, and the numbers, in network order.
 std::vector<std::byte> pack(const series& values) {
     std::vector<std::byte> packed(8 + 8 * values.samples.size());
     const std::uint32_t head[2] = {htobe32(icd::reply_type), htobe32(static_cast<std::uint32_t>(packed.size()))};
@@ -65,9 +65,9 @@ double time_packed(const std::vector<std::byte>& packed, std::uint64_t repetitio
     for (std::uint64_t i = 0; i < repetitions; ++i) {
         series values;
         if (!unpack(packed, values)) {
-            throw std::runtime_error("the packed struct is none");
+            throw std::runtime_error("the packed struct cannot be read");
         }
-        asm volatile("" : : "r"(values.samples.data()) : "memory"); // or the compiler would see that nobody looks
+        asm volatile("" : : "r"(values.samples.data()) : "memory"); // otherwise the compiler would optimise it away
     }
     return nanoseconds(clock::now() - began) / static_cast<double>(repetitions);
 }
@@ -86,7 +86,7 @@ line_costs::line_costs()
 line_costs::~line_costs() = default;
 
 line_times line_costs::measure(std::size_t bytes, std::uint64_t repetitions) {
-    // A part of the head that no node knows and every node reads.
+    // An adverb that no node knows, but every node has to parse.
     std::string head = "PULL car1:nothing id=1 pad=";
     head.append(bytes - head.size(), 'x');
     const std::string text = "PUSH car1:text id=1 ";
@@ -130,7 +130,7 @@ double line_costs::time_reply(const std::string& body, std::uint64_t repetitions
         bool came = false;
         client_.async_pull<T>("car1:series", [&](boost::system::error_code code, const T&) { came = !code; });
         io_.restart();
-        io_.poll(); // the request leaves, the first time after the link has been made
+        io_.poll(); // sends the request; the first time this creates the link
         const auto& asked = exchange_.dialled()->written();
         const auto id = asked.find("id=");
         reply.assign(asked, id, asked.find_first_of(" \n", id) - id).append(" ").append(body);
@@ -139,7 +139,7 @@ double line_costs::time_reply(const std::string& body, std::uint64_t repetitions
         exchange_.dialled()->deliver(reply);
         took += clock::now() - began;
         if (!came) {
-            throw std::runtime_error("a reply was not taken");
+            throw std::runtime_error("a reply was not delivered");
         }
     }
     return nanoseconds(took) / static_cast<double>(repetitions);

@@ -16,25 +16,25 @@
 
 namespace cles::perf {
 
-/// What the measured messages carry: as many numbers as make the message long.
+/// The body of the measured messages, with as many numbers as their length requires.
 struct series {
     std::vector<double> samples;
 };
 BOOST_DESCRIBE_STRUCT(series, (), (samples))
 
-/// Nanoseconds that a message takes in the means of one pass, from the line in memory to the handler's or caller's code
-/// (and, of a request, until its reply stands in memory).
+/// Nanoseconds for a message, the mean of one pass: from the line in memory to the handler's or caller's code, and for
+/// a request until its reply is in memory.
 struct line_times {
-    double head = 0;             ///< a PULL whose head is that long
-    double validated = 0;        ///< a PUSH whose body is that long, and its handler does not read it
+    double head = 0;             ///< a PULL whose head has that length
+    double validated = 0;        ///< a PUSH whose body has that length, and is not read by the handler
     double typed = 0;            ///< the same, read into the handler's C++ type
-    double reply_validated = 0;  ///< a reply that long, to a caller who takes text
+    double reply_validated = 0;  ///< a reply of that length, delivered as text
     double reply_typed = 0;      ///< the same, read into the caller's C++ type
     double packed = 0;           ///< the same numbers from a packed struct in network order
     std::size_t packed_size = 0; ///< its bytes
 };
 
-/// Two services without sockets, one that is asked and one that asks, and messages of one length for both.
+/// A server and a client without sockets.
 class line_costs {
   public:
     line_costs();
@@ -42,8 +42,8 @@ class line_costs {
     line_costs(const line_costs&) = delete;
     line_costs& operator=(const line_costs&) = delete;
 
-    /// Measures messages of so many bytes, or a few less, their LF not counted; 64 at least.
-    /// \throws std::runtime_error where something is answered wrongly
+    /// Measures messages of this number of bytes, or a few less, without their LF. \pre `bytes` >= 64
+    /// \throws std::runtime_error if an answer is wrong
     line_times measure(std::size_t bytes, std::uint64_t repetitions);
 
   private:
@@ -56,7 +56,7 @@ class line_costs {
     service car_;
     service client_;
     std::shared_ptr<direct_link> into_car_;
-    std::size_t read_ = 0; ///< numbers that the typed handler got last
+    std::size_t read_ = 0; ///< numbers that the typed handler received last
 };
 
 } // namespace cles::perf

@@ -28,7 +28,7 @@ void register_all(service& car) {
     car.on_update("localization", [](const localization&) {});
 }
 
-/// Counts from one point to another.
+/// Counts the bytes between two points in time.
 template <class Tap>
 class meter {
   public:
@@ -78,7 +78,7 @@ asio::awaitable<void> measure(service& car, service& client, const Tap& tap, std
 
     const auto current = co_await feed.async_next();
     if (current.kind != feed_event::current) {
-        throw error(errc::failed, "the reply to BIND held no packet");
+        throw error(errc::failed, "the reply to BIND does not contain a packet");
     }
     const meter updates{tap};
     for (std::uint64_t i = 0; i < exchanges; ++i) {

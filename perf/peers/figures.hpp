@@ -13,17 +13,17 @@
 
 namespace cles::perf::peers {
 
-/// What a middleware takes of a machine, as the kernel knows it.
+/// What a process uses, as the kernel reports it.
 struct footprint {
-    std::uint64_t peak_kib = 0; ///< the most that was resident, VmHWM
+    std::uint64_t peak_kib = 0; ///< most resident memory, VmHWM
     std::map<std::string, std::uint64_t>
         libraries; ///< shared ones besides those of C and C++: path to bytes in the file
 };
 
-/// \throws std::runtime_error where there is no such process
+/// \throws std::runtime_error if there is no such process
 footprint footprint_of(pid_t process);
 
-/// Of this process's own program: what of its file is loaded, that is code and data without symbols.
+/// The loaded size of this program: code and data without symbols.
 std::uint64_t loaded_program_bytes();
 
 struct figures {
@@ -31,12 +31,12 @@ struct figures {
     latencies latency;
     double per_second = 0;
     double cpu_us = 0;                           ///< of all processes, for each call or delivery
-    double lost = 0;                             ///< the part of the deliveries that never came
-    std::map<std::string, footprint> footprints; ///< of each process, by what it is
+    double lost = 0;                             ///< the share of the deliveries that did not arrive
+    std::map<std::string, footprint> footprints; ///< of each process, by its role
     std::uint64_t program_bytes = 0;
 };
 
-/// Measures one peer in one way: starts its server, warms it up, asks it or has it publish.
+/// Measures one peer in one way: starts its server, warms it up, sends requests or has it publish.
 /// \throws not_offered
 figures measure(const options& how);
 

@@ -45,7 +45,7 @@ const description about{
     .carriers = "tcp unix",
     .settings =
         "unary calls on one channel, asynchronous server with one completion queue; streams by the callback API; both "
-        "ends on all cores, since it is several times slower where its threads share one",
+        "ends on all cores, because it is several times slower if its threads share one",
     .on_all_cores = true,
 };
 

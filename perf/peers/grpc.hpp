@@ -12,16 +12,16 @@
 
 namespace cles::perf::peers {
 
-/// Listens, and says where. \throws std::runtime_error
+/// Listens, and sets `where` to the address. \throws std::runtime_error
 std::unique_ptr<::grpc::Server> start_grpc(::grpc::ServerBuilder& builder, const std::string& listen,
                                            std::string& where);
-/// A connection that nobody else in this process shares.
+/// A connection that is not shared within this process.
 std::shared_ptr<::grpc::Channel> own_channel(const std::string& where);
 
 void serve_calls(call what, const std::string& listen, const announce& tell);
 std::unique_ptr<caller> make_grpc_caller(call what, const std::string& where);
 
-/// Streams what is published to whoever has called.
+/// Streams publications to all subscribers.
 class grpc_publisher {
   public:
     explicit grpc_publisher(const std::string& listen);
@@ -30,7 +30,7 @@ class grpc_publisher {
     ~grpc_publisher();
 
     [[nodiscard]] const std::string& where() const noexcept;
-    /// Waits for a subscriber that has not taken what came before.
+    /// Waits for subscribers that have not received the previous one.
     void publish(const publication& value);
 
   private:

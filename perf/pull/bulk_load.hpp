@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <string>
 
-/// Large answers of a node, so many at once that it always has some to send.
+/// Large answers of a node, so many in flight that it always has one to send.
 namespace cles::perf {
 
 inline constexpr std::size_t bulk_bytes = 100'000;
@@ -14,14 +14,14 @@ inline constexpr std::size_t bulk_bytes = 100'000;
 /// Registers the PULL of `bulk_bytes`.
 void register_bulk(cles::registrar& tasks);
 
-/// Keeps PULLs of them in flight. When it goes none may be, or the client's context runs no more.
+/// Keeps PULLs of them in flight. \pre when it is destroyed, none is in flight, or the client's context no longer runs
 class bulk_load {
   public:
-    /// `node` is one to which the client knows the way.
+    /// \pre the client can reach `node`
     bulk_load(cles::service& client, const std::string& node) : client_(client), noun_(node + ":bulk") {}
 
     void start(std::size_t in_flight);
-    /// Asks for no more; what is in flight still comes.
+    /// Starts no more; those in flight are still answered.
     void stop() noexcept { over_ = true; }
     [[nodiscard]] std::size_t in_flight() const noexcept { return in_flight_; }
 

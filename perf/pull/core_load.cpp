@@ -7,7 +7,7 @@
 namespace cles::perf {
 namespace {
 
-constexpr std::size_t words = std::size_t{4} << 20U; // 32 MiB: more than a core's own caches hold
+constexpr std::size_t words = std::size_t{4} << 20U; // 32 MiB: more than the caches of a core
 
 [[noreturn]] void burn(const child_process::announce& announce) {
     std::vector<std::uint64_t> memory(words, 1);
@@ -19,7 +19,7 @@ constexpr std::size_t words = std::size_t{4} << 20U; // 32 MiB: more than a core
         draw ^= draw << 17U;
         auto& word = memory[draw % words];
         word = word * draw + 1;
-        asm volatile("" : : "r"(&word) : "memory"); // or the compiler would see that nobody looks
+        asm volatile("" : : "r"(&word) : "memory"); // otherwise the compiler would optimise it away
     }
 }
 

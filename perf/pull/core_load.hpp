@@ -8,7 +8,7 @@
 
 namespace cles::perf {
 
-/// Others who want the cores: on each of these, processes that never sleep, computing and moving memory.
+/// Load on cores: processes on each that never sleep, but compute and copy memory.
 class core_load {
   public:
     core_load(const std::vector<int>& cores, int processes_per_core);

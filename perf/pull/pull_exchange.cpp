@@ -25,7 +25,7 @@ void serve_localization(std::string_view url, const run_options& how, const chil
     run(io, how);
 }
 
-const call_options pull_load::hurried = call_options{}.urgent();
+const call_options pull_load::urgent_options = call_options{}.urgent();
 
 pull_load::pull_load(asio::io_context& io, cles::service& client, std::string noun, handler_style style,
                      bool check_samples, run_options how)
@@ -57,7 +57,7 @@ std::chrono::nanoseconds pull_load::run(std::size_t in_flight, std::chrono::nano
         const auto failure = failure_;
         client_.stop();
         io_.restart();
-        io_.poll(); // so that no lane is called after this object has gone
+        io_.poll(); // so that no lane is called after this object is destroyed
         std::rethrow_exception(failure);
     }
     return last_ - began;
@@ -100,7 +100,7 @@ bool pull_load::arrived(const localization& value, clock::time_point& began) {
         return false;
     }
     if (check_samples_ && !is_sample(value)) {
-        failure_ = std::make_exception_ptr(std::runtime_error("the values that came are not those that were sent"));
+        failure_ = std::make_exception_ptr(std::runtime_error("the received values are not those that were sent"));
         over_ = true;
         return false;
     }
@@ -116,7 +116,7 @@ void pull_load::lane_ended(std::exception_ptr failure) {
         failure_ = std::move(failure);
         over_ = true;
     }
-    // With a failure, what is still in flight may never end.
+    // After a failure, requests in flight may never be answered.
     if (--lanes_running_ == 0 || failure_) {
         io_.stop();
     }

@@ -25,21 +25,21 @@ namespace cles::perf {
 /// Registers the task that is pulled.
 void register_localization(cles::registrar& tasks);
 
-/// A node that serves it, for ever.
+/// A node that serves it. Does not return.
 void serve_localization(std::string_view url, const run_options& how, const child_process::announce& announce);
 
 /// Keeps a number of PULLs in flight from one client.
 class pull_load {
   public:
-    /// `noun` names the task at its node, to which the client must know the way.
+    /// \pre the client can reach the node of `noun`
     pull_load(boost::asio::io_context& io, cles::service& client, std::string noun, handler_style style,
               bool check_samples, run_options how = {});
-    /// Has what follows be asked urgently, or not.
-    void ask_urgently(bool hurry) { urgent_ = hurry ? &hurried : nullptr; }
+    /// Whether the requests that follow are urgent.
+    void ask_urgently(bool urgent) { urgent_ = urgent ? &urgent_options : nullptr; }
 
-    /// Runs until the recorder is full or the time is over. A request counts once its result, as a C++ value, is in the
-    /// hands of the caller's code. Returns how long the requests took that were counted.
-    /// \throws what the first request that fails throws
+    /// Runs until the recorder is full or the time is over. A request counts when its result, as a C++ value, has
+    /// reached the caller's code. Returns how long the counted requests took. \throws the error of the first request
+    /// that fails
     std::chrono::nanoseconds run(std::size_t in_flight, std::chrono::nanoseconds at_most, latency_recorder& record);
 
   private:
@@ -48,11 +48,11 @@ class pull_load {
         clock::time_point began;
     };
 
-    static const call_options hurried;
+    static const call_options urgent_options;
 
     void ask(lane& from);
     boost::asio::awaitable<void> ask_on_and_on(clock::time_point began);
-    /// Takes a result; false where no more are wanted.
+    /// Records a result; false if it was the last one.
     bool arrived(const localization& value, clock::time_point& began);
     void lane_ended(std::exception_ptr failure);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// What `any:` costs beside naming the node: the same PULL, by the same node and its links to a hundred others, once
-// with the node's name and once with `any`. Prints medians of the rounds.
+// What `any:` costs: the same PULL with the name of a node and with `any`, by a node that is linked to a hundred
+// others. Prints medians of the rounds.
 //
 //   cles_any_cost
 #include <cles/gossip.hpp>
@@ -34,7 +34,7 @@ using clock_type = std::chrono::steady_clock;
 
 constexpr int nodes = 100;
 constexpr int rounds = 9;
-constexpr int blocks = 20; // of each kind in a round, in turn, so that what disturbs one disturbs the other
+constexpr int blocks = 20; // of each kind in a round, in turn, so that a disturbance affects both
 constexpr std::size_t block = 200;
 
 std::string name_of(int number) { return "car" + std::to_string(number); }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// What it costs to choose a node for `any`: among a hundred others that offer the task, this one too. Prints the median
-// of nanoseconds over some passes; fails past a microsecond.
+// What it costs to choose a node for `any` among a hundred others and this one, which all offer the task. Prints the
+// median in nanoseconds over some passes; fails if it is more than a microsecond.
 #include "core/chooser.hpp"
 #include "core/routing.hpp"
 
@@ -21,7 +21,7 @@ struct system_time final : core::clock {
     [[nodiscard]] cles::time_point now() const override { return cles::time_point::clock::now(); }
 };
 
-/// Other nodes that say what they offer, and are never given anything.
+/// Other nodes, which report what they offer, and receive no requests.
 struct telling final : core::onward {
     std::uint64_t send(const request& r, cles::detail::pending_ptr reply, core::outbound::progress_function) override {
         asked.emplace_back(r.node, std::move(reply));

@@ -18,19 +18,19 @@ namespace {
 
 constexpr int stream = SOCK_STREAM | SOCK_CLOEXEC;
 constexpr int datagrams = SOCK_DGRAM | SOCK_CLOEXEC;
-constexpr int most_silence_s = 10;
+constexpr int max_silence_s = 10;
 
 sockaddr_in address_of(const url& where) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     if (::inet_pton(AF_INET, where.host.c_str(), &address.sin_addr) != 1) {
-        throw std::runtime_error(to_string(where) + ": to listen there takes an IPv4 address");
+        throw std::runtime_error(to_string(where) + ": listening requires an IPv4 address");
     }
     address.sin_port = htons(where.port);
     return address;
 }
 
-// As the library sets them, so that no flag makes a difference.
+// The same as the library sets.
 void tune(const descriptor& socket) {
     const int on = 1;
     checked(::setsockopt(socket.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on), "TCP_NODELAY");
@@ -49,7 +49,7 @@ descriptor connect_internet(const url& where) {
     const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> addresses{found, &::freeaddrinfo};
     descriptor socket{checked(::socket(found->ai_family, udp ? datagrams : stream, 0), "socket")};
     if (udp) {
-        const timeval silence{.tv_sec = most_silence_s, .tv_usec = 0};
+        const timeval silence{.tv_sec = max_silence_s, .tv_usec = 0};
         checked(::setsockopt(socket.get(), SOL_SOCKET, SO_RCVTIMEO, &silence, sizeof silence), "SO_RCVTIMEO");
     } else {
         tune(socket);
@@ -66,7 +66,7 @@ struct unix_address {
         }
         std::memcpy(name.sun_path, where.path.data(), where.path.size());
         length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + where.path.size() + 1);
-        if (where.path.starts_with('@')) { // abstract: a zero in front, none behind
+        if (where.path.starts_with('@')) { // abstract: begins with a zero, does not end with one
             name.sun_path[0] = '\0';
             --length;
         }
@@ -116,7 +116,7 @@ listener listen_on(const url& where) {
     if (where.scheme == "unix") {
         return listen_unix(where);
     }
-    throw std::runtime_error(to_string(where) + ": none of tcp, udp and unix");
+    throw std::runtime_error(to_string(where) + ": not a URL of tcp, udp or unix");
 }
 
 descriptor accept_from(const listener& at) {
@@ -134,7 +134,7 @@ descriptor connect_to(const url& where) {
     if (where.scheme == "unix") {
         return connect_unix(where);
     }
-    throw std::runtime_error(to_string(where) + ": none of tcp, udp and unix");
+    throw std::runtime_error(to_string(where) + ": not a URL of tcp, udp or unix");
 }
 
 void send_all(int socket, std::span<const std::byte> bytes) {
@@ -155,7 +155,7 @@ bool receive_all(int socket, std::span<std::byte> bytes) {
             continue;
         }
         if (got < 0 && errno == EAGAIN) {
-            throw std::runtime_error("no datagram came for " + std::to_string(most_silence_s) + " s");
+            throw std::runtime_error("no datagram arrived for " + std::to_string(max_silence_s) + " s");
         }
         if (checked(got, "recv") == 0) {
             if (have == 0) {

@@ -27,7 +27,7 @@ void write_line(int to, char mark, std::string_view text) {
     while (written < line.size()) {
         const auto taken = ::write(to, line.data() + written, line.size() - written);
         if (taken < 0 && errno != EINTR) {
-            return; // the parent is gone, and this process about to go
+            return; // the parent has ended, and this process will end with it
         }
         written += taken < 0 ? 0 : static_cast<std::size_t>(taken);
     }
@@ -56,9 +56,9 @@ child_process::child_process(int core, const work& run) {
     if (id_ == 0) {
         from_child_.reset();
         ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-        // The parent may have died before it was asked for its death.
+        // The parent may have ended before the prctl.
         const int result = ::getppid() == parent ? run_child(core, run, to_parent.get()) : 1;
-        // Nothing that the parent left in its buffers may be written twice.
+        // What is in the buffers of the parent must not be written twice.
         ::_exit(result);
     }
 }
@@ -78,7 +78,7 @@ std::string child_process::announced() {
             continue;
         }
         if (checked(got, "read from the server process") == 0) {
-            throw std::runtime_error("the server process ended without a word");
+            throw std::runtime_error("the server process ended before it announced anything");
         }
         if (byte == '\n') {
             break;

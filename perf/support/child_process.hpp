@@ -11,14 +11,14 @@
 
 namespace cles::perf {
 
-/// The other end of a measurement: a process forked off this one, which ends with this object, or with its parent.
+/// The other end of a measurement: a process forked from this one, which ends with this object, or with its parent.
 ///
-/// To be made before the parent starts threads or event loops.
+/// \pre the parent has not started threads or event loops
 class child_process {
   public:
-    /// Tells the parent where it listens, once it does.
+    /// Sends the parent the URL at which the child listens.
     using announce = std::function<void(std::string_view)>;
-    /// Runs in the child on that core. What it throws is thrown by `announced` in the parent.
+    /// Runs in the child on that core. `announced` throws its exception in the parent.
     using work = std::function<void(const announce&)>;
 
     child_process(int core, const work& run);
@@ -26,8 +26,8 @@ class child_process {
     child_process& operator=(const child_process&) = delete;
     ~child_process();
 
-    /// Waits for what the child announces.
-    /// \throws std::runtime_error with the child's words where it failed
+    /// Waits for the announcement.
+    /// \throws std::runtime_error with the child's message if it failed
     std::string announced();
     [[nodiscard]] pid_t id() const noexcept { return id_; }
 

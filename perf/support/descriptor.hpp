@@ -25,7 +25,7 @@ class descriptor {
     ~descriptor() { reset(); }
 
     [[nodiscard]] int get() const noexcept { return fd_; }
-    /// Hands it over to somebody who will close it.
+    /// Gives up ownership.
     [[nodiscard]] int release() noexcept { return std::exchange(fd_, -1); }
     void reset() noexcept {
         if (fd_ >= 0) {
@@ -37,7 +37,7 @@ class descriptor {
     int fd_ = -1;
 };
 
-/// The result of a system call, or an exception that says what was attempted.
+/// The result of a system call, or an exception that names what was attempted.
 template <class T>
 T checked(T result, const char* attempted) {
     if (result < 0) {

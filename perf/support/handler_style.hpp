@@ -5,7 +5,7 @@
 
 namespace cles::perf {
 
-/// How the caller's code takes its results.
+/// How results reach the caller's code.
 enum class handler_style : std::uint8_t {
     coroutine, ///< `co_await`, as in the examples
     callback,  ///< a function object, without a coroutine around it

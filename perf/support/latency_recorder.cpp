@@ -12,7 +12,7 @@ latencies latency_recorder::quantiles() {
     }
     const auto begin = nanoseconds_.begin();
     const auto end = begin + static_cast<std::ptrdiff_t>(count_);
-    // The nearest rank: the smallest latency that at least this share of all does not exceed.
+    // The nearest rank: the smallest latency that this share of all does not exceed.
     const auto quantile = [&](double share) {
         const auto rank = std::ceil(share * static_cast<double>(count_));
         const auto at = begin + std::max<std::ptrdiff_t>(static_cast<std::ptrdiff_t>(rank) - 1, 0);

@@ -16,7 +16,8 @@ struct latencies {
     double max = 0;
 };
 
-/// Keeps every latency of one pass, so that its quantiles are exact. Recording neither allocates nor touches new pages.
+/// Stores every latency of one pass, so that its quantiles are exact. Recording neither allocates nor touches new
+/// pages.
 class latency_recorder {
   public:
     explicit latency_recorder(std::size_t capacity) : nanoseconds_(capacity) {}
@@ -25,7 +26,7 @@ class latency_recorder {
     [[nodiscard]] bool full() const noexcept { return count_ == nanoseconds_.size(); }
     [[nodiscard]] std::size_t count() const noexcept { return count_; }
     [[nodiscard]] std::size_t room() const noexcept { return nanoseconds_.size() - count_; }
-    /// Only while not full.
+    /// \pre it is not full
     void record(std::chrono::nanoseconds latency) noexcept {
         nanoseconds_[count_++] = static_cast<std::uint64_t>(latency.count());
     }

@@ -19,11 +19,11 @@ struct localization {
 };
 BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon, velocity, acceleration))
 
-/// The values that every server gives out, in turn. They vary, so that no server can keep an answer ready, and are
-/// rounded as those of a node that thinks of its readers.
+/// The nth values that every server returns. They vary, so that no server can cache an answer, and are rounded as a
+/// user would round them.
 const localization& sample(std::uint64_t n) noexcept;
 
-/// Whether this came through unharmed: what a client checks of each answer.
+/// Whether these are the values of a sample, which a client checks for each answer.
 bool is_sample(const localization& value) noexcept;
 
 } // namespace cles::perf

@@ -8,7 +8,7 @@
 namespace cles::perf {
 namespace {
 
-constexpr int buffer = 1 << 20; // the system may give less
+constexpr int buffer = 1 << 20; // the system may limit it
 
 descriptor datagram_socket() { return descriptor{checked(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0), "socket")}; }
 
@@ -39,13 +39,14 @@ void bind_to(const descriptor& socket, sockaddr_in& address) {
 } // namespace
 
 reserved_group::reserved_group() : socket_(datagram_socket()) {
-    set(socket_, IPPROTO_IP, IP_MULTICAST_ALL, 0, "IP_MULTICAST_ALL"); // it takes nothing that others have joined for
+    set(socket_, IPPROTO_IP, IP_MULTICAST_ALL, 0,
+        "IP_MULTICAST_ALL"); // ignores groups that only other sockets have joined
     auto address = address_of(group_);
     bind_to(socket_, address);
     socklen_t length = sizeof address;
     checked(::getsockname(socket_.get(), reinterpret_cast<sockaddr*>(&address), &length), "getsockname");
     group_.port = ntohs(address.sin_port);
-    // Only now, so that the port was nobody's when it was given.
+    // Only now, so that the port was unused when it was chosen.
     set(socket_, SOL_SOCKET, SO_REUSEADDR, 1, "SO_REUSEADDR");
 }
 

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-/// Multicast sockets on the loopback interface, bare.
+/// Multicast sockets on the loopback interface, without the library.
 namespace cles::perf {
 
 struct multicast_group {
@@ -14,7 +14,7 @@ struct multicast_group {
     std::uint16_t port = 0;
 };
 
-/// A port of a group that nobody else is given as long as this object lives: those who name it may share it.
+/// Reserves a port of a group while this object exists: the system does not choose it for another socket.
 class reserved_group {
   public:
     reserved_group();
@@ -25,9 +25,9 @@ class reserved_group {
     descriptor socket_;
 };
 
-/// A socket that gets what is sent to the group, with the flags and the buffer that the library gives its own.
+/// A socket that receives from the group, with the flags and the buffer size that the library sets.
 descriptor join(const multicast_group& group);
-/// A socket whose datagrams go to the group, and no farther than this host.
+/// A socket that sends to the group on this host only.
 descriptor connect_to(const multicast_group& group);
 
 } // namespace cles::perf

@@ -12,7 +12,7 @@ std::vector<int> usable_cores();
 /// \throws std::system_error
 void pin_to(int core);
 
-/// Where the two ends run. They are the same where there is but one core.
+/// The cores of the two ends: the same one if there is only one.
 struct placement {
     int client = 0;
     int server = 0;
