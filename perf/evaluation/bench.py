@@ -5,9 +5,9 @@ size of packets, the cost of parsing by length; and the way of updates to many b
 
     bench.py [--programs build/release/apps] [--rounds 15] [--quick] [-o FILE]
 
-Writes JSON. The rounds of all exchanges take turns, so that whatever else the machine does falls on all of them. A
+Writes JSON. The rounds of all exchanges take turns, so that other load on the machine affects all of them. A
 ratio is the median over the rounds of CLES divided by the hand-written exchange of the same round; the interval is that
-of the median, with 95 % confidence. Ends with 1 where a measurement failed: the others are written all the same.
+of the median, with 95 % confidence. Ends with 1 where a measurement failed: the others are still written.
 """
 
 import argparse
@@ -31,7 +31,7 @@ class Failed(Exception):
 
 
 class Bench:
-    """Calls of `cles bench`, counted."""
+    """Calls `cles bench`, and counts the calls."""
 
     def __init__(self, programs, calls):
         self.program, self.calls, self.done = os.path.join(programs, "cles"), calls, 0
@@ -42,7 +42,7 @@ class Bench:
                                    capture_output=True, text=True, timeout=900, check=False,
                                    env=clean_environment())
         except subprocess.TimeoutExpired as failure:
-            raise Failed(f"cles bench {' '.join(arguments)}: no end in 15 minutes") from failure
+            raise Failed(f"cles bench {' '.join(arguments)}: not done after 15 minutes") from failure
         if ended.returncode != 0:
             raise Failed(f"cles bench {' '.join(arguments)}: {ended.stderr.strip()}")
         self.done += 1
@@ -51,7 +51,7 @@ class Bench:
 
 
 def in_turns(bench, kinds, rounds, failures):
-    """{kind: its reports}, of kinds {kind: arguments}. A kind that fails once is left out, and told."""
+    """{kind: its reports}, of kinds {kind: arguments}. A kind that fails once is left out, and added to the failures."""
     reports = {kind: [] for kind in kinds}
     for turn in range(rounds):
         names = list(reports)
@@ -87,7 +87,7 @@ def parsed_arguments():
     parser.add_argument("--programs", default="build/release/apps")
     parser.add_argument("--rounds", type=int, default=15, help="of each PULL; a third as many of the longer ones")
     parser.add_argument("--requests", type=int, default=20_000, help="in each round of PULL")
-    parser.add_argument("--quick", action="store_true", help="3 short rounds: that it works, not how fast")
+    parser.add_argument("--quick", action="store_true", help="3 short rounds: shows that it works, not how fast")
     parser.add_argument("-o", "--output", default="-")
     options = parser.parse_args()
     if options.rounds < 1 or options.requests < 1:
@@ -101,7 +101,7 @@ def main():
     options = parsed_arguments()
     if not os.access(os.path.join(options.programs, "cles"), os.X_OK):
         raise SystemExit(f"bench.py: there is no program {os.path.join(options.programs, 'cles')}: build it first")
-    failures, before = [], machine()  # while nothing of ours runs
+    failures, before = [], machine()  # before anything runs
     reports = measure(options, failures)
     if not any(reports.values()):
         raise SystemExit("bench.py: nothing could be measured: " + "; ".join(f["reason"] for f in failures))

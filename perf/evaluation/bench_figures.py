@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""From reports of `cles bench`, one for each round, to figures beside the paper's, and to what pictures are drawn from."""
+"""Calculates figures, and the data of pictures, from reports of `cles bench`, one for each round."""
 
 import math
 import statistics
@@ -13,7 +13,7 @@ PAPER_REPLY_BYTES = 132
 PAPER_BYTES_RATIO = 3
 FRAME_BYTES = 1500
 MULTICAST_RATIO, MULTICAST_BINDERS, MULTICAST_RATE = 1.2, 64, 0.8
-MOST_GROWTH = 1.1  # of time over length, as an exponent: 1 is as fast as the length
+MAX_GROWTH = 1.1  # of time by length, as an exponent: 1 is linear
 
 PARSE_KINDS = ("typed", "reply_typed", "validated", "reply_validated", "head", "packed")
 
@@ -30,7 +30,7 @@ def figure(name, what, values, unit, paper=None, at_most=None, at_least=None):
 
 
 def figures(reports):
-    """Of what there is."""
+    """Of the reports that exist."""
     return [*pull_figures(reports), *bytes_figures(reports.get("bytes")), *parse_figures(reports.get("parse")),
             *fan_out_figures(reports)]
 
@@ -48,7 +48,7 @@ def pull_figures(reports):
         yield figure(f"pull_{name}_p99", f"PULL over {meaning}, p99", (r["cles"]["p99_us"] for r in rounds), "us")
         yield figure(f"pull_{name}_ratio", f"PULL over {meaning}, p50, to the exchange by hand over TCP",
                      (r["cles"]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times", at_most=PULL_RATIOS[name])
-        bare = f"icd_{name}"  # the same sockets by hand
+        bare = f"icd_{name}"  # by hand over the same kind of socket
         if rounds[0].get(bare):
             yield figure(f"pull_{name}_bare_ratio", f"the exchange by hand over {meaning}, p50, to that over TCP",
                          (r[bare]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times")
@@ -75,7 +75,7 @@ def bytes_figures(reports):
 
 
 def growth(row, longer, kind):
-    """1 where the time grows as the length does, 2 where it grows with its square."""
+    """1 if the time grows linearly with the length, 2 if quadratically."""
     return math.log(longer[kind]["ns"] / row[kind]["ns"]) / math.log(longer["bytes"] / row["bytes"])
 
 
@@ -91,7 +91,7 @@ def parse_figures(reports):
                      (r["rows"][-1][kind]["ns"] / r["rows"][-1]["bytes"] for r in reports), "ns")
         yield figure(f"parse_{kind}_growth", f"{what}: power of the length with which time grows, "
                      f"from {reports[0]['rows'][-3]['bytes'] >> 10} to {long >> 10} KiB",
-                     (growth(r["rows"][-3], r["rows"][-1], kind) for r in reports), "", paper="O(n)", at_most=MOST_GROWTH)
+                     (growth(r["rows"][-3], r["rows"][-1], kind) for r in reports), "", paper="O(n)", at_most=MAX_GROWTH)
 
 
 def fan_out_figures(reports):
@@ -112,7 +112,7 @@ def fan_out_figures(reports):
                          (r["ratio"]["deliveries_per_s"] for r in rows), "times", at_least=MULTICAST_RATE if multicast else None)
 
 
-# --- What pictures are drawn from ----------------------------------------------------------------------------------------
+# --- The data of pictures ------------------------------------------------------------------------------------------------
 
 QUANTILES = ("p50_us", "p99_us", "p999_us", "max_us")
 

@@ -97,13 +97,13 @@ def measure(programs, hosts, threads, epochs, runs):
     daemons = []
     try:
         urls = {}
-        # `beside`: the first host without the core that the second has, for when both work.
+        # `beside`: the first host without the core of the second, for work on both.
         for name, host in (("near", hosts.near), ("beside", hosts.near.on(hosts.others)), ("far", hosts.far)):
             daemons.append(Daemon(programs, host, name, threads, list(urls.values())[:1], folder))
             urls[name] = daemons[-1].url
         rows = rows_of(hosts, urls, threads)
         reports = {row[0]: [] for row in rows}
-        for turn in range(runs + 1):  # the first is for warming up
+        for turn in range(runs + 1):  # the first one warms up
             for name, _, host, arguments in rows[turn % len(rows):] + rows[:turn % len(rows)]:
                 report = run_manager(programs, host, arguments, epochs)
                 if turn > 0:
@@ -158,15 +158,15 @@ def main():
     parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), help="per host; all cores unless said")
     parser.add_argument("--epochs", type=int, default=100)
     parser.add_argument("--quota", type=float, default=0.5, help="part of its core that the second host has")
-    parser.add_argument("--quick", action="store_true", help="3 short runs: that it works, not how fast")
+    parser.add_argument("--quick", action="store_true", help="3 short runs: shows that it works, not how fast")
     parser.add_argument("-o", "--output", default="-")
     options = parser.parse_args()
     if options.quick:
         options.runs, options.epochs = 3, 10
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that nothing is left behind
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what it started is ended
     if not can_pin():
-        raise SystemExit("dsgd.py: it takes taskset")
-    before = machine()  # while nothing of ours runs
+        raise SystemExit("dsgd.py: it requires taskset")
+    before = machine()  # before anything runs
     with Hosts(options.quota) as hosts:
         rows = measure(options.programs, hosts, options.threads, options.epochs, options.runs)
         points = dsgd_points.made()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Two hosts on one machine: network namespaces with a cable between them, of which the second has one core, and of that
-a part. What the system does not allow is left out and told."""
+"""Two hosts on one machine: network namespaces with a virtual cable between them. The second has a part of one core. What
+the system does not permit is left out, and reported."""
 
 import os
 import shutil
@@ -9,13 +9,13 @@ import tempfile
 
 
 class Host:
-    """Where commands run: in a namespace, on these cores, within a quota; each where there is one."""
+    """Runs commands on these cores, and in a namespace and within a quota if there are any."""
 
     def __init__(self, address, cores, keeper=None, group=None):
         self.address, self.cores, self.keeper, self.group = address, cores, keeper, group
 
     def on(self, cores):
-        """The same, with fewer cores."""
+        """The same host with fewer cores."""
         return Host(self.address, cores, self.keeper, self.group)
 
     def command(self, *words):
@@ -30,7 +30,7 @@ class Hosts:
     PERIOD_US = 10_000
 
     def __init__(self, quota):
-        self.missing = []  # what the system does not allow, for people
+        self.missing = []  # descriptions of what the system does not permit
         self.keepers = []
         cores = sorted(os.sched_getaffinity(0))
         self.group = self._make_group(quota)
@@ -38,7 +38,7 @@ class Hosts:
         near, far = ("10.77.1.1", "10.77.1.2") if keepers else ("127.0.0.1", "127.0.0.1")
         self.near = Host(near, cores, keepers[0] if keepers else None)
         self.far = Host(far, cores[-1:], keepers[1] if keepers else None, self.group)
-        self.others = cores[:-1] or cores  # what the second host leaves the first
+        self.others = cores[:-1] or cores  # all but the core of the second host
         self.quota = quota if self.group else None
 
     def described(self):
@@ -69,7 +69,7 @@ class Hosts:
         subprocess.run(["nsenter", "--net", f"--target={keeper.pid}", "ip", *words], check=True, capture_output=True)
 
     def _make_group(self, quota):
-        """A control group for the processor, of either version; nothing where none can be made."""
+        """A control group for the CPU, of either version; empty if none can be created."""
         for folder, files in (("/sys/fs/cgroup/cpu", {"cpu.cfs_period_us": f"{self.PERIOD_US}",
                                                       "cpu.cfs_quota_us": f"{int(quota * self.PERIOD_US)}"}),
                               ("/sys/fs/cgroup", {"cpu.max": f"{int(quota * self.PERIOD_US)} {self.PERIOD_US}"})):
@@ -106,7 +106,7 @@ class Hosts:
             try:
                 os.rmdir(self.group)
             except OSError:
-                pass  # a process of it is not quite gone
+                pass  # a process in it has not ended yet
 
 
 def can_pin():

@@ -6,7 +6,7 @@ is found once more by a program that shares no line with it."""
 import math
 
 SEPARATION, PER_CLASS, SEED = 7, 100_000, 1
-SHOWN = 2_000  # points of the picture of all
+SHOWN = 2_000  # points in the picture of all
 BOX = 1.0      # half the side of the zoomed picture, about the middle between the classes
 ALL_BITS = (1 << 64) - 1
 
@@ -20,7 +20,7 @@ def _splitmix64(state):
 
 
 def made(seed=SEED, per_class=PER_CLASS, separation=SEPARATION):
-    """(x, y) of every point; those in even places are of class 0."""
+    """(x, y) of every point; those with even indices are of class 0."""
     chance = _splitmix64(seed)
     mean = separation / 2 / math.sqrt(2)
     points = []
@@ -36,14 +36,14 @@ def made(seed=SEED, per_class=PER_CLASS, separation=SEPARATION):
 
 
 def mean_squared_error(points, classifier):
-    """Of {"weights": [a, b], "bias": c}."""
+    """The error of {"weights": [a, b], "bias": c}."""
     (a, b), c = classifier["weights"], classifier["bias"]
     return math.fsum((a * x + b * y + c - place % 2) ** 2 for place, (x, y) in enumerate(points)) / len(points)
 
 
 def pictured(points, classifier):
-    """What is drawn: of all points some, evenly, and all that lie where the classes meet."""
-    step = max(1, len(points) // SHOWN) | 1  # odd, so that both classes have their turns
+    """The points to draw: an even sample of all, and all near the boundary between the classes."""
+    step = max(1, len(points) // SHOWN) | 1  # odd, so that it alternates between the classes
     some = [(round(x, 3), round(y, 3), place % 2) for place, (x, y) in list(enumerate(points))[::step]]
     near = [(round(x, 4), round(y, 4), place % 2) for place, (x, y) in enumerate(points) if abs(x) < BOX and abs(y) < BOX]
     return {"of": len(points), "some": some, "near": near, "box": BOX, "classifier": classifier}

@@ -6,8 +6,8 @@ the same exchange by hand.
     latency.py [--programs build/release/apps] [--runs 15] [--rounds 10] [--quick] [-o FILE]
 
 Writes JSON. On loopback it runs `cles bench`, as fast as it goes, and `cles_link_latency`, 1000 and 50 times a second; the
-latter between two network namespaces too, which take root: on a cable, on a link like a WiFi's, and on one of 64 kbit/s.
-Updates go by TCP and by multicast. Exchanges take turns within each round, so that whatever else the machine does falls on
+latter between two network namespaces too, which require root: on a cable, on a link like a WiFi's, and on one of 64 kbit/s.
+Updates go by TCP and by multicast. Exchanges take turns within each round, so that other load on the machine affects
 all of them. Each figure is over all rounds, its interval of 95 % over resampled rounds.
 """
 
@@ -31,7 +31,7 @@ COUNT_LINES = Path(__file__).parent.parent / "effort" / "count_lines.py"
 WANTED_RATIO, WANTED_ONE_WAY, WANTED_BYTES, WANTED_LINES = 1.10, 0.6, 132, 30
 PAPER_OVERHEAD_US, PAPER_BYTES, PAPER_BYTES_RATIO, PAPER_LINES, PAPER_LINES_RATIO = 1500, 132, 3, 30, 10
 
-# Name, what it is, the relay's words (none of them: a cable; None: one host), milliseconds from one exchange to the next.
+# Name, description, arguments of the relay (empty: a cable; None: one host), milliseconds between exchanges.
 LINKS = [
     ("lively", "on loopback, 1000 a second", None, 1),
     ("paced", "on loopback, 50 a second", None, 20),
@@ -116,12 +116,12 @@ class Link:
         self.pace = ["--interval", str(interval_ms)]
 
     def round(self, count, turn):
-        """All kinds in turn, beginning with another one each time: microseconds."""
+        """Microseconds of all kinds in turn, beginning with another one each time."""
         kinds, at = list(KINDS), turn % len(KINDS)
         return {kind: self.timed(kind, count) for kind in kinds[at:] + kinds[:at]}
 
     def timed(self, kind, count):
-        """The far end runs meanwhile and no longer: what it publishes would wake a core in the others' turns."""
+        """Runs the far end only meanwhile, because its publications would wake a core during the others' turns."""
         words = [kind] if kind.startswith("icd-") else ["car"]
         if kind == "update-multicast":
             words += ["--multicast", self.hosts.interfaces["far"]]
@@ -160,8 +160,8 @@ def link_figures(figures, found):
 
 
 def add_latencies(figures, rounds, name, meaning, statistics_of, like_for_like=True):
-    """Each exchange, and CLES to by hand. A paced PULL is not compared: the far end of CLES publishes while it is timed,
-    that of the hand-written exchange sleeps."""
+    """Adds each exchange, and the ratio of CLES to the hand-written one. Paced PULLs are not compared: the far end of CLES
+    also publishes meanwhile, that of the hand-written exchange sleeps."""
     for key, of in statistics_of.items():
         for kind, what in KINDS.items():
             figures.over(rounds, f"{name}_{kind.replace('-', '_')}_{key}", f"{what}, {meaning}, {key}", "us", of(kind))
@@ -178,7 +178,7 @@ def add_latencies(figures, rounds, name, meaning, statistics_of, like_for_like=T
 
 
 def add_one_way(figures, rounds, name, meaning, statistics_of):
-    """Only where both come at the same pace: cores that sleep longer are slower to wake."""
+    """Only if both have the same pace, because cores that sleep longer take longer to wake."""
     for key, of in statistics_of.items():
         wanted = {"at_most": WANTED_ONE_WAY} if key == "p50" else {}
         for kind, what in (("update", "UPDATE one way"), ("update-multicast", "UPDATE by multicast one way")):
@@ -213,7 +213,7 @@ def add_lines(figures):
     figures.add("icd_lines_all", "the same by hand", sum(by_hand.values()), "lines")
 
 
-# --- The whole ---------------------------------------------------------------------------------------------------------
+# --- The result --------------------------------------------------------------------------------------------------------
 
 
 def progress(what, done, of):
@@ -221,7 +221,7 @@ def progress(what, done, of):
 
 
 def series_of(loopback, links):
-    """The raw values: of loopback each run's quantiles, of links every latency."""
+    """The raw values: the quantiles of each run on loopback, every latency across links."""
     series = {"loopback": {f"{kind}_{key}": [one[kind][key] for one in loopback]
                            for kind in KINDS for key in ("p50_us", "p99_us")}}
     for name, rounds in links.items():
@@ -236,13 +236,13 @@ def main():
     parser.add_argument("--requests", type=int, default=20_000, help="PULLs in a run on loopback; a twentieth of updates")
     parser.add_argument("--rounds", type=int, default=10, help="of each exchange on each link")
     parser.add_argument("--count", type=int, default=100, help="of each exchange in a round on a link")
-    parser.add_argument("--quick", action="store_true", help="3 short runs: that it works, not how fast")
+    parser.add_argument("--quick", action="store_true", help="3 short runs: shows that it works, not how fast")
     parser.add_argument("-o", "--output", default="-")
     options = parser.parse_args()
     if options.quick:
         options.runs, options.requests, options.rounds, options.count = 3, 400, 3, 8
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that nothing is left behind
-    before = machine()  # while nothing of ours runs
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what it started is ended
+    before = machine()  # before anything runs
     figures, skipped, possible = Figures(), [], LINKS
     loopback = loopback_rounds(options.programs, options.runs, options.requests, max(1, options.requests // 20))
     loopback_figures(figures, loopback)

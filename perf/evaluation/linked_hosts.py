@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Two hosts on one machine with a link between them that may be bad: network namespaces, and a cable or a relay. Or one
-host with its loopback."""
+"""Two hosts on one machine, which are network namespaces with a virtual cable or a relay between them; or one host with
+its loopback interface."""
 
 import contextlib
 import os
@@ -8,21 +8,21 @@ import shutil
 import subprocess
 
 def why_not():
-    """What is missing for it; empty where nothing is."""
+    """What is missing for it; empty if nothing is."""
     missing = [tool for tool in ("unshare", "nsenter", "ip", "taskset") if not shutil.which(tool)]
     if missing:
-        return f"it takes {', '.join(missing)}"
+        return f"it requires {', '.join(missing)}"
     if os.geteuid() != 0:
-        return "it takes root"
+        return "it requires root"
     if subprocess.run(["unshare", "--net", "true"], capture_output=True, check=False).returncode != 0:
-        return "no network namespaces may be made here"
+        return "network namespaces cannot be created here"
     if not os.access("/dev/net/tun", os.R_OK | os.W_OK):
-        return "it takes /dev/net/tun"
+        return "it requires /dev/net/tun"
     return ""
 
 
 class OneHost:
-    """`near` and `far` are this host, by loopback, each on a core of its own where there are two."""
+    """`near` and `far` are this host, by loopback, each on a core of its own if there are two."""
 
     def __init__(self):
         self.processes = []
@@ -32,16 +32,16 @@ class OneHost:
         self.interfaces = {"near": "lo", "far": "lo"}
 
     def command(self, end, *words):
-        """What runs that at this end."""
+        """The command that runs this at one end."""
         return ["taskset", "--cpu-list", str(self.cores[end]), *words] if shutil.which("taskset") else list(words)
 
     def start(self, end, *words):
-        """Starts a program there that goes on; gives the line that it says first."""
+        """Starts a program there, and returns the first line that it prints."""
         return self._start(self.command(end, *words))
 
     @contextlib.contextmanager
     def running(self, end, *words):
-        """A program there, for as long as this is entered; gives the line that it says first."""
+        """Runs a program there during the block; its value is the first line that the program prints."""
         line = self.start(end, *words)
         process = self.processes[-1]
         try:
@@ -74,7 +74,7 @@ class OneHost:
 
 
 class LinkedHosts(OneHost):
-    """`near` and `far` have a network namespace each. Without words for a relay the link between them is a cable."""
+    """`near` and `far` are network namespaces. Without arguments for a relay the link between them is a virtual cable."""
 
     def __init__(self, relay=None, words=()):
         super().__init__()
@@ -97,7 +97,7 @@ class LinkedHosts(OneHost):
             raise
 
     def _keep(self):
-        """A process that keeps a namespace until its input ends, and so no longer than this one lives."""
+        """A process that holds a namespace until its input ends, so no longer than this process exists."""
         keeper = subprocess.Popen(["unshare", "--net", "sh", "-c", "echo up; exec cat"], stdin=subprocess.PIPE,
                                   stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.keepers.append(keeper)
@@ -106,7 +106,7 @@ class LinkedHosts(OneHost):
         return keeper.pid
 
     def _address(self, devices):
-        """Neighbours are told, for what asks for them could be lost; and nothing else is to take room on the link."""
+        """Sets the neighbours, because ARP requests could be lost; and turns off other traffic on the link."""
         ends = []
         for (end, place), device in zip(self.places.items(), devices):
             address = self.addresses[end]

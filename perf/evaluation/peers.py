@@ -26,7 +26,7 @@ LONGEST_RUN_S = 300
 
 
 class Failure(Exception):
-    """A program that is there did not do its work."""
+    """A program exists, but failed."""
 
 
 def program_of(folder, peer):
@@ -34,7 +34,7 @@ def program_of(folder, peer):
 
 
 def run_program(folder, peer, arguments):
-    """What it says; or a text, where it does not offer that."""
+    """Its report, or the reason as text if it does not offer this."""
     try:
         done = subprocess.run([program_of(folder, peer), *arguments], stdin=subprocess.DEVNULL, capture_output=True,
                               text=True, check=False, timeout=LONGEST_RUN_S)
@@ -49,7 +49,7 @@ def run_program(folder, peer, arguments):
 
 
 def present_peers(folder, only):
-    """Those whose program is there, and [{"name", "reason"}] of the others."""
+    """Those whose program exists, and [{"name", "reason"}] of the others."""
     present, skipped = [], []
     reasons = {}
     listed = os.path.join(folder, "skipped.json")
@@ -99,7 +99,7 @@ def measure(folder, present, skipped, options):
                 elif said is not None:
                     runs.setdefault((peer, over, name), []).append(said)
     print(file=sys.stderr)
-    # In the order of the rows, whose turn was first. What failed half way has no row.
+    # In the order of the rows, not of the turns. What failed has no row.
     return {(peer, over, name): runs[peer, over, name] for peer, over in places for name in MEASURES
             if peer not in failed and (peer, over, name) in runs}, about, failed
 
@@ -110,7 +110,7 @@ def main():
     parser.add_argument("--rounds", type=int, default=5)
     parser.add_argument("--only", type=lambda text: text.split(","), default=[], help="these peers, with commas between")
     parser.add_argument("--spread", action="store_true", help="let all ends run on all cores, instead of one core each")
-    parser.add_argument("--quick", action="store_true", help="one short round: that it works, not how fast")
+    parser.add_argument("--quick", action="store_true", help="one short round: shows that it works, not how fast")
     parser.add_argument("-o", "--output", help="write JSON there; - is the standard output, and no table then")
     options = parser.parse_args()
     unknown = set(options.only) - {peer for peer, _ in PEERS}
@@ -118,13 +118,13 @@ def main():
         parser.error(f"no such peer: {', '.join(sorted(unknown))}" if unknown else "--rounds takes 1 or more")
     if options.quick:
         options.rounds = 1
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that nothing is left behind
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what it started is ended
     present, skipped = present_peers(options.programs, options.only)
     if not present:
         print(f"peers.py: {options.programs} holds no peer's program; build with CLES_BUILD_PEERS=ON, and see --programs",
               file=sys.stderr)
         return 77
-    before = machine()  # while nothing of ours runs
+    before = machine()  # before anything runs
     runs, about, failed = measure(options.programs, present, skipped, options)
     rows = rows_of(runs, about)
     result = {"title": "CLES beside other middleware, in ratios to a hand-written exchange over TCP",

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSL-1.0
-"""From the runs of all peers to rows: medians, ratios to the hand-written exchange, and the table of them."""
+"""Calculates rows from the runs of all peers: medians, ratios to the hand-written exchange; and prints their table."""
 
 from interval import summary
 
 BASELINE = ("by_hand", "tcp")
 
-# Each peer by each way to link its ends, and what to install where its program is missing.
+# Each peer with each carrier, and what to install if its program is missing.
 PEERS = [
     ("by_hand", ["tcp", "unix", "multicast"]),
     ("cles", ["tcp", "unix", "udp", "multicast"]),
@@ -18,7 +18,7 @@ PEERS = [
     ("redis", ["unix", "tcp"]),
 ]
 
-# name -> the arguments that measure it, besides the carrier; (how many, how many where it is to be quick)
+# name -> the arguments that measure it, without the carrier; (count, count with --quick)
 MEASURES = {
     "exchange": (["--mode", "exchange"], (5_000, 100)),
     "exchange_64": (["--mode", "exchange", "--in-flight", "64"], (50_000, 1_000)),
@@ -45,7 +45,7 @@ RATIOS = [
 
 
 def rows_of(runs, about):
-    """A row for each peer and carrier with a run at least.
+    """A row for each peer and carrier with at least one run.
 
     runs: (peer, over, measure) -> a list of what its program said, or the reason why it does not offer that.
     about: peer -> what its program says of itself.
@@ -76,7 +76,7 @@ def rows_of(runs, about):
 
 
 def ratio(row, baseline, measure, figure):
-    """Of the medians; nothing where one of the two was not measured."""
+    """Of the medians; None if one of the two was not measured."""
     if baseline is None or measure not in row["measures"] or measure not in baseline["measures"]:
         return None
     by_hand = baseline["measures"][measure][figure]["median"]

@@ -30,7 +30,7 @@ MOST_RATIO, MOST_P999_MS, BUDGET_MS = 1.02, 2, 100
 
 
 def free_group():
-    """A group of our own, so that no other platoon is heard."""
+    """A group of its own, separate from other platoons."""
     with socket.socket(type=socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return f"lo,239.255.25.37:{probe.getsockname()[1]}"
@@ -38,7 +38,7 @@ def free_group():
 
 def asked(program, *arguments):
     done = subprocess.run([program, *map(str, arguments)], capture_output=True, text=True, check=False)
-    if done.returncode not in (0, 1):  # 1: a collision, which the result tells
+    if done.returncode not in (0, 1):  # 1: a collision, which the result contains
         raise SystemExit(f"platoon.py: {' '.join(map(str, arguments))}: {done.stderr.strip()}")
     return json.loads(done.stdout)
 
@@ -89,7 +89,7 @@ def checks_of(rows, drives, kills):
 
 
 def fastest(drives):
-    """Of each loss in percent, the drives' p99.9 in ms at 50 Hz, by size."""
+    """{loss in percent: the sorted p99.9 of its drives at 50 Hz, in ms}"""
     found = {}
     for drive in drives:
         if drive["hz"] == 50:
@@ -103,7 +103,7 @@ def figure(name, what, value, unit="", runs=1, target=None, reached=None, low=No
 
 
 def figures_of(checks, rows, drives):
-    """What the checks say, in the form that the report reads. The largest ratio counts, not the median one."""
+    """The checks in the form that the report reads. The largest ratio counts, not the median one."""
     within = f"\u2264 {MOST_RATIO:g}"
     lossy = [row for row in rows if row["loss_percent"] == 10]
     for row in lossy:
@@ -140,7 +140,7 @@ def main():
     parser.add_argument("--vehicles", type=int, default=20)
     parser.add_argument("--seconds", type=int, default=60, help="of each drive of processes")
     parser.add_argument("--drives", type=int, default=5, help="of processes, at 50 Hz with each loss")
-    parser.add_argument("--quick", action="store_true", help="small and short: that it works, not how fast")
+    parser.add_argument("--quick", action="store_true", help="small and short: shows that it works, not how fast")
     parser.add_argument("--plots", help="a folder for plots of the drives, at each rate and loss of the last")
     parser.add_argument("-o", "--output", default="-")
     options = parser.parse_args()
@@ -150,7 +150,7 @@ def main():
         options.seeds, options.vehicles, options.seconds, options.drives = 2, 4, 8, 1
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
     program = os.path.join(options.programs, "cles-platoon")
-    before = machine()  # while nothing of ours runs
+    before = machine()  # before anything runs
     print("platoon: in virtual time", file=sys.stderr, flush=True)
     rows = simulated(program, options.vehicles, options.seeds)
     drives, pictures = [], []
@@ -165,7 +165,7 @@ def main():
             record = json.loads(file.read_text(encoding="utf-8"))
         if options.plots:
             platoon_plot.draw(record, folder)
-        pictures = pictures_of(record)  # of the last, the most frequent with losses
+        pictures = pictures_of(record)  # of the last one: losses at the highest rate
     last = options.vehicles - 1
     kills = [{"killed": who, **driven(program, options.vehicles, 8 if options.quick else 25, None, "--hz", 25,
                                       "--vanish", f"{who}@4")}

@@ -63,11 +63,11 @@ class Chart:
     def line(self, x1, y1, x2, y2, colour, more=""):
         self.parts.append(f'<line x1="{x1:.1f}" y1="{y1:.1f}" x2="{x2:.1f}" y2="{y2:.1f}" stroke="{colour}" {more}/>')
 
-    def text(self, x, y, words, anchor="start", colour=INK):
-        self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}">{words}</text>')
+    def text(self, x, y, label, anchor="start", colour=INK):
+        self.parts.append(f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" fill="{colour}">{label}</text>')
 
     def curve(self, xs, ys, colour):
-        """A line through the points; a value that is missing breaks it."""
+        """A line through the points, interrupted at missing values."""
         run = []
         for x, y in [*zip(xs, ys), (0, None)]:
             if y is not None:
@@ -77,11 +77,11 @@ class Chart:
                 run = []
 
     def legend(self, entries):
-        """(words, colour) from the top down, as many as have room."""
-        for i, (words, colour) in enumerate(entries[:22]):
+        """(text, colour) from the top down, as many as fit."""
+        for i, (label, colour) in enumerate(entries[:22]):
             y = TOP + 8 + i * 14.5
             self.line(WIDTH - RIGHT + 12, y - 4, WIDTH - RIGHT + 30, y - 4, colour, 'stroke-width="3"')
-            self.text(WIDTH - RIGHT + 36, y, words)
+            self.text(WIDTH - RIGHT + 36, y, label)
 
     def svg(self):
         return (f'<svg xmlns="http://www.w3.org/2000/svg" width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" '
@@ -94,7 +94,7 @@ def number_of(course):
 
 
 def around(values, least):
-    """A range that holds all values, with some air, and is at least so high."""
+    """A range that contains all values with a margin, and has a minimum height."""
     low, high = min(values), max(values)
     air = max((high - low) * 0.06, (least - (high - low)) / 2)
     return low - air, high + air
@@ -140,7 +140,7 @@ def latency_chart(record):
 
 
 def charts_of(record):
-    """SVG by name, of what there is to be drawn."""
+    """{name: SVG} for the data that exists."""
     charts = {"speed": course_chart(record, "speed", "Speed", "m/s", 1),
               "error": course_chart(record, "error", "Spacing error", "m", 0.1),
               "latency": latency_chart(record)}
@@ -148,7 +148,7 @@ def charts_of(record):
 
 
 def draw(record, folder):
-    """Names of the files that were written."""
+    """Returns the names of the files that it has written."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     charts = charts_of(record)

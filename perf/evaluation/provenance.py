@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Where figures come from: the machine, the date, and the command that repeats them."""
+"""The origin of figures: the machine, the date, and the command that repeats them."""
 
 import datetime
 import os
@@ -17,19 +17,19 @@ def machine():
 
 
 def busy_cores(seconds=1.0):
-    """How many cores others keep busy, looked at for so long before anything is measured; the load would still count what
-    was measured before. Nothing where the system does not tell."""
+    """How many cores other processes keep busy in this period before anything is measured. (The load average would include
+    earlier measurements.) None if the system does not report it."""
     before = _ticks()
     time.sleep(seconds)
     after = _ticks()
     if not before or not after or sum(after) == sum(before):
         return None
-    idle = sum(after[3:5]) - sum(before[3:5])  # also what waits for a disk
+    idle = sum(after[3:5]) - sum(before[3:5])  # and waiting for I/O
     return round((1 - idle / (sum(after) - sum(before))) * (os.cpu_count() or 1), 2)
 
 
 def _ticks():
-    """Of all cores together: user, nice, system, idle, waiting, interrupts of both kinds, stolen."""
+    """The times of all cores together: user, nice, system, idle, iowait, irq, softirq, steal."""
     found = re.match(r"cpu +(.+)", text_of("/proc/stat"))
     return [int(each) for each in found[1].split()[:8]] if found else []
 
@@ -57,5 +57,5 @@ def date():
 
 
 def command(script, arguments=None):
-    """As it is typed at the root of the project."""
+    """The command, as typed in the project's root folder."""
     return shlex.join([script, *(sys.argv[1:] if arguments is None else arguments)])

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Where a measurement leaves what it found."""
+"""Writes the result of a measurement."""
 
 import json
 
 
 def write(result, output):
-    """As JSON, to a file; - is the standard output."""
+    """Writes JSON to a file; - is the standard output."""
     text = json.dumps(result, indent=1)
     if output == "-":
         print(text)

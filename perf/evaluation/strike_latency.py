@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Measures how long a strike order takes while video frames saturate the node that carries it out, beside an idle one.
+"""Measures how long a strike order takes while video frames saturate the node that executes it, and on an idle node.
 
     strike_latency.py [--programs build/release/apps] [--rounds 10] [--orders 1000] [--streams 4] [--workers N] [--quick]
                       [-o FILE]
@@ -26,7 +26,7 @@ import sys
 import tempfile
 
 from clean_environment import clean_environment
-from in_one_piece import InOnePiece
+from deferred_signals import DeferredSignals
 from interval import summary
 from provenance import command, date, machine
 from result_file import write
@@ -36,10 +36,10 @@ WANTED = 2.0
 
 @contextlib.contextmanager
 def running(words, **how):
-    """A program that ends with the block, however that ends."""
+    """A program that is ended with the block."""
     process = None
     try:
-        with InOnePiece():
+        with DeferredSignals():
             process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, text=True,
                                        env=clean_environment(), **how)
         yield process
@@ -60,13 +60,13 @@ def end(process):
 
 
 def first_line(process):
-    """What it says first; nothing where it is silent for a minute."""
+    """The first line that it prints; empty if there is none within a minute."""
     return process.stdout.readline() if select.select([process.stdout], [], [], 60)[0] else ""
 
 
 @contextlib.contextmanager
 def node(options):
-    """A daemon that offers both; gives its address."""
+    """A daemon that offers both; its value is its address."""
     plugins = os.path.abspath(os.path.join(options.programs, "..", "plugins"))
     with tempfile.TemporaryDirectory(prefix="cles-strike-") as folder:
         config, log = os.path.join(folder, "node.yaml"), os.path.join(folder, "log")
@@ -93,13 +93,13 @@ def drill(programs, url, orders):
 
 
 def drill_beside_load(options, url):
-    """Orders while frames come as fast as they are answered; gives what became of both."""
+    """Sends orders while frames are sent as fast as they are answered; returns the results of both."""
     with running([os.path.join(options.programs, "cles-jadc2"), "load", "--at", url, "--streams", str(options.streams),
                   "--duration", "0"]) as load:
         if first_line(load) != "loading\n":
             raise SystemExit("strike_latency.py: the load did not begin")
         orders = drill(options.programs, url, options.orders)
-        load.terminate()  # it goes on until then, and tells its result
+        load.terminate()  # then it prints its result
         out, _ = load.communicate(timeout=60)
         if load.returncode != 0:
             raise SystemExit(f"strike_latency.py: the load ended with {load.returncode}")
@@ -109,7 +109,7 @@ def drill_beside_load(options, url):
 def measure(options):
     idle, loaded, loads = [], [], []
     with node(options) as url:
-        drill(options.programs, url, 50)  # for warming up
+        drill(options.programs, url, 50)  # warms up
         for number in range(1, options.rounds + 1):
             idle.append(drill(options.programs, url, options.orders))
             orders, load = drill_beside_load(options, url)
@@ -141,7 +141,7 @@ def figures(idle, loaded, loads):
 
 
 def may_run_in_real_time(programs):
-    """Whether the daemon may take a real-time priority here."""
+    """Whether the daemon may have a real-time priority here."""
     if os.geteuid() != 0:
         return False
     done = subprocess.run(["chrt", "-f", "10", "true"], capture_output=True, check=False) if shutil.which("chrt") else None
@@ -157,15 +157,15 @@ def main():
     parser.add_argument("--streams", type=int, default=4)
     parser.add_argument("--workers", type=int, default=max(1, cores - 1))
     parser.add_argument("--real-time", type=int, default=None, help="the I/O thread's priority; 10 where it may, 0: none")
-    parser.add_argument("--quick", action="store_true", help="2 short rounds: that it works, not how fast")
+    parser.add_argument("--quick", action="store_true", help="2 short rounds: shows that it works, not how fast")
     parser.add_argument("-o", "--output", default="-")
     options = parser.parse_args()
     if options.quick:
         options.rounds, options.orders = 2, 200
     if options.real_time is None:
         options.real_time = 10 if may_run_in_real_time(options.programs) else 0
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that nothing is left behind
-    before = machine()  # while nothing of ours runs
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that what it started is ended
+    before = machine()  # before anything runs
     idle, loaded, loads = measure(options)
     result = {"title": "Allocation of tasks: strike orders while video frames saturate the node (section 4.3)",
               "command": command("perf/evaluation/strike_latency.py"), "machine": before, "date": date(),

@@ -21,7 +21,7 @@ WIDTH, HEIGHT, LEFT, TOP, RIGHT, BOTTOM = 760, 480, 80, 30, 230, 50
 
 
 def scale(low, high, start, end):
-    """From a value to a place, logarithmically."""
+    """The coordinate of a value on a logarithmic scale."""
     span = math.log10(high) - math.log10(low)
     return lambda value: start + (math.log10(value) - math.log10(low)) / span * (end - start)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""What is measured: a script of perf/evaluation for each section of the report, in the order in which they are told."""
+"""The sections of the report, in order. Each is measured by a script in perf/evaluation."""
 
 import os
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 class Section:
     name: str  # of the script, without its suffix
     title: str
-    paper: str  # what the paper reports there; empty where nothing
-    targets: tuple = ()  # of the build, as patterns; as far as there are such
-    programs: str = "apps"  # where in the build its script looks for them
+    paper: str  # what the paper reports about it; empty if nothing
+    targets: tuple = ()  # of the build, as patterns; those that exist are built
+    programs: str = "apps"  # the folder of the build in which its script looks for them
 
 
 SECTIONS = (
@@ -36,7 +36,7 @@ SECTIONS = (
 
 
 def known(folder):
-    """Those of the table, then what else in the folder can be run."""
+    """Those of the table, then all other executable scripts in the folder."""
     names = {section.name for section in SECTIONS}
     others = sorted(entry[:-3] for entry in os.listdir(folder)
                     if entry.endswith(".py") and entry[:-3] not in names and os.access(os.path.join(folder, entry), os.X_OK))

@@ -20,7 +20,7 @@ import time
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "evaluation"))
 from clean_environment import clean_environment  # noqa: E402
 
-PATIENCE = 30  # s, for what takes milliseconds
+TIMEOUT_S = 30  # for what takes milliseconds
 
 
 def free_port(kind):
@@ -40,11 +40,11 @@ class Daemon:
                                         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=clean_environment())
 
     def ask(self, request):
-        """The answer, once there is a link."""
-        end = time.monotonic() + PATIENCE
+        """The answer, as soon as there is a link."""
+        end = time.monotonic() + TIMEOUT_S
         while True:
             try:
-                link = socket.create_connection(("127.0.0.1", self.port), timeout=PATIENCE)
+                link = socket.create_connection(("127.0.0.1", self.port), timeout=TIMEOUT_S)
                 break
             except ConnectionRefusedError:
                 if self.process.poll() is not None or time.monotonic() > end:

@@ -159,7 +159,7 @@ class One(unittest.TestCase):
         return running.run(script, self.output, False, "apps", limit_s, running.Progress())
 
     def test_what_writes_nothing_or_no_json_has_failed(self):
-        for text, says in ((SILENT, "it said nothing"), (BROKEN, "wrote no JSON")):
+        for text, says in ((SILENT, "no output"), (BROKEN, "wrote no JSON")):
             found = self.outcome(text)
             self.assertEqual(found.state, running.FAILED)
             self.assertIn(says, found.reason)
