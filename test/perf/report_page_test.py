@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""The page that `scripts/evaluate` makes, from JSON that was recorded: whether it is whole, and stands by itself.
+"""The page that `scripts/evaluate` writes, from recorded JSON: whether it is complete and self-contained.
 
     report_page_test.py ROOT
 
@@ -79,7 +79,7 @@ def evaluate(*arguments, path=None):
 
 
 class Folder:
-    """Of samples, and what else a test puts into it."""
+    """A folder with samples, and what else a test adds."""
 
     def __init__(self, test, **more):
         holder = tempfile.TemporaryDirectory(prefix="cles-report-")
@@ -165,7 +165,7 @@ class Page(unittest.TestCase):
         self.assertIn("there is no strike_latency.json among what was measured", words(root))
         self.assertIn("it is not installed", words(root))
         self.assertIn("a broker", words(root))
-        self.assertIn("latency.json holds no JSON object", words(root))
+        self.assertIn("latency.json does not contain a JSON object", words(root))
         self.made("--strict", code=1)
 
     def test_without_gnuplot_the_pictures_are_missing_and_nothing_else(self):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""How `scripts/evaluate` runs its sections: those that work, fail, hang, say nothing, or are not there.
+"""How `scripts/evaluate` runs its sections: those that work, fail, hang, print nothing, or are missing.
 
     report_running_test.py ROOT
 
@@ -59,7 +59,7 @@ def is_alive(process):
 
 
 class Tree:
-    """The program, its modules, and measuring scripts of a test's own."""
+    """The program, its modules, and the sections of a test."""
 
     def __init__(self, test, **scripts):
         holder = tempfile.TemporaryDirectory(prefix="cles-evaluate-")
