@@ -70,7 +70,7 @@ install(FILES "${PROJECT_BINARY_DIR}/package/cles.pc" DESTINATION "${CMAKE_INSTA
 
 # --- The programs ------------------------------------------------------------------------------------------------------
 
-foreach(program IN ITEMS cles_command clesd)
+foreach(program IN ITEMS cles_command cles_bench clesd)
     if(TARGET ${program})
         install(TARGETS ${program} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
     endif()

@@ -32,6 +32,8 @@ void add_doctor(CLI::App& app, context& shared);
 void add_completion(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);
 void add_help(CLI::App& app, context& shared);
+/// `words` are the arguments of this program, ended by a null pointer. Those after "bench" are passed to `cles-bench`.
+void add_bench(CLI::App& app, char** words);
 
 /// A description of the program and its commands.
 std::string overview_of(const CLI::App& app);

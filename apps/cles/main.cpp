@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/version.hpp>
 
-#include "bench.hpp"
 #include "commands.hpp"
 #include "output/errors.hpp"
 
@@ -87,9 +86,7 @@ int main(int argc, char** argv) {
         tool::add_completion(app, shared);
         tool::add_serve(app, shared);
         tool::add_help(app, shared);
-#ifdef CLES_WITH_BENCH
-        tool::add_bench(app, shared.exit_code);
-#endif
+        tool::add_bench(app, argv + 1);
         if (argc > 1 && std::string_view{argv[1]} == "__complete") {
             return tool::complete(app, {argv + 2, argv + argc});
         }

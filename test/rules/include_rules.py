@@ -65,8 +65,8 @@ FACADE_HEADERS = {f"cles/{name}.hpp" for name in ("service", "feed", "plugin", "
 EXCEPTIONS: dict[str, set[str]] = {
     "test/plugins/three_homes_test.cpp": {"apps"},  # an example's tasks, in one more home
     "test/effort/impaired_line_test.cpp": {"perf"},  # what the measurements' bad link decides
-    "perf/choice_cost.cpp": {"core", "protocol"},  # measures a choice without a link
-    "perf/job_cost.cpp": {"runtime"},  # measures a daemon in a process of its own
+    "perf/routing/choice_cost.cpp": {"core", "protocol"},  # measures a choice without a link
+    "perf/jobs/job_cost.cpp": {"runtime"},  # measures a daemon in a process of its own
 }
 
 # Headers that move bytes, wait, or start threads: nothing for rooms where time is a parameter.
