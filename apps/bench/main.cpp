@@ -3,8 +3,8 @@
 #include <cles/wake_bound.hpp>
 
 #include "arguments.hpp"
-#include "output/errors.hpp"
 #include "measurements.hpp"
+#include "output/errors.hpp"
 #include "output/terminal.hpp"
 #include "perf/support/pinning.hpp"
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
-#include "output/errors.hpp"
 #include "figures.hpp"
 #include "measurements.hpp"
+#include "output/errors.hpp"
 #include "perf/pull/core_load.hpp"
 #include "perf/pull/pull_exchange.hpp"
 #include "perf/support/child_process.hpp"
