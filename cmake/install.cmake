@@ -59,10 +59,6 @@ function(cles_flags_of_boost cflags_out libs_out)
 endfunction()
 
 cles_flags_of_boost(cles_pc_cflags cles_pc_libs)
-# Code that is compiled against the library has to agree with it on these.
-get_target_property(cles_pc_definitions cles INTERFACE_COMPILE_DEFINITIONS)
-list(TRANSFORM cles_pc_definitions PREPEND " -D")
-string(CONCAT cles_pc_cflags ${cles_pc_definitions} "${cles_pc_cflags}")
 file(RELATIVE_PATH cles_pc_prefix "${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig" "${CMAKE_INSTALL_PREFIX}")
 string(REGEX REPLACE "/$" "" cles_pc_prefix "${cles_pc_prefix}")
 configure_file(cmake/cles.pc.in "${PROJECT_BINARY_DIR}/package/cles.pc" @ONLY)

@@ -5,6 +5,8 @@
 
 #include "core/call.hpp"
 
+#include <boost/asio/any_io_executor.hpp>
+
 #include <chrono>
 #include <cstdint>
 #include <functional>
