@@ -57,6 +57,7 @@ class neighbouring final : public part {
     void look_at(node_run& n, const core::presence::known& other);
     void expect_all_known(const char* when);
     [[nodiscard]] static time_point last_chance(const node_run& n, const heard_run& r);
+    [[nodiscard]] bool could_answer(node_run& at, std::string_view node, std::uint32_t epoch);
     void complain(rule which, node_run& at, const std::string& what);
 
     world& world_;

@@ -38,16 +38,16 @@ engine::engine(std::shared_ptr<asio_port::asio_environment> by, service_options 
 
 std::weak_ptr<engine> engine::weak() { return std::static_pointer_cast<engine>(shared_from_this()); }
 
-void engine::add(registration task) {
-    core::handler entry{.info = std::move(task.info)};
-    if (task.plain) {
-        entry.plain = [this, handler = std::move(task.plain)](const request& r, json_writer& w) {
+void engine::add(registration offered) {
+    core::handler entry{.info = std::move(offered.info)};
+    if (offered.plain) {
+        entry.plain = [this, handler = std::move(offered.plain)](const request& r, json_writer& w) {
             const core::turns::serving during{turns()};
             handler(r, w);
         };
     }
-    if (task.async) {
-        entry.start = [this, handler = std::move(task.async),
+    if (offered.async) {
+        entry.start = [this, handler = std::move(offered.async),
                        self = weak()](const request& r, const std::shared_ptr<core::call>& call) {
             // Held here too, so that what a handler throws is the answer, and not that its responder went without one.
             const auto control = std::make_shared<api::service_call>(call, executor(), self);
@@ -59,7 +59,7 @@ void engine::add(registration task) {
             }
         };
     }
-    node().tasks.add(task.verb, task.task, std::move(entry));
+    node().tasks.add(offered.verb, offered.task, std::move(entry));
 }
 
 std::shared_ptr<update_sink> engine::outside_updates() {

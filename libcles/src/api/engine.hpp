@@ -20,7 +20,7 @@ class engine final : public shell::local_node {
     engine(const boost::asio::any_io_executor& executor, service_options options);
 
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return asio_.executor(); }
-    void add(registration task);
+    void add(registration offered);
     /// Where updates go that come from other threads.
     std::shared_ptr<update_sink> outside_updates();
     void stop() override;

@@ -20,8 +20,8 @@ constexpr std::chrono::seconds idle_after{2};
 
 } // namespace
 
-connection::connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from)
-    : host_(std::move(host)), link_(std::move(carrier)), from_(from),
+connection::connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number)
+    : host_(std::move(host)), link_(std::move(carrier)), from_(from), number_(number),
       memory_(std::make_shared<core::memory_account>(host_->node().memory)),
       session_(host_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
     if (link_->datagram() == 0) {

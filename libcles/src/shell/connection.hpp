@@ -39,12 +39,14 @@ class connection final : public link_events,
     /// `refused`: it came in past the limit, and is told so.
     enum class origin : std::uint8_t { accepted, local, dialled, refused };
 
-    connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from);
+    /// `number`: none of the others of the service has it.
+    connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number);
     ~connection() override;
 
     void start();
     [[nodiscard]] core::session& session() noexcept { return session_; }
     [[nodiscard]] origin from() const noexcept { return from_; }
+    [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
     /// It came in as a source of datagrams.
     [[nodiscard]] bool is_source() const noexcept { return life_.has_value(); }
     /// Nothing would be lost with it.
@@ -132,6 +134,7 @@ class connection final : public link_events,
     std::shared_ptr<local_node> host_;
     link_ptr link_;
     origin from_;
+    std::uint64_t number_;
     std::shared_ptr<core::memory_account> memory_;
     core::memory_reservation held_output_{memory_};
     core::session session_;

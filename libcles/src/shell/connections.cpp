@@ -119,8 +119,8 @@ void connections::turn_away(link_ptr arrived) {
 std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin from) {
     const bool counted = from == connection::origin::accepted;
     const auto address = counted ? address_of(made->peer()) : std::string{};
-    auto c = std::make_shared<connection>(host_.shared_from_this(), std::move(made), from);
-    open_.emplace(c.get(), c);
+    auto c = std::make_shared<connection>(host_.shared_from_this(), std::move(made), from, ++last_number_);
+    open_.emplace(c->number(), c);
     if (counted) {
         if (c->datagram() != 0) {
             ++sources_;
@@ -153,7 +153,7 @@ void connections::begin_nothing(connection& c) {
 }
 
 bool connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
-    if (open_.erase(&c) == 0) {
+    if (open_.erase(c.number()) == 0) {
         return false;
     }
     if (c.from() == connection::origin::accepted) {

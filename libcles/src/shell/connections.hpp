@@ -52,7 +52,8 @@ class connections {
     void drop_sources_at_rest();
 
     local_node& host_;
-    std::map<connection*, std::shared_ptr<connection>> open_;
+    std::map<std::uint64_t, std::shared_ptr<connection>> open_; // by number, so that their order is always the same
+    std::uint64_t last_number_ = 0;
     std::map<const link*, link_ptr> parting_;
     std::optional<core::link_admission> admission_;
     std::size_t sources_ = 0;

@@ -205,7 +205,7 @@ class feed_links::features_reply final : public detail::pending {
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms) {
     feed.share_by("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
                   terms.adverbs);
-    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0});
+    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0, {}, ++last_number_});
 }
 
 void feed_links::leave(core::feed_machine& feed) { feeds_.erase(&feed); }
@@ -355,7 +355,8 @@ void feed_links::on_new_run(std::string_view node, bool replaced) {
         bool elsewhere;
     };
     std::vector<concern> concerned;
-    for (const auto& [feed, e] : feeds_) {
+    for (auto* feed : in_order()) {
+        const auto& e = feeds_.at(feed);
         if (feed->target() == node && e.terms.at.empty()) {
             concerned.push_back({feed, e.handle, e.at != where});
         }
@@ -374,10 +375,21 @@ void feed_links::on_new_run(std::string_view node, bool replaced) {
     }
 }
 
+std::vector<core::feed_machine*> feed_links::in_order() const {
+    std::vector<core::feed_machine*> feeds;
+    feeds.reserve(feeds_.size());
+    for (const auto& [feed, e] : feeds_) {
+        feeds.push_back(feed);
+    }
+    std::sort(feeds.begin(), feeds.end(),
+              [this](auto* a, auto* b) { return feeds_.at(a).number < feeds_.at(b).number; });
+    return feeds;
+}
+
 void feed_links::stop() {
     const auto feeds = feeds_;
-    for (const auto& [feed, e] : feeds) {
-        if (const auto handle = e.handle.lock()) {
+    for (auto* feed : in_order()) {
+        if (const auto handle = feeds.at(feed).handle.lock()) {
             // Taken out of the feed, which they may own: else neither would go if the context goes without running.
             feed->abandon().fail(host_.completions(), errc::stopped);
         }

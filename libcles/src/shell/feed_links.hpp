@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace cles::shell {
 
@@ -51,6 +52,7 @@ class feed_links final : public core::feed_host {
         std::string at{};                // the URL where it was asked for last
         std::uint64_t asking = 0;        // the id of its last BIND by datagram
         std::optional<time_point> due{}; // until when a BIND is to be answered that waits for the node's features
+        std::uint64_t number = 0;        // in the order in which they were entered
     };
 
     class features_reply;
@@ -60,8 +62,12 @@ class feed_links final : public core::feed_host {
     [[nodiscard]] protocol::request_text bind_text(entry& e, const connection& c);
     void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
 
+    /// As they were entered, so that the order does not depend on addresses.
+    [[nodiscard]] std::vector<core::feed_machine*> in_order() const;
+
     local_node& host_;
     std::map<core::feed_machine*, entry> feeds_;
+    std::uint64_t last_number_ = 0;
 };
 
 } // namespace cles::shell

@@ -61,6 +61,8 @@ class neighbours final : private core::group_presence,
     /// Whether a node that is known, at no address that can be used, may be heard any moment by another of its
     /// interfaces.
     [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
+    /// What presence reports changes to; a test may put itself between.
+    [[nodiscard]] core::presence::watcher& presence_watcher() noexcept { return *this; }
     /// Why a name is not known, as the first part of a sentence; empty without a group.
     [[nodiscard]] std::string why_unknown() const;
 
