@@ -62,7 +62,7 @@ int main(int argc, char** argv) {
     } catch (const CLI::Success& asked) { // --help
         return command.exit(asked);
     } catch (const CLI::ParseError& wrong) {
-        tool::complain(wrong.what());
+        tool::print_error(wrong.what());
         tool::note("cles help bench shows its options");
         return tool::exit_code::usage;
     } catch (...) {

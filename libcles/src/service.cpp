@@ -200,7 +200,7 @@ void service::send_elsewhere(const detail::remote_withdrawal& withdraw, const de
     asio::dispatch(get_executor(),
                    [inside = engine_, ticket = withdraw.ticket, verb = request.verb, noun = std::string{request.noun},
                     body = std::string{request.body}, options, operation = std::move(operation)]() mutable {
-                       *ticket = inside->send({verb, noun, body}, options, std::move(operation));
+                       *ticket = inside->send(verb, noun, body, options, std::move(operation));
                    });
 }
 

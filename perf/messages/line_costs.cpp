@@ -112,7 +112,7 @@ double line_costs::time_request(const std::string& line, std::uint64_t repetitio
     const auto began = clock::now();
     for (std::uint64_t i = 0; i < repetitions; ++i) {
         into_car_->deliver(line);
-        if (into_car_->written() != wanted) {
+        if (into_car_->written() != expected_reply) {
             throw std::runtime_error("a request was answered with " + into_car_->written());
         }
     }

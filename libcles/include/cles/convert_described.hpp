@@ -57,7 +57,7 @@ template <class D>
 inline constexpr bool is_field = (D::modifiers & (boost::describe::mod_static | boost::describe::mod_function)) == 0;
 
 template <template <class...> class List, class... D>
-constexpr bool any_is_named(List<D...>, std::string_view name) noexcept {
+constexpr bool any_is_named(List<D...>, [[maybe_unused]] std::string_view name) noexcept {
     return ((name == D::name) || ...);
 }
 /// Whether a class describes a member of this name, which hides those of its bases.

@@ -3,6 +3,7 @@
 
 #include <cles/plugin_text.hpp>
 
+#include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/post.hpp>
 
 #include <string>

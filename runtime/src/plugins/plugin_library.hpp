@@ -3,15 +3,14 @@
 
 #include <cles/plugin_abi.h>
 
-#include <boost/dll/shared_library.hpp>
-
-#include <filesystem>
-#include <string>
-
 // With the standard library's file system no further library of Boost is linked.
 #ifndef BOOST_DLL_USE_STD_FS
 #define BOOST_DLL_USE_STD_FS
 #endif
+#include <boost/dll/shared_library.hpp>
+
+#include <filesystem>
+#include <string>
 
 namespace cles::runtime {
 
