@@ -102,7 +102,8 @@ BOOST_AUTO_TEST_CASE(they_go_with_their_context_also_where_they_own_the_queue) {
     std::weak_ptr<cles::core::completion_drain> queue;
     {
         boost::asio::io_context other;
-        const auto own = std::make_shared<cles::core::completion_drain>(other.get_executor());
+        const auto own = std::make_shared<cles::core::completion_drain>(
+            std::make_shared<cles::asio_port::asio_environment>(other.get_executor()));
         queue = own;
         own->put(cles::core::completion{cles::core::completion::callback{[own, owned] {}}});
         BOOST_TEST(owned.use_count() == 2);
