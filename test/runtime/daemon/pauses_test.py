@@ -51,8 +51,8 @@ class Pauses(unittest.TestCase):
         for attempt in range(5):
             first = 1000 * attempt
             with self.daemon.connect() as link, self.daemon.connect() as other:
-                # Ends during the pause, so that the only worker is free.
-                link.send(f"DELEGATE sat1:once/{first}/100 id=1")
+                # Ends while the daemon is stopped, not before, and leaves the only worker to the next.
+                link.send(f"DELEGATE sat1:once/{first}/600 id=1")
                 wait_until(lambda n=first: n in self.begun(), "the first has begun")
                 for id_ in range(2, 12):
                     link.send(f"DELEGATE sat1:once/{first + id_}/0 id={id_} deadline=60000")
