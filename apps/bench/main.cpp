@@ -53,8 +53,12 @@ int main(int argc, char** argv) {
     std::signal(SIGPIPE, SIG_IGN);
     tool::bench_arguments given;
     CLI::App command{"", "cles bench"};
+    // Accepted, since `cles` accepts it after each command. A hidden option ahead of all others leaves no empty line in
+    // the help text, so the help option goes behind it.
+    command.set_help_flag();
+    command.add_flag("-v,--verbose")->group("");
+    command.set_help_flag("-h,--help", "Print this help message and exit");
     tool::add_bench_arguments(command, given);
-    command.add_flag("-v,--verbose")->group(""); // which `cles` accepts after each command
     try {
         command.parse(argc, argv);
         run(command, given);

@@ -325,7 +325,8 @@ GOOD = {
     'const char* text = "steady_clock::now()"; // steady_clock::now()\nvoid f(std::mt19937& chance);\n',
     "libcles/src/transport/tcp.cpp": '#include <cles/link.hpp>\n#include "protocol/line.hpp"\n#include <boost/asio/ip/tcp.hpp>\n'
     "task f() {\n  auto&& x = co_await g(a && b);\n  if (a && b) {\n    co_await h(c ? d : e);\n  }\n  z(a || b, co_await q());\n}\n",
-    "libcles/src/shell/connection.cpp": '#include "core/session.hpp"\n#include "transport/tcp.hpp"\n#include <cles/service.hpp>\n',
+    "libcles/src/shell/connection.cpp": '#include "core/session.hpp"\n#include <cles/registrar.hpp>\n',
+    "libcles/src/asio/dial.cpp": '#include "core/session.hpp"\n#include "transport/tcp.hpp"\n#include <boost/asio/post.hpp>\n',
     "libcles/src/core/session.hpp": "#pragma once\n",
     "libcles/src/transport/tcp.hpp": "#pragma once\n",
     "libcles/src/service.cpp": '#include <cles/service.hpp>\n#include "shell/connection.hpp"\n',
@@ -359,6 +360,8 @@ PLANTED = [
     ("libcles/src/transport/a.cpp", '#include "shell/connection.hpp"\n', "transport must not see shell"),
     ("libcles/src/transport/a.cpp", "#include <cles/service.hpp>\n", "must not see the facade"),
     ("libcles/src/shell/a.cpp", "#include <spdlog/spdlog.h>\n", "spdlog is for programs"),
+    ("libcles/src/shell/a.cpp", '#include "transport/tcp.hpp"\n', "shell must not see transport"),
+    ("libcles/src/shell/a.cpp", "#include <boost/asio/post.hpp>\n", "shell"),
     ("libcles/src/shell/a.cpp", '#include "nowhere.hpp"\n', "is no file of this project"),
     ("libcles/src/util/a.cpp", "int a;\n", "is no room yet"),
     ("libcles/include/cles/a.hpp", '#include "protocol/line.hpp"\n', "public must not see protocol"),

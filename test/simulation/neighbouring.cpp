@@ -52,7 +52,8 @@ void neighbouring::perform(const action& a) {
     }
 }
 
-void neighbouring::on_start(node_run&) {
+void neighbouring::on_start(node_run& n) {
+    record_begin(n);
     if (world_.has_group() && !std::exchange(looking_, true)) {
         look_at_all();
     }
@@ -66,6 +67,7 @@ void neighbouring::begin_namesake(unsigned of) {
     auto& n = namesakes_[of];
     if (!n) {
         n = world_.begin_stranger(world::name_of(of), world_.hosts() + of, ++namesake_runs_);
+        record_begin(*n);
     }
 }
 
@@ -134,6 +136,14 @@ bool neighbouring::could_answer(node_run& at, std::string_view node, std::uint32
            world_.net().undisturbed_since(world_.time().now() - enough);
 }
 
+void neighbouring::record_begin(node_run& n) { began_[*protocol::parse_epoch(n.node()->epoch)] = n.now(); }
+
+// Of two runs of one name the earlier one keeps it, and whoever heard the later one first finds that out by asking both.
+bool neighbouring::has_precedence(std::uint32_t epoch, std::uint32_t over) const {
+    const auto later = began_.at(epoch) - began_.at(over);
+    return later <= seconds{0} || (later <= presence::together && epoch < over);
+}
+
 // -- what is made of it --------------------------------------------------------------------------------------------
 
 void neighbouring::on_neighbour(node_run& at, std::string_view node, presence::change what) {
@@ -160,7 +170,7 @@ void neighbouring::on_neighbour(node_run& at, std::string_view node, presence::c
         break;
     case presence::change::moved:
         if (known && owner != mine.owners.end() && known->epoch != owner->second && !mine.silent.contains(node) &&
-            could_answer(at, node, owner->second)) {
+            !has_precedence(known->epoch, owner->second) && could_answer(at, node, owner->second)) {
             complain_if_heard(audible_until(until_silent), "another");
         }
         break;

@@ -127,7 +127,7 @@ BOOST_AUTO_TEST_CASE(a_throwing_callback_is_reported) {
     stops.notify({.callback = [] { throw std::runtime_error{"no"}; },
                   .log = [log](log_level level, const std::string& text) { log->add(level, text); }});
     BOOST_TEST(stops.close(1min) == 0U);
-    BOOST_TEST(log->count("warning: a job threw when it was told to stop") == 1U);
+    BOOST_TEST(log->count("warning: its on_stop callback threw") == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(calls_not_made_before_close_are_dropped) {
