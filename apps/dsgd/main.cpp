@@ -116,8 +116,7 @@ int main(int argc, char** argv) {
     app.add_option("--at", args.seeds, "A node that knows the others (tcp://127.0.0.1:25370)")->type_name("URL");
     app.add_option("-n,--nodes", args.nodes, "The nodes that train, in turn (default any)")->delimiter(',');
     app.add_flag("-w,--weighted", args.weighted, "Measure the nodes first; faster ones get larger shards");
-    app.add_option("--local", args.threads, "Train in this process, in this number of threads")
-        ->check(CLI::Range(1, 1024));
+    app.add_option("--local", args.threads, "Train here, in this number of threads")->check(CLI::Range(1, 1024));
     app.add_option("-e,--epochs", args.epochs, "Steps for each point (100)")->check(CLI::Range(1, 1'000'000));
     app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(CLI::PositiveNumber);
     app.add_option("--seed", args.seed, "Seed of the random numbers (1)");
