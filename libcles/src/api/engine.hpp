@@ -29,7 +29,7 @@ class engine final : public shell::local_node {
     engine(std::shared_ptr<asio_port::asio_environment> by, service_options options);
     [[nodiscard]] std::weak_ptr<engine> weak();
 
-    const asio_port::asio_environment& asio_; // the node's environment
+    const asio_port::asio_environment& asio_;                     // the node's environment
     std::shared_ptr<asio_port::outside_updates> outside_updates_; ///< once the program wants to publish from elsewhere
 };
 
