@@ -5,6 +5,7 @@
 #include <boost/asio/post.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <atomic>
 #include <chrono>
 #include <future>
 #include <memory>
@@ -72,17 +73,18 @@ BOOST_AUTO_TEST_CASE(a_thread_that_does_not_return_is_abandoned) {
 BOOST_AUTO_TEST_CASE(functions_not_started_before_stop_never_run) {
     std::promise<void> opener;
     const auto gate = as_gate(opener);
-    threads one{1};
-    occupy(one, gate).wait();
-    const auto witness = std::make_shared<int>(0);
-    boost::asio::post(one.get_executor(), [witness] { ++*witness; });
-    std::thread late{[&opener] {
-        std::this_thread::sleep_for(2ms);
-        opener.set_value();
-    }};
-    BOOST_TEST(one.stop(patience) == 0U);
-    late.join();
-    BOOST_TEST(*witness == 0);
+    const auto ran = std::make_shared<std::atomic<bool>>(false);
+    const auto discarded = std::make_shared<std::promise<void>>();
+    {
+        threads one{1};
+        occupy(one, gate).wait();
+        std::shared_ptr<void> held{nullptr, [discarded](void*) { discarded->set_value(); }};
+        boost::asio::post(one.get_executor(), [ran, held = std::move(held)] { *ran = true; });
+        BOOST_TEST(one.stop(1ms, 1) == 1U);
+    }
+    opener.set_value();
+    BOOST_TEST((discarded->get_future().wait_for(patience) == std::future_status::ready));
+    BOOST_TEST(!*ran);
 }
 
 BOOST_AUTO_TEST_SUITE_END()
