@@ -36,7 +36,7 @@ class ip_networks {
     explicit ip_networks(const std::vector<std::string>& texts);
 
     /// Whether a numeric address is of one of them.
-    [[nodiscard]] bool contain(std::string_view address) const noexcept;
+    [[nodiscard]] bool contain(std::string_view text) const noexcept;
 
   private:
     struct network {

@@ -110,7 +110,7 @@ class local_node : public std::enable_shared_from_this<local_node>, private core
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
     /// Returns a ticket by which it can be withdrawn while it waits; 0 where it does not.
     std::uint64_t publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
-    std::uint64_t send(verb how, std::string_view noun, std::string_view body, const call_options& options,
+    std::uint64_t send(verb how, std::string_view text, std::string_view body, const call_options& options,
                        detail::pending_ptr operation);
     void cancel(std::uint64_t ticket);
     /// Completes an operation that failed while it began; not from inside the call.

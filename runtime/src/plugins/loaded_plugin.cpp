@@ -3,6 +3,7 @@
 
 #include <cles/plugin_text.hpp>
 
+#include "jobs/job_context.hpp"
 #include "plugins/plugin_jobs.hpp"
 
 #include <algorithm>
