@@ -59,10 +59,6 @@ function(cles_flags_of_boost cflags_out libs_out)
 endfunction()
 
 cles_flags_of_boost(cles_pc_cflags cles_pc_libs)
-# Code that is compiled against the library has to agree with it on these.
-get_target_property(cles_pc_definitions cles INTERFACE_COMPILE_DEFINITIONS)
-list(TRANSFORM cles_pc_definitions PREPEND " -D")
-string(CONCAT cles_pc_cflags ${cles_pc_definitions} "${cles_pc_cflags}")
 file(RELATIVE_PATH cles_pc_prefix "${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig" "${CMAKE_INSTALL_PREFIX}")
 string(REGEX REPLACE "/$" "" cles_pc_prefix "${cles_pc_prefix}")
 configure_file(cmake/cles.pc.in "${PROJECT_BINARY_DIR}/package/cles.pc" @ONLY)
@@ -70,17 +66,28 @@ install(FILES "${PROJECT_BINARY_DIR}/package/cles.pc" DESTINATION "${CMAKE_INSTA
 
 # --- The programs ------------------------------------------------------------------------------------------------------
 
-foreach(program IN ITEMS cles_command clesd cles_dsgd cles_jadc2 cles_platoon)
+foreach(program IN ITEMS cles_command cles_bench clesd)
     if(TARGET ${program})
         install(TARGETS ${program} RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}")
     endif()
 endforeach()
 
-# --- Plugins that come along -------------------------------------------------------------------------------------------
+# --- Plugins -----------------------------------------------------------------------------------------------------------
 
-foreach(plugin IN ITEMS cles_plugin_system cles_plugin_primes cles_plugin_sgd cles_plugin_fmv cles_plugin_strike)
+foreach(plugin IN ITEMS cles_plugin_system cles_plugin_primes)
     if(TARGET ${plugin})
         install(TARGETS ${plugin} LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/cles")
+    endif()
+endforeach()
+
+# --- The case studies --------------------------------------------------------------------------------------------------
+
+# Only installed by `cmake --install BUILD --component case_studies`.
+foreach(target IN ITEMS cles_dsgd cles_jadc2 cles_platoon cles_plugin_sgd cles_plugin_fmv cles_plugin_strike)
+    if(TARGET ${target})
+        install(TARGETS ${target}
+            RUNTIME DESTINATION "${CMAKE_INSTALL_BINDIR}" COMPONENT case_studies EXCLUDE_FROM_ALL
+            LIBRARY DESTINATION "${CMAKE_INSTALL_LIBDIR}/cles" COMPONENT case_studies EXCLUDE_FROM_ALL)
     endif()
 endforeach()
 

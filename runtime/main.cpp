@@ -1,4 +1,175 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "clesd.hpp"
+#include <cles/error.hpp>
+#include <cles/run.hpp>
+#include <cles/wake_bound.hpp>
 
-int main(int argc, char** argv) { return cles::runtime::clesd(argc, argv); }
+#include "config/config.hpp"
+#include "config/config_file.hpp"
+#include "config/config_sources.hpp"
+#include "daemon/command_line.hpp"
+#include "daemon/daemon.hpp"
+#include "daemon/daemon_log.hpp"
+#include "daemon/service_manager.hpp"
+#include "plugins/plugin_trial.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <variant>
+
+#include <unistd.h>
+
+namespace cles::runtime {
+namespace {
+
+// The exit codes.
+constexpr int success = 0;
+constexpr int cannot_run = 1;
+constexpr int wrong_usage = 2;
+constexpr int name_conflict = 3;
+
+void print(std::FILE* to, const std::string& text) {
+    std::fwrite(text.data(), 1, text.size(), to);
+    std::fflush(to);
+}
+
+int report(const std::string& text, int code) {
+    print(stderr, "clesd: " + text + "\n");
+    return code;
+}
+
+std::string host_name() {
+    std::array<char, 256> name{};
+    return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
+}
+
+config_sources sources_of(const command_line_options& wanted) {
+    return {.file = wanted.config,
+            .flags = wanted.flags,
+            .variable = [](const char* name) -> const char* { return std::getenv(name); },
+            .host = host_name(),
+            .cores = std::thread::hardware_concurrency()};
+}
+
+// Plugins are tried, each in a process of its own, but not started: a running daemon may use their devices.
+int check_plugins(config setup) {
+    try_plugins(setup);
+    for (const auto& plugin : setup.plugins) {
+        if (!plugin.trial_error.empty()) {
+            report(plugin.trial_error + " (it is not required)", success);
+        }
+    }
+    print(stdout, (setup.file.empty() ? "without a file: " : setup.file + ": ") + "can be used\n");
+    return success;
+}
+
+// For a system error: what could not be done, then why, without repetition.
+std::string message_of(const error& e) {
+    const auto why = e.code().message();
+    if (e.code().category() == error_category() || e.message().empty()) {
+        return e.what();
+    }
+    return e.message().find(why) != std::string::npos ? e.message() : e.message() + ": " + why;
+}
+
+// Child processes must not notify the service manager.
+std::string take_notify_socket() {
+    const char* socket = std::getenv("NOTIFY_SOCKET");
+    std::string value = socket == nullptr ? "" : socket;
+    ::unsetenv("NOTIFY_SOCKET");
+    return value;
+}
+
+std::unique_ptr<const wake_bound> limit_wake_latency(const config& setup) {
+    try {
+        return setup.wake_within ? std::make_unique<const wake_bound>(*setup.wake_within) : nullptr;
+    } catch (const std::system_error& e) {
+        throw config_error(setup.location_of("wake_within"), e.what());
+    }
+}
+
+int run(config setup, config_sources sources) {
+    auto notify_socket = take_notify_socket();
+    try_plugins(setup); // while there are no threads
+    const auto node = setup.node;
+    const run_options how{.busy_poll = setup.busy_poll,
+                          .fifo_priority = static_cast<int>(setup.real_time),
+                          .lock_memory = setup.real_time != 0};
+    daemon_log log{node, setup.log};
+    const auto latency_limit = limit_wake_latency(setup); // before the service manager is notified
+    const service_manager manager{std::move(notify_socket)};
+    boost::asio::io_context io{1};
+    daemon clesd{io, std::move(setup), std::move(sources), log, manager};
+    for (const auto& endpoint : clesd.endpoints()) {
+        std::string line{node};
+        line.append(" listening on ").append(endpoint).push_back('\n');
+        print(stdout, line);
+    }
+    if (!manager.ready()) {
+        log.warning("the service manager could not be notified");
+    }
+    cles::run(io, how);
+    const int code = clesd.lost_name() ? name_conflict : success;
+    if (clesd.has_unfinished_work()) {
+        std::_Exit(code); // without waiting for it
+    }
+    return code;
+}
+
+// The parent's signal settings are inherited. Ignoring SIGCHLD would hide how a plugin's trial ended, and a blocked
+// signal would neither stop the daemon nor end a plugin's start that hangs.
+void set_up_signals() {
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    std::signal(SIGCHLD, SIG_DFL);
+    std::signal(SIGPIPE, SIG_IGN); // if a reader of its output ends
+}
+
+int start(int argc, const char* const* argv) {
+    const auto parsed = parse_command_line(argc, argv);
+    if (const auto* text = std::get_if<std::string>(&parsed)) {
+        print(stdout, *text);
+        return success;
+    }
+    const auto& wanted = std::get<command_line_options>(parsed);
+    auto sources = sources_of(wanted);
+    auto setup = load(sources);
+    if (wanted.print_config) {
+        print(stdout, to_yaml(setup));
+    }
+    if (wanted.check) {
+        return check_plugins(setup);
+    }
+    return wanted.print_config ? success : run(std::move(setup), std::move(sources));
+}
+
+} // namespace
+} // namespace cles::runtime
+
+int main(int argc, char** argv) {
+    using namespace cles::runtime;
+    set_up_signals();
+    try {
+        return start(argc, argv);
+    } catch (const usage_error& e) {
+        return report(std::string{e.what()} + "\nclesd: run clesd --help for the options", wrong_usage);
+    } catch (const config_error& e) {
+        return report(e.what(), wrong_usage);
+    } catch (const cles::error& failed) {
+        return report(message_of(failed), cannot_run);
+    } catch (const boost::system::system_error& failed) {
+        return report(failed.code().message(), cannot_run); // what() may contain the path of a header
+    } catch (const std::exception& failed) {
+        return report(failed.what(), cannot_run);
+    }
+}

@@ -15,9 +15,9 @@ import tempfile
 import threading
 import time
 
-sys.path.append(os.path.join(os.path.dirname(__file__), "..", "perf", "evaluate"))
+sys.path.append(os.path.join(os.path.dirname(__file__), "..", "perf", "evaluation"))
 from clean_environment import clean_environment  # noqa: E402
-from in_one_piece import InOnePiece  # noqa: E402
+from deferred_signals import DeferredSignals  # noqa: E402
 
 PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
 CONFIG = """\
@@ -79,7 +79,7 @@ class Namespaces:
 
     def _keep(self, role):
         """A process that keeps a namespace until its input ends, and so no longer than this one lives."""
-        with InOnePiece():
+        with DeferredSignals():
             keeper = subprocess.Popen(["unshare", "--net", "sh", "-c", "echo up; exec cat"], stdin=subprocess.PIPE,
                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
             self.keepers[role] = keeper
@@ -108,7 +108,7 @@ class Process:
     def __init__(self, fleet, name, command, stdin=subprocess.DEVNULL):
         self.name = name
         self.errors = os.path.join(fleet.folder, f"{name}-{time.monotonic_ns()}.err")
-        with open(self.errors, "w", encoding="utf-8") as err, InOnePiece():
+        with open(self.errors, "w", encoding="utf-8") as err, DeferredSignals():
             self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=err, text=True,
                                             env=clean_environment())
             fleet.started.append(self)

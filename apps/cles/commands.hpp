@@ -1,14 +1,22 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <string>
+#include <vector>
+
 namespace CLI {
 class App;
 }
 
-/// Each function adds one subcommand, which leaves its exit code in the context when it has run.
 namespace tool {
 
-struct context;
+/// What the subcommands share with `main`.
+struct context {
+    int exit_code = 0;
+    int verbosity = 0; ///< how often -v was given
+};
+
+// Each adds one subcommand, which sets the exit code when it has run.
 
 void add_pull(CLI::App& app, context& shared);
 void add_push(CLI::App& app, context& shared);
@@ -24,5 +32,21 @@ void add_doctor(CLI::App& app, context& shared);
 void add_completion(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);
 void add_help(CLI::App& app, context& shared);
+/// `words` are the arguments of this program, ended by a null pointer. Those after "bench" are passed to `cles-bench`.
+void add_bench(CLI::App& app, char** words);
+
+/// A description of the program and its commands.
+std::string overview_of(const CLI::App& app);
+
+/// Reports on stderr that there is no such command, and suggests a similar one.
+void report_unknown_command(const CLI::App& app, const std::string& typed);
+
+/// Suggests a similar option on stderr, if this word looks like one.
+void suggest_option(const CLI::App& app, const CLI::App& command, const std::string& word);
+
+/// The completion of a shell runs this, as `cles __complete WORD...`: the words after "cles" up to the cursor, the last
+/// of which is incomplete, and may be empty. Prints the candidates for it, one per line, each with a tab and a short
+/// description. It takes less than 100 ms, prints nothing else, and never fails.
+int complete(CLI::App& app, std::vector<std::string> words);
 
 } // namespace tool

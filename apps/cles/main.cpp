@@ -1,14 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/version.hpp>
 
-#include "bench.hpp"
 #include "commands.hpp"
-#include "complete.hpp"
-#include "context.hpp"
-#include "diagnostics.hpp"
-#include "exit_code.hpp"
-#include "failure.hpp"
-#include "help.hpp"
+#include "output/errors.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Config.hpp>
@@ -23,7 +17,7 @@
 
 namespace {
 
-constexpr auto about = "Talks to the nodes of a CLES network: five verbs, and what helps to look at them.";
+constexpr auto about = "Talks to the nodes of a CLES network: the five verbs, and commands to inspect nodes.";
 
 constexpr auto footer =
     "Data goes to stdout, everything else to stderr. CLES_AT is the default of --at, CLES_MULTICAST that of "
@@ -41,20 +35,20 @@ int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
     try {
         app.parse(argc, argv);
         return shared.exit_code;
-    } catch (const CLI::Success& asked) { // --help, --version
-        return app.exit(asked);
-    } catch (const CLI::ParseError& wrong) {
+    } catch (const CLI::Success& request) { // --help, --version
+        return app.exit(request);
+    } catch (const CLI::ParseError& error) {
         const auto commands = app.get_subcommands();
         const auto unknown = app.remaining(true);
         if (commands.empty() && unknown.empty()) {
-            tool::complain(wrong.what());
+            tool::print_error(error.what());
             std::cerr << '\n' << tool::overview_of(app);
             return tool::exit_code::usage;
         }
         if (commands.empty()) {
-            tool::refuse_command(app, unknown.front());
+            tool::report_unknown_command(app, unknown.front());
         } else {
-            tool::complain(wrong.what());
+            tool::print_error(error.what());
             for (const auto& word : unknown) {
                 tool::suggest_option(app, *commands.front(), word);
             }
@@ -68,7 +62,7 @@ int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
 } // namespace
 
 int main(int argc, char** argv) {
-    // A reader that goes away shows as an error of the write, which ends the command without noise.
+    // If the reader of the output is gone, the write fails, which ends the command silently.
     std::signal(SIGPIPE, SIG_IGN);
     try {
         tool::context shared;
@@ -77,7 +71,7 @@ int main(int argc, char** argv) {
         app.fallthrough();
         app.require_subcommand(1);
         app.set_version_flag("--version", "cles " + std::string{cles::version});
-        app.add_flag("-v,--verbose", shared.verbosity, "Say more on stderr; twice: also every line sent and received");
+        app.add_flag("-v,--verbose", shared.verbosity, "Log more on stderr; twice: also every line sent and received");
         tool::add_pull(app, shared);
         tool::add_push(app, shared);
         tool::add_delegate(app, shared);
@@ -92,9 +86,7 @@ int main(int argc, char** argv) {
         tool::add_completion(app, shared);
         tool::add_serve(app, shared);
         tool::add_help(app, shared);
-#ifdef CLES_WITH_BENCH
-        tool::add_bench(app, shared.exit_code);
-#endif
+        tool::add_bench(app, argv + 1);
         if (argc > 1 && std::string_view{argv[1]} == "__complete") {
             return tool::complete(app, {argv + 2, argv + argc});
         }

@@ -20,26 +20,26 @@ void board::done(std::size_t shard, const sgd::trained& part) {
 }
 
 bool board::failed(std::size_t shard, const cles::error& why) {
-    auto& which = shards_[shard];
+    auto& shard_entry = shards_[shard];
     if (failure_) {
-        which.fate = "withdrawn";
+        shard_entry.fate = "withdrawn";
         return false;
     }
-    which.trouble.push_back(which.target + ": " + why.what());
+    shard_entry.trouble.push_back(shard_entry.target + ": " + why.what());
     const auto code = why.code();
     bool again = code == errc::busy;
     const bool lost = code == errc::unavailable || code == errc::deadline || code == errc::no_target ||
-                      code.category() != cles::error_category(); // the system's word: no link came about
-    if (lost && which.target == "any") {
-        again = code != errc::no_target; // which says that there is nobody else
+                      code.category() != cles::error_category(); // a system error: no link was established
+    if (lost && shard_entry.target == "any") {
+        again = code != errc::no_target; // which means that there is no other node
     } else if (lost) {
-        nodes_.erase(which.target);
+        nodes_.erase(shard_entry.target);
         again = !nodes_.empty();
-        which.target = again ? least_loaded() : which.target;
+        shard_entry.target = again ? least_loaded() : shard_entry.target;
     }
-    if (!again || which.trouble.size() == most_attempts) {
-        which.fate = "failed";
-        failure_.emplace(code, "shard " + std::to_string(shard + 1) + ": " + which.trouble.back());
+    if (!again || shard_entry.trouble.size() == max_attempts) {
+        shard_entry.fate = "failed";
+        failure_.emplace(code, "shard " + std::to_string(shard + 1) + ": " + shard_entry.trouble.back());
     }
     return !failure_;
 }

@@ -10,33 +10,33 @@
 
 namespace dsgd {
 
-/// What is to be done of a shard, and who is to do it.
+/// The order for a shard, and the node for it.
 struct entry {
     sgd::order what{};
-    std::string target{};               ///< who is asked, or was last: a node, or `any`
+    std::string target{};               ///< the node that is or was asked last, or `any`
     std::string fate = "open";          ///< or done, failed, withdrawn
-    std::vector<std::string> trouble{}; ///< of each attempt that failed, who and why
+    std::vector<std::string> trouble{}; ///< node and reason of each failed attempt
 };
 BOOST_DESCRIBE_STRUCT(entry, (), (what, target, fate, trouble))
 
-/// Who has which shard, and who is to have it when a node fails. It decides; asking and waiting is its caller's.
+/// Assigns shards to nodes, again when a node fails. It only decides; its caller sends and waits.
 class board {
   public:
-    static constexpr std::size_t most_attempts = 6;
+    static constexpr std::size_t max_attempts = 6;
 
-    /// \param targets whose turn it is, shard by shard; none: each shard goes to `any`
+    /// \param targets the nodes, in turn; none: each shard goes to `any`
     board(const std::vector<sgd::order>& orders, const std::vector<std::string>& targets);
 
     [[nodiscard]] const std::vector<entry>& shards() const noexcept { return shards_; }
-    /// What has been done of each.
+    /// The results.
     [[nodiscard]] const std::vector<sgd::trained>& parts() const noexcept { return parts_; }
-    /// Why all of it failed: the first shard that could not be done.
+    /// The reason of the first shard that could not be done.
     [[nodiscard]] const std::optional<cles::error>& failure() const noexcept { return failure_; }
 
     void done(std::size_t shard, const sgd::trained& part);
-    /// True: delegate it again, to whom `target` now says. Training twice does no harm, so that a shard whose node is
-    /// lost goes to the one of the others that has the fewest; a node that is busy is asked again. False: it has
-    /// failed, or was withdrawn since another has.
+    /// \return whether to delegate it again, to the present `target`. Training twice does no harm: a shard whose node
+    /// is lost goes to the node with the fewest shards; a busy node is asked again. Otherwise it has failed, or was
+    /// withdrawn because another one has.
     bool failed(std::size_t shard, const cles::error& why);
 
   private:
@@ -44,7 +44,7 @@ class board {
 
     std::vector<entry> shards_;
     std::vector<sgd::trained> parts_;
-    std::set<std::string> nodes_; ///< that have not been lost
+    std::set<std::string> nodes_; ///< that are not lost
     std::optional<cles::error> failure_;
 };
 

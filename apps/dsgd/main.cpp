@@ -8,7 +8,7 @@
 
 namespace {
 
-struct wishes {
+struct arguments {
     std::size_t shards = 4, threads = 0;
     std::vector<std::string> seeds{"tcp://127.0.0.1:25370"}, nodes{};
     std::uint64_t epochs = 100, seed = 1, deadline_s = 60;
@@ -34,7 +34,7 @@ int report_failure(const cles::error& why) {
     return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
 }
 
-int tell(const wishes& wanted, const sgd::data_set& data, const dsgd::board& all, double trial_ms = 0) {
+int report_result(const arguments& args, const sgd::data_set& data, const dsgd::board& all, double trial_ms = 0) {
     report out{.trial_ms = trial_ms, .shards = all.shards(), .parts = all.parts()};
     if (all.failure()) {
         out.error = all.failure()->message();
@@ -43,7 +43,7 @@ int tell(const wishes& wanted, const sgd::data_set& data, const dsgd::board& all
         out.result = average(out.parts);
         out.quality = judge(data, out.result);
     }
-    if (wanted.json) {
+    if (args.json) {
         std::puts(cles::to_json(out).c_str());
         return all.failure() ? report_failure(*all.failure()) : 0;
     }
@@ -61,73 +61,73 @@ int tell(const wishes& wanted, const sgd::data_set& data, const dsgd::board& all
     return 0;
 }
 
-int run_here(const wishes& wanted, const sgd::order& like) {
-    const sgd::data_set data{*like.data};
-    const auto orders = orders_for(sgd::divide(data.size(), std::vector<double>(wanted.threads, 1)), like);
+int run_local(const arguments& args, const sgd::order& setup) {
+    const sgd::data_set data{*setup.data};
+    const auto orders = orders_for(sgd::divide(data.size(), std::vector<double>(args.threads, 1)), setup);
     dsgd::board all{orders, {"here"}};
     for (std::size_t i = 0; const auto& part : train_here(data, orders)) {
         all.done(i++, part);
     }
-    return tell(wanted, data, all);
+    return report_result(args, data, all);
 }
 
-int run(const wishes& wanted, sgd::order like) {
-    dsgd::pool pool{wanted.seeds, std::chrono::seconds{wanted.deadline_s}, !wanted.json};
-    auto targets = wanted.nodes;
+int run(const arguments& args, sgd::order setup) {
+    dsgd::pool pool{args.seeds, std::chrono::seconds{args.deadline_s}, !args.json};
+    auto targets = args.nodes;
     const auto offered = pool.find();
     for (const auto& [node, data] : offered) {
-        if (wanted.nodes.empty() && wanted.weighted) {
+        if (args.nodes.empty() && args.weighted) {
             targets.push_back(node);
         }
-        like.data = data; // a node whose data is other will refuse
+        setup.data = data; // a node with other data refuses
     }
     for (const auto& node : targets) {
         if (!offered.contains(node)) {
             throw cles::error(cles::errc::no_target, "'" + node + "' does not offer 'sgd': see cles ls --tasks");
         }
     }
-    const sgd::data_set data{*like.data};
-    std::vector<double> weights(wanted.shards, 1);
+    const sgd::data_set data{*setup.data};
+    std::vector<double> weights(args.shards, 1);
     double trial_ms = 0;
-    if (wanted.weighted) {
-        auto few = like;
-        few.epochs = std::max<std::uint64_t>(1, wanted.epochs / 10);
-        dsgd::board trial{orders_for(sgd::divide(data.size(), weights), few), targets};
+    if (args.weighted) {
+        auto trial_order = setup;
+        trial_order.epochs = std::max<std::uint64_t>(1, args.epochs / 10);
+        dsgd::board trial{orders_for(sgd::divide(data.size(), weights), trial_order), targets};
         pool.train(trial);
         if (trial.failure()) {
-            return tell(wanted, data, trial);
+            return report_result(args, data, trial);
         }
-        targets = nodes_of(trial.parts()); // where each was done, should a node have been lost
+        targets = nodes_of(trial.parts()); // where each was done, in case a node was lost
         trial_ms = times_of(trial.parts()).elapsed_ms;
         weights = speeds(trial.parts());
     }
-    dsgd::board all{orders_for(sgd::divide(data.size(), weights), like), targets};
+    dsgd::board all{orders_for(sgd::divide(data.size(), weights), setup), targets};
     pool.train(all);
-    return tell(wanted, data, all, trial_ms);
+    return report_result(args, data, all, trial_ms);
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
-    wishes wanted;
+    arguments args;
     CLI::App app{"Distributed stochastic gradient descent: delegates shards of a data set, and averages.", "cles-dsgd"};
     app.footer("Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline, 5 another error, 6 busy.");
-    app.add_option("-k,--shards", wanted.shards, "Into how many the data is divided (4)")->check(CLI::Range(1, 1024));
-    app.add_option("--at", wanted.seeds, "Who is asked for the nodes (tcp://127.0.0.1:25370)")->type_name("URL");
-    app.add_option("-n,--nodes", wanted.nodes, "Who trains, in turns; any unless said")->delimiter(',');
-    app.add_flag("-w,--weighted", wanted.weighted, "Measure the nodes first; who is fast has larger shards");
-    app.add_option("--local", wanted.threads, "Train here, in so many threads; ask nobody")->check(CLI::Range(1, 1024));
-    app.add_option("-e,--epochs", wanted.epochs, "Steps for each point (100)")->check(CLI::Range(1, 1'000'000));
-    app.add_option("--rate", wanted.rate, "Size of a step (0.0001)")->check(CLI::PositiveNumber);
-    app.add_option("--seed", wanted.seed, "Of the draws (1)");
-    app.add_option("--deadline", wanted.deadline_s, "Of a shard, in seconds (60)")->check(CLI::Range(1, 86'400));
-    app.add_flag("--json", wanted.json, "Print an object, and no progress");
+    app.add_option("-k,--shards", args.shards, "Number of shards of the data (4)")->check(CLI::Range(1, 1024));
+    app.add_option("--at", args.seeds, "A node that knows the others (tcp://127.0.0.1:25370)")->type_name("URL");
+    app.add_option("-n,--nodes", args.nodes, "The nodes that train, in turn (default any)")->delimiter(',');
+    app.add_flag("-w,--weighted", args.weighted, "Measure the nodes first; faster ones get larger shards");
+    app.add_option("--local", args.threads, "Train here, in this number of threads")->check(CLI::Range(1, 1024));
+    app.add_option("-e,--epochs", args.epochs, "Steps for each point (100)")->check(CLI::Range(1, 1'000'000));
+    app.add_option("--rate", args.rate, "Size of a step (0.0001)")->check(CLI::PositiveNumber);
+    app.add_option("--seed", args.seed, "Seed of the random numbers (1)");
+    app.add_option("--deadline", args.deadline_s, "Deadline of a shard in seconds (60)")->check(CLI::Range(1, 86'400));
+    app.add_flag("--json", args.json, "Print a JSON object, and no progress");
     try {
         app.parse(argc, argv);
-        const sgd::order like{.epochs = wanted.epochs, .rate = wanted.rate, .seed = wanted.seed, .data = sgd::recipe{}};
-        return wanted.threads != 0 ? run_here(wanted, like) : run(wanted, like);
-    } catch (const CLI::ParseError& wrong) { // or --help
-        return app.exit(wrong) == 0 ? 0 : 2;
+        const sgd::order setup{.epochs = args.epochs, .rate = args.rate, .seed = args.seed, .data = sgd::recipe{}};
+        return args.threads != 0 ? run_local(args, setup) : run(args, setup);
+    } catch (const CLI::ParseError& error) { // or --help
+        return app.exit(error) == 0 ? 0 : 2;
     } catch (const cles::error& e) {
         return report_failure(e);
     }

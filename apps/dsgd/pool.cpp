@@ -22,15 +22,15 @@ BOOST_DESCRIBE_STRUCT(offers, (), (results))
 struct pool::round {
     board& all;
     std::size_t open;
-    std::vector<double> progress; ///< of each shard
-    double done = 0, told = 0;    ///< of all, in percent
+    std::vector<double> progress;  ///< of each shard
+    double done = 0, reported = 0; ///< of all, in percent
     char end_of_line = ::isatty(STDERR_FILENO) == 1 ? '\r' : '\n';
     steady::time_point begun = steady::now();
 
-    void tell(double& shard, double part) {
+    void report_progress(double& shard, double part) {
         done += (part - std::exchange(shard, part)) / static_cast<double>(progress.size()) * 100;
-        if (done >= told + 10) {
-            told = done;
+        if (done >= reported + 10) {
+            reported = done;
             std::fprintf(stderr, "cles-dsgd: %2.0f %% of %zu shards%c", done, progress.size(), end_of_line);
         }
     }
@@ -49,7 +49,7 @@ std::map<std::string, sgd::recipe> pool::find() {
             .results;
     } catch (const cles::error& e) {
         const bool alone = e.code() == cles::errc::no_target && node_.peers().empty();
-        throw cles::error(e.code(), alone ? "no node answers where it was told to ask (--at): is clesd running there?"
+        throw cles::error(e.code(), alone ? "no node answers at the given address (--at): is clesd running there?"
                                           : e.message() + ": is libcles-sgd.so among the plugins of a node?");
     }
 }
@@ -67,7 +67,7 @@ void pool::train(board& all) {
 boost::asio::awaitable<void> pool::delegate(round& now, std::size_t i) {
     auto options = cles::call_options{}.deadline(deadline_);
     if (progress_) {
-        options.on_progress([&now, i](double part, std::string_view) { now.tell(now.progress[i], part); });
+        options.on_progress([&now, i](double part, std::string_view) { now.report_progress(now.progress[i], part); });
     }
     const auto& shard = now.all.shards()[i];
     while (shard.fate == "open") {
@@ -86,7 +86,7 @@ boost::asio::awaitable<void> pool::delegate(round& now, std::size_t i) {
             boost::asio::steady_timer pause{io_, std::chrono::milliseconds{20}};
             co_await pause.async_wait(boost::asio::use_awaitable);
         } else if (failure) {
-            node_.stop(); // withdraws the others
+            node_.stop(); // cancels the others
         }
     }
     --now.open;

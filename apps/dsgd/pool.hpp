@@ -12,14 +12,14 @@ namespace dsgd {
 /// The nodes, as the manager sees them: a member of their network that offers nothing.
 class pool {
   public:
-    /// \param seeds    URLs of nodes that are asked who else is there
+    /// \param seeds    URLs of nodes that know the others
     /// \param deadline of a shard
-    /// \param progress is told on stderr
+    /// \param progress is reported on stderr
     pool(const std::vector<std::string>& seeds, std::chrono::seconds deadline, bool progress);
 
-    /// The nodes that offer the task, and what their data is made from. \throws cles::error with what is missing
+    /// The nodes that offer the task, with the recipe of their data. \throws cles::error that says what is missing
     std::map<std::string, sgd::recipe> find();
-    /// Delegates all shards at once, and returns when each has its fate.
+    /// Delegates all shards at once, and returns when all have ended.
     void train(board& all);
 
   private:

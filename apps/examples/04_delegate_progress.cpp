@@ -32,7 +32,7 @@ asio::awaitable<void> take_frames(scan order, cles::responder answer) {
         co_await shutter.async_wait(asio::use_awaitable);
         answer.progress(double(taken) / order.frames, scan{taken});
     }
-    answer.done(order); // ignored where nobody waits any more
+    answer.done(order); // ignored if the requester no longer waits
 }
 
 asio::awaitable<void> watch(cles::service& camera, cles::service& me) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A feed: it begins with the last value, tells of gaps, and survives its publisher.
+// A feed: it begins with the last value, reports gaps, and survives its publisher.
 #include <cles/service.hpp>
 
 #include <boost/asio/awaitable.hpp>
@@ -44,13 +44,13 @@ asio::awaitable<void> follow(std::unique_ptr<cles::service> car, cles::service& 
     for (double speed = 12.0; speed <= 111.0; ++speed) {
         car->update("speed", speed); // far more at once than the two that are kept for this binder
     }
-    std::uint64_t told = 0; // how many were read depends on how fast; what is missed is told, and the newest comes
+    std::uint64_t total = 0; // how many are read depends on the speed; missed ones are reported, the newest arrives
     for (double newest = 0.0; newest < 111.0;) {
         const auto item = co_await feed.async_next();
-        told += item.kind == cles::feed_event::gap ? item.missed : 1;
+        total += item.kind == cles::feed_event::gap ? item.missed : 1;
         newest = item.value;
     }
-    std::cout << told << " more, read or missed\n";
+    std::cout << total << " more, read or missed\n";
 
     car.reset();
     car = start_car(me.get_executor());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// One function decides who may do what. It sees the peer, the verb and the noun of every request that a link brings.
+// One function decides who may do what. It gets the peer, the verb and the noun of every request that a link delivers.
 #include <cles/service.hpp>
 
 #include <boost/asio/io_context.hpp>

@@ -17,7 +17,7 @@ std::string fate_of(const cles::error& why) {
     return not_begun ? "refused" : "failed";
 }
 
-std::optional<fmv::track> commander::worth_striking(int frames) const {
+std::optional<fmv::track> commander::select_target(int frames) const {
     std::optional<fmv::track> best;
     for (const auto& t : latest_.tracks) {
         const bool fits = t.age >= frames && t.missed == 0 && !struck_.contains({latest_.by, t.id});

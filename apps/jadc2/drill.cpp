@@ -4,7 +4,6 @@
 #include <cles/service.hpp>
 
 #include "events.hpp"
-#include "some_run.hpp"
 #include "strike/order.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -28,14 +27,14 @@ struct quantiles {
 BOOST_DESCRIBE_STRUCT(quantiles, (), (count, p50_us, p90_us, p99_us, max_us))
 
 constexpr std::uint64_t deadline_ms = 5000;
-constexpr std::uint64_t warm_up = 20; ///< orders: the first makes the link
+constexpr std::uint64_t warm_up = 20; ///< orders: the first one opens the link
 
-boost::asio::awaitable<void> give_orders(cles::service& from, const drill_options& wanted, std::vector<double>& took) {
+boost::asio::awaitable<void> give_orders(cles::service& from, const drill_options& args, std::vector<double>& took) {
     boost::asio::steady_timer pause{from.get_executor()};
-    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).urgent().at(wanted.at);
-    const auto run = "drill-" + some_run() + "-";
+    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).urgent().at(args.at);
+    const auto run = "drill-" + run_id() + "-";
     auto next = steady::now();
-    for (std::uint64_t i = 0; i < wanted.count + warm_up; ++i) {
+    for (std::uint64_t i = 0; i < args.count + warm_up; ++i) {
         const strike::order what{.id = run + std::to_string(i),
                                  .x = 160,
                                  .y = 120,
@@ -49,7 +48,7 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
         if (i >= warm_up && outcome.order == what.id) {
             took.push_back(std::chrono::duration<double, std::micro>(steady::now() - begun).count());
         }
-        next = std::max(next, steady::now()) + std::chrono::microseconds{wanted.every_us};
+        next = std::max(next, steady::now()) + std::chrono::microseconds{args.every_us};
         pause.expires_at(next);
         co_await pause.async_wait(boost::asio::use_awaitable);
     }
@@ -57,12 +56,12 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
 
 } // namespace
 
-int drill(const drill_options& wanted) {
+int drill(const drill_options& args) {
     boost::asio::io_context io{1};
     cles::service node{io, {.name = "drill"}};
     std::vector<double> took;
     std::exception_ptr failure;
-    boost::asio::co_spawn(io, give_orders(node, wanted, took), [&](const std::exception_ptr& thrown) {
+    boost::asio::co_spawn(io, give_orders(node, args, took), [&](const std::exception_ptr& thrown) {
         failure = thrown;
         node.stop();
     });

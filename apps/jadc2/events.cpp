@@ -29,7 +29,7 @@ std::string fixed(double number, int digits) {
     return text.data();
 }
 
-void events::write(std::string_view event, std::string_view text, std::string_view data) const {
+void event_log::write(std::string_view event, std::string_view text, std::string_view data) const {
     const double now = utc_now();
     if (json_) {
         entry out{.utc = now, .who = who_, .event = std::string{event}, .text = std::string{text}};
@@ -44,7 +44,7 @@ void events::write(std::string_view event, std::string_view text, std::string_vi
         std::printf("%s.%03d %s: %.*s\n", clock.data(), static_cast<int>((now - std::floor(now)) * 1000), who_.c_str(),
                     static_cast<int>(text.size()), text.data());
     }
-    std::fflush(stdout); // who reads it from a pipe wants it now
+    std::fflush(stdout); // so that the reader of a pipe gets it at once
 }
 
 } // namespace jadc2

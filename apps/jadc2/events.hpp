@@ -3,6 +3,7 @@
 
 #include <cles/convert.hpp>
 
+#include <random>
 #include <string>
 #include <string_view>
 
@@ -11,14 +12,14 @@ namespace jadc2 {
 /// Seconds since 1970.
 double utc_now();
 
-/// Tells on stdout what happens: a line for people, or an object a line with `utc`, `who`, `event`, `text` and `data`.
-class events {
+/// Logs events on stdout: a line of text, or a JSON object per line with `utc`, `who`, `event`, `text` and `data`.
+class event_log {
   public:
-    events(std::string who, bool json) : who_(std::move(who)), json_(json) {}
+    event_log(std::string who, bool json) : who_(std::move(who)), json_(json) {}
 
-    void tell(std::string_view event, std::string_view text) const { write(event, text, "{}"); }
+    void log(std::string_view event, std::string_view text) const { write(event, text, "{}"); }
     template <class T>
-    void tell(std::string_view event, std::string_view text, const T& data) const {
+    void log(std::string_view event, std::string_view text, const T& data) const {
         write(event, text, cles::to_json(data));
     }
 
@@ -29,7 +30,13 @@ class events {
     bool json_;
 };
 
-/// A number with so many digits behind the point.
+/// A number with that many digits after the decimal point.
 std::string fixed(double number, int digits);
+
+/// A random number that identifies this run.
+inline std::string run_id() {
+    std::random_device chance;
+    return std::to_string(chance());
+}
 
 } // namespace jadc2

@@ -8,12 +8,12 @@ using cles::errc;
 bool frame_fates::done(std::string_view by) {
     open_ = false;
     ++sums_.done;
-    trouble_.clear();
+    error_.clear();
     target_ = by;
     if (!sums_.nodes.empty() && sums_.nodes.back() == by) {
         return false;
     }
-    constexpr std::size_t most = 1000; // of a network where it wanders about for days
+    constexpr std::size_t most = 1000; // enough for days of changes
     if (sums_.nodes.size() < most) {
         sums_.nodes.emplace_back(by);
     }
@@ -26,14 +26,14 @@ bool frame_fates::failed(const cles::error& why) {
     const auto code = why.code();
     const bool ours = code.category() == cles::error_category();
     ++sums_.failures[ours ? std::string{cles::wire_name(static_cast<errc>(code.value()))} : "unreachable"];
-    // A node that is busy, or that a frame does not suit, is there and knows the stream.
+    // A node that is busy, or rejects a frame, is still there and knows the stream.
     if (!ours || code == errc::unavailable || code == errc::deadline || code == errc::no_target ||
         code == errc::no_task) {
         target_ = "any";
     }
-    const bool news = trouble_ != why.what();
-    trouble_ = why.what();
-    return news;
+    const bool is_new = error_ != why.what();
+    error_ = why.what();
+    return is_new;
 }
 
 } // namespace jadc2

@@ -13,23 +13,23 @@
 
 namespace jadc2 {
 
-/// What became of each frame, and who is asked for the next one. It decides; asking and waiting is its caller's.
+/// How each frame ended, and which node gets the next one. It only decides; its caller sends and waits.
 ///
 /// The first frame goes to any node that offers the task, and the following ones to the node that took it, since it
-/// knows the stream. Where that is lost, the next frame is for any again. No frame is sent twice: the next one is
-/// newer.
+/// knows the stream. If that node is lost, the next frame goes to any node again. No frame is sent twice, because the
+/// next one is newer.
 class frame_fates {
   public:
     struct totals {
-        std::uint64_t captured = 0, done = 0, failed = 0, skipped = 0; ///< skipped: the last one was still open
-        std::map<std::string, std::uint64_t> failures{};               ///< by the error's name
-        std::vector<std::string> nodes{};                              ///< who processed, in their order
+        std::uint64_t captured = 0, done = 0, failed = 0, skipped = 0; ///< skipped: the previous one was still open
+        std::map<std::string, std::uint64_t> failures{};               ///< by the name of the error
+        std::vector<std::string> nodes{};                              ///< that processed frames, in their order
     };
 
-    /// Who is asked for the next frame: a node, or `any`.
+    /// The node for the next frame, or `any`.
     [[nodiscard]] const std::string& target() const noexcept { return target_; }
-    /// Why the last frame failed; empty where it did not.
-    [[nodiscard]] const std::string& trouble() const noexcept { return trouble_; }
+    /// Why the last frame failed; empty if it did not.
+    [[nodiscard]] const std::string& error() const noexcept { return error_; }
     [[nodiscard]] bool open() const noexcept { return open_; }
     [[nodiscard]] const totals& sums() const noexcept { return sums_; }
 
@@ -37,19 +37,19 @@ class frame_fates {
         ++sums_.captured;
         open_ = true;
     }
-    /// It was not even captured, since the last one is open.
+    /// The previous frame is still open, so this one is not captured.
     void skipped() noexcept {
         ++sums_.captured;
         ++sums_.skipped;
     }
-    /// True where the node is another than before.
+    /// \return whether it is another node than before
     bool done(std::string_view by);
-    /// True where this is news: the frame before had not failed so.
+    /// \return whether the previous frame did not fail with this error
     bool failed(const cles::error& why);
 
   private:
     std::string target_ = "any";
-    std::string trouble_;
+    std::string error_;
     bool open_ = false;
     totals sums_;
 };

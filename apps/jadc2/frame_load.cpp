@@ -3,10 +3,10 @@
 
 #include <cles/service.hpp>
 
+#include "events.hpp"
 #include "fmv/base64.hpp"
 #include "fmv/messages.hpp"
 #include "scene.hpp"
-#include "some_run.hpp"
 
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/io_context.hpp>
@@ -23,10 +23,10 @@ namespace {
 using steady = std::chrono::steady_clock;
 
 constexpr std::uint64_t deadline_ms = 10'000;
-constexpr std::size_t pictures = 50; ///< sent over and over: a node that works is all that is wanted
+constexpr std::size_t pictures = 50; ///< sent repeatedly, because only the load matters
 
 struct work {
-    const load_options& wanted;
+    const load_options& args;
     const std::vector<std::string>& pixels;
     cles::service& from;
     steady::time_point until{};
@@ -36,7 +36,7 @@ struct work {
 };
 
 boost::asio::awaitable<void> send_stream(work& all, std::string stream) {
-    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).at(all.wanted.at);
+    const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).at(all.args.at);
     for (std::uint64_t number = 0; steady::now() < all.until; ++number) {
         const fmv::frame_message what{.stream = stream,
                                       .frame = number,
@@ -47,7 +47,7 @@ boost::asio::awaitable<void> send_stream(work& all, std::string stream) {
         const auto seen = co_await all.from.async_delegate<fmv::found>("self:FMV_Processing", what, options);
         ++all.done;
         all.run_ms += seen.run_ms;
-        if (number == 0 && ++all.answered == all.wanted.streams) {
+        if (number == 0 && ++all.answered == all.args.streams) {
             std::puts("loading");
             std::fflush(stdout);
         }
@@ -62,8 +62,8 @@ BOOST_DESCRIBE_STRUCT(summary, (), (frames, frames_a_second, mean_run_ms))
 
 } // namespace
 
-int load_with_frames(const load_options& wanted) {
-    const scene ground{wanted.seed};
+int run_load(const load_options& args) {
+    const scene ground{args.seed};
     std::vector<std::string> pixels;
     for (std::uint64_t number = 0; number < pictures; ++number) {
         pixels.push_back(fmv::to_base64(ground.frame(number)));
@@ -71,25 +71,25 @@ int load_with_frames(const load_options& wanted) {
     boost::asio::io_context io{1};
     cles::service node{io, {.name = "load"}};
     const auto begun = steady::now();
-    work all{.wanted = wanted,
+    work all{.args = args,
              .pixels = pixels,
              .from = node,
-             .until = wanted.duration_s > 0 ? begun + std::chrono::duration_cast<steady::duration>(
-                                                          std::chrono::duration<double>{wanted.duration_s})
-                                            : steady::time_point::max()};
+             .until = args.duration_s > 0 ? begun + std::chrono::duration_cast<steady::duration>(
+                                                        std::chrono::duration<double>{args.duration_s})
+                                          : steady::time_point::max()};
     boost::asio::signal_set signals{io, SIGINT, SIGTERM};
     signals.async_wait([&all](boost::system::error_code code, int) {
         if (!code) {
-            all.until = {}; // what is on its way is still waited for
+            all.until = {}; // the frames in flight are still answered
         }
     });
-    const auto run = "load-" + some_run() + "-";
-    for (std::uint64_t i = 0; i < wanted.streams; ++i) {
+    const auto run = "load-" + run_id() + "-";
+    for (std::uint64_t i = 0; i < args.streams; ++i) {
         boost::asio::co_spawn(io, send_stream(all, run + std::to_string(i)), [&](const std::exception_ptr& thrown) {
-            if (thrown && !all.failure) { // the others then end because the node does
+            if (thrown && !all.failure) { // the others end because the node is stopped
                 all.failure = thrown;
             }
-            if (++all.ended == wanted.streams || thrown) {
+            if (++all.ended == args.streams || thrown) {
                 signals.cancel();
                 node.stop();
             }

@@ -8,14 +8,14 @@ namespace jadc2 {
 
 struct load_options {
     std::string at = "tcp://127.0.0.1:25370";
-    std::uint64_t streams = 4; ///< each of which has a frame on its way at any time
-    double duration_s = 5;     ///< 0: until it is told to end
+    std::uint64_t streams = 4; ///< each with one frame in flight at any time
+    double duration_s = 5;     ///< 0: until it is stopped
     std::uint64_t seed = 1;
 };
 
-/// Sends frames to a node as fast as it answers, all encoded before the first is sent, until the time is over or it is
-/// told to end by SIGINT or SIGTERM; prints what became of them, and "loading" on a line of its own once each stream
-/// has had an answer. \throws cles::error where the node does not answer
-int load_with_frames(const load_options& wanted);
+/// Sends frames, which are encoded in advance, to a node as fast as it answers, until the time is over, or SIGINT or
+/// SIGTERM stops it; prints the results, and "loading" on a separate line as soon as each stream has had an answer.
+/// \throws cles::error if the node does not answer
+int run_load(const load_options& args);
 
 } // namespace jadc2

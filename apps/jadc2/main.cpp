@@ -17,55 +17,56 @@ int report_failure(const cles::error& why) {
     return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
 }
 
-CLI::App* add_recon(CLI::App& app, jadc2::recon_options& wanted) {
-    auto* r = app.add_subcommand("recon", "The reconnaissance aircraft: films, has it processed, publishes tracks");
-    r->add_option("--name", wanted.name, "What it is called (recon)");
-    r->add_option("-l,--listen", wanted.listen, "Where the mission centre finds it (tcp://127.0.0.1:25373)")
+CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
+    auto* r =
+        app.add_subcommand("recon", "The reconnaissance aircraft: films, delegates the processing, publishes tracks");
+    r->add_option("--name", args.name, "Its name (recon)");
+    r->add_option("-l,--listen", args.listen, "Where it listens for the mission centre (tcp://127.0.0.1:25373)")
         ->type_name("URL");
-    r->add_flag("--insecure", wanted.insecure, "Let it listen beyond this host, where anybody may ask for anything");
-    r->add_option("-s,--satellite", wanted.satellites, "Who is asked to process video (tcp://127.0.0.1:25370)")
+    r->add_flag("--insecure", args.insecure, "Allow listening beyond this host, where anyone may send any request");
+    r->add_option("-s,--satellite", args.satellites, "A node that processes video (tcp://127.0.0.1:25370)")
         ->type_name("URL");
-    r->add_option("--seed", wanted.seed, "Of what is filmed (1)");
-    r->add_option("--fps", wanted.fps, "Frames a second (25)")->check(CLI::Range(0.1, 200.0));
-    r->add_option("--frames", wanted.frames, "After which it ends; 0: it does not (0)");
-    r->add_option("--deadline", wanted.deadline_ms, "Of a frame, in milliseconds (1000)")->check(CLI::Range(1, 60'000));
-    r->add_flag("--json", wanted.json, "Print an object for each event");
+    r->add_option("--seed", args.seed, "Seed of the scene (1)");
+    r->add_option("--fps", args.fps, "Frames per second (25)")->check(CLI::Range(0.1, 200.0));
+    r->add_option("--frames", args.frames, "Frames after which it ends; 0: no limit (0)");
+    r->add_option("--deadline", args.deadline_ms, "Deadline of a frame in milliseconds (1000)")
+        ->check(CLI::Range(1, 60'000));
+    r->add_flag("--json", args.json, "Print a JSON object for each event");
     return r;
 }
 
-CLI::App* add_mission(CLI::App& app, jadc2::mission_options& wanted) {
+CLI::App* add_mission(CLI::App& app, jadc2::mission_options& args) {
     auto* m = app.add_subcommand("mission", "The mission centre: watches the tracks, decides, delegates strikes");
-    m->add_option("--name", wanted.name, "What it is called (mission)");
-    m->add_option("--recon-name", wanted.recon_name, "What the reconnaissance aircraft is called (recon)");
-    m->add_option("-r,--recon", wanted.recon, "Where it is (tcp://127.0.0.1:25373)")->type_name("URL");
-    m->add_option("-s,--strike", wanted.strikers, "Who is asked to strike (tcp://127.0.0.1:25374)")->type_name("URL");
-    m->add_option("--strikes", wanted.strikes, "After which it ends (1)")->check(CLI::Range(1, 1000));
-    m->add_option("--age", wanted.age, "Frames for which a target is followed before it is struck (15)")
+    m->add_option("--name", args.name, "Its name (mission)");
+    m->add_option("--recon-name", args.recon_name, "The name of the reconnaissance aircraft (recon)");
+    m->add_option("-r,--recon", args.recon, "Its address (tcp://127.0.0.1:25373)")->type_name("URL");
+    m->add_option("-s,--strike", args.strikers, "A node that strikes (tcp://127.0.0.1:25374)")->type_name("URL");
+    m->add_option("--strikes", args.strikes, "Strikes after which it ends (1)")->check(CLI::Range(1, 1000));
+    m->add_option("--age", args.age, "Frames for which a target is followed before it is struck (15)")
         ->check(CLI::Range(1, 100'000));
-    m->add_flag("--operator", wanted.by_hand, "Let an operator at the terminal decide");
-    m->add_option("--duration", wanted.duration_s, "Seconds after which it ends in any case; 0: it does not (0)")
+    m->add_flag("--operator", args.has_operator, "Let an operator at the terminal decide");
+    m->add_option("--duration", args.duration_s, "Seconds after which it ends in any case; 0: no limit (0)")
         ->check(CLI::Range(0.0, 86'400.0));
-    m->add_option("--deadline", wanted.deadline_ms, "Of a strike, in milliseconds (3000)")
+    m->add_option("--deadline", args.deadline_ms, "Deadline of a strike in milliseconds (3000)")
         ->check(CLI::Range(1, 60'000));
-    m->add_flag("--json", wanted.json, "Print an object for each event");
+    m->add_flag("--json", args.json, "Print a JSON object for each event");
     return m;
 }
 
-CLI::App* add_drill(CLI::App& app, jadc2::drill_options& wanted) {
+CLI::App* add_drill(CLI::App& app, jadc2::drill_options& args) {
     auto* d = app.add_subcommand("drill", "Measures how long strike orders take, without a release");
-    d->add_option("--at", wanted.at, "Who is asked to strike (tcp://127.0.0.1:25374)")->type_name("URL");
-    d->add_option("-n,--count", wanted.count, "Orders (1000)")->check(CLI::Range(1, 10'000'000));
-    d->add_option("--every", wanted.every_us, "Microseconds between them (2000)")->check(CLI::Range(0, 10'000'000));
+    d->add_option("--at", args.at, "A node that strikes (tcp://127.0.0.1:25374)")->type_name("URL");
+    d->add_option("-n,--count", args.count, "Orders (1000)")->check(CLI::Range(1, 10'000'000));
+    d->add_option("--every", args.every_us, "Microseconds between them (2000)")->check(CLI::Range(0, 10'000'000));
     return d;
 }
 
-CLI::App* add_load(CLI::App& app, jadc2::load_options& wanted) {
+CLI::App* add_load(CLI::App& app, jadc2::load_options& args) {
     auto* l = app.add_subcommand("load", "Sends frames to a node as fast as it answers");
-    l->add_option("--at", wanted.at, "Who is asked (tcp://127.0.0.1:25370)")->type_name("URL");
-    l->add_option("--streams", wanted.streams, "So many at once (4)")->check(CLI::Range(1, 64));
-    l->add_option("--duration", wanted.duration_s, "Seconds; 0: until it is told to end (5)")
-        ->check(CLI::Range(0.0, 3600.0));
-    l->add_option("--seed", wanted.seed, "Of what is filmed (1)");
+    l->add_option("--at", args.at, "Address of the node (tcp://127.0.0.1:25370)")->type_name("URL");
+    l->add_option("--streams", args.streams, "Number of parallel streams (4)")->check(CLI::Range(1, 64));
+    l->add_option("--duration", args.duration_s, "Seconds; 0: until it is stopped (5)")->check(CLI::Range(0.0, 3600.0));
+    l->add_option("--seed", args.seed, "Seed of the scene (1)");
     return l;
 }
 
@@ -77,7 +78,8 @@ int main(int argc, char** argv) {
     jadc2::drill_options drill;
     jadc2::load_options load;
     CLI::App app{"Joint command: a reconnaissance aircraft and a mission centre.", "cles-jadc2"};
-    app.footer("Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline or fate unknown, 5 another error, 6 busy.");
+    app.footer(
+        "Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline or unknown result, 5 another error, 6 busy.");
     app.require_subcommand(1);
     const auto* as_recon = add_recon(app, recon);
     const auto* as_mission = add_mission(app, mission);
@@ -88,9 +90,9 @@ int main(int argc, char** argv) {
         return as_recon->parsed()     ? jadc2::recon{recon}.run()
                : as_mission->parsed() ? jadc2::mission{mission}.run()
                : as_drill->parsed()   ? jadc2::drill(drill)
-                                      : jadc2::load_with_frames(load);
-    } catch (const CLI::ParseError& wrong) { // or --help
-        return app.exit(wrong) == 0 ? 0 : 2;
+                                      : jadc2::run_load(load);
+    } catch (const CLI::ParseError& error) { // or --help
+        return app.exit(error) == 0 ? 0 : 2;
     } catch (const cles::error& e) {
         return report_failure(e);
     }

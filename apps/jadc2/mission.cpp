@@ -1,15 +1,19 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "mission.hpp"
 
-#include "some_run.hpp"
-
 #include <boost/asio/as_tuple.hpp>
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/detached.hpp>
+#include <boost/asio/read_until.hpp>
 
+#include <charconv>
 #include <chrono>
+#include <cstdint>
 #include <optional>
 #include <utility>
+
+#include <unistd.h>
 
 namespace jadc2 {
 namespace {
@@ -18,12 +22,12 @@ using std::chrono::milliseconds;
 
 } // namespace
 
-mission::mission(const mission_options& wanted)
-    : wanted_(wanted), tell_(wanted.name, wanted.json), node_(io_, {.name = wanted.name,
-                                                                    .peers = {{wanted.recon_name, wanted.recon}},
-                                                                    .gossip = cles::gossip(wanted.strikers),
-                                                                    .routing = cles::routing()}),
-      run_(some_run()) {}
+mission::mission(const mission_options& args)
+    : args_(args), events_(args.name, args.json), node_(io_, {.name = args.name,
+                                                              .peers = {{args.recon_name, args.recon}},
+                                                              .gossip = cles::gossip(args.strikers),
+                                                              .routing = cles::routing()}),
+      run_(run_id()) {}
 
 int mission::run() {
     signals_.async_wait([this](boost::system::error_code code, int) {
@@ -31,9 +35,8 @@ int mission::run() {
             end();
         }
     });
-    if (wanted_.duration_s > 0) {
-        limit_.expires_after(
-            std::chrono::duration_cast<milliseconds>(std::chrono::duration<double>{wanted_.duration_s}));
+    if (args_.duration_s > 0) {
+        limit_.expires_after(std::chrono::duration_cast<milliseconds>(std::chrono::duration<double>{args_.duration_s}));
         limit_.async_wait([this](boost::system::error_code code) {
             if (!code) {
                 end();
@@ -41,16 +44,16 @@ int mission::run() {
         });
     }
     boost::asio::co_spawn(io_, watch(), boost::asio::detached);
-    if (wanted_.by_hand) {
+    if (args_.has_operator) {
         boost::asio::co_spawn(io_, read_orders(), boost::asio::detached);
     }
     io_.run();
     const auto& all = commander_.fates();
-    tell_.tell("report",
-               std::to_string(all.given) + " orders: " + std::to_string(all.done) + " done, " +
-                   std::to_string(all.refused) + " refused, " + std::to_string(all.failed) + " failed, " +
-                   std::to_string(all.unknown) + " unknown",
-               all);
+    events_.log("report",
+                std::to_string(all.given) + " orders: " + std::to_string(all.done) + " done, " +
+                    std::to_string(all.refused) + " refused, " + std::to_string(all.failed) + " failed, " +
+                    std::to_string(all.unknown) + " unknown",
+                all);
     return all.unknown != 0 ? 4 : all.failed != 0 ? 5 : all.refused != 0 || all.given == 0 ? 3 : 0;
 }
 
@@ -61,31 +64,31 @@ void mission::end() {
     pause_.cancel();
     boost::system::error_code ignored;
     keyboard_.close(ignored);
-    node_.stop(); // orders that are open end as unknown
+    node_.stop(); // open orders end as unknown
 }
 
-void mission::end_if_all_is_done() {
+void mission::end_if_done() {
     const auto& all = commander_.fates();
-    if (!ending_ && all.open == 0 && (all.given >= wanted_.strikes || operator_gone_)) {
+    if (!ending_ && all.open == 0 && (all.given >= args_.strikes || operator_gone_)) {
         end();
     }
 }
 
 boost::asio::awaitable<void> mission::watch() {
-    const auto noun = wanted_.recon_name + ":tracks";
+    const auto noun = args_.recon_name + ":tracks";
     while (!ending_) {
         std::optional<cles::error> failure;
         try {
             auto tracks = co_await node_.async_bind<picture>(noun, cles::bind_options{}.keep(4));
-            trouble_.clear();
-            tell_.tell("bound", "bound to the tracks of " + wanted_.recon_name);
+            error_.clear();
+            events_.log("bound", "bound to the tracks of " + args_.recon_name);
             co_await follow(std::move(tracks));
         } catch (const cles::error& e) {
             failure = e;
         }
         if (failure && !ending_) {
-            tell_trouble("no tracks: " + std::string{failure->what()} + ": is cles-jadc2 recon running at " +
-                         wanted_.recon + " (--recon)?");
+            report_error("no tracks: " + std::string{failure->what()} + ": is cles-jadc2 recon running at " +
+                         args_.recon + " (--recon)?");
             pause_.expires_after(milliseconds{200});
             co_await pause_.async_wait(boost::asio::as_tuple(boost::asio::use_awaitable));
         }
@@ -97,15 +100,15 @@ boost::asio::awaitable<void> mission::follow(cles::feed<picture> tracks) {
         auto next = co_await tracks.async_next();
         switch (next.kind) {
         case cles::feed_event::update: see(std::move(next.value)); break;
-        case cles::feed_event::current: break; // of nobody knows when
-        case cles::feed_event::gap: tell_.tell("gap", std::to_string(next.missed) + " pictures were missed"); break;
+        case cles::feed_event::current: break; // of unknown age
+        case cles::feed_event::gap: events_.log("gap", std::to_string(next.missed) + " pictures were missed"); break;
         case cles::feed_event::lost:
-            commander_.see({});
-            tell_trouble(wanted_.recon_name + " is lost: " + next.text);
+            commander_.set_picture({});
+            report_error(args_.recon_name + " is lost: " + next.text);
             break;
         case cles::feed_event::rebound:
-            trouble_.clear();
-            tell_.tell("rebound", wanted_.recon_name + " is back");
+            error_.clear();
+            events_.log("rebound", args_.recon_name + " is back");
             break;
         }
     }
@@ -114,82 +117,82 @@ boost::asio::awaitable<void> mission::follow(cles::feed<picture> tracks) {
 void mission::see(picture what) {
     received_utc_ = utc_now();
     if (!what.trouble.empty()) {
-        tell_trouble(wanted_.recon_name + " has nobody who processes its video: " + what.trouble);
-    } else if (!trouble_.empty()) {
-        trouble_.clear();
-        tell_.tell("processing", what.by + " processes the video");
+        report_error("no node processes the video of " + args_.recon_name + ": " + what.trouble);
+    } else if (!error_.empty()) {
+        error_.clear();
+        events_.log("processing", what.by + " processes the video");
     }
-    commander_.see(std::move(what));
-    if (wanted_.by_hand) {
+    commander_.set_picture(std::move(what));
+    if (args_.has_operator) {
         show();
-    } else if (const auto target = commander_.worth_striking(wanted_.age);
-               target && commander_.fates().given < wanted_.strikes) {
+    } else if (const auto target = commander_.select_target(args_.age);
+               target && commander_.fates().given < args_.strikes) {
         decide(*target);
     }
 }
 
-void mission::tell_trouble(const std::string& text) {
-    if (text != std::exchange(trouble_, text)) {
-        tell_.tell("trouble", text);
+void mission::report_error(const std::string& text) {
+    if (text != std::exchange(error_, text)) {
+        events_.log("trouble", text);
     }
 }
 
 void mission::decide(const fmv::track& target) {
     const auto& seen = commander_.latest();
-    auto told = begin_story(seen, target, received_utc_, utc_now());
-    told.order = wanted_.name + "-" + run_ + "-" + std::to_string(commander_.fates().given + 1);
-    const strike::order what{.id = told.order,
+    auto record = begin_story(seen, target, received_utc_, utc_now());
+    record.order = args_.name + "-" + run_ + "-" + std::to_string(commander_.fates().given + 1);
+    const strike::order what{.id = record.order,
                              .x = target.x,
                              .y = target.y,
                              .vx = target.vx,
                              .vy = target.vy,
                              .utc = seen.captured,
-                             .deadline_ms = wanted_.deadline_ms};
+                             .deadline_ms = args_.deadline_ms};
     commander_.ordered(target);
-    tell_.tell("decided", "order " + told.order + ": strike target " + std::to_string(target.id), told);
-    boost::asio::co_spawn(io_, give(what, std::move(told)), boost::asio::detached);
+    events_.log("decided", "order " + record.order + ": strike target " + std::to_string(target.id), record);
+    boost::asio::co_spawn(io_, give(what, std::move(record)), boost::asio::detached);
 }
 
-// Once: what became of an order whose answer is lost is for people to find out.
-boost::asio::awaitable<void> mission::give(strike::order what, story told) {
-    const auto options = cles::call_options{}.deadline(milliseconds{wanted_.deadline_ms}).urgent();
+// Only once: people have to find out what happened to an order whose answer is lost.
+boost::asio::awaitable<void> mission::give(strike::order what, story record) {
+    const auto options = cles::call_options{}.deadline(milliseconds{args_.deadline_ms}).urgent();
     const auto begun = std::chrono::steady_clock::now();
     const double sent = utc_now();
     try {
-        told.outcome = co_await node_.async_delegate<strike::outcome>("any:strike", what, options);
+        record.outcome = co_await node_.async_delegate<strike::outcome>("any:strike", what, options);
         const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - begun;
-        told.fate = "done";
-        told.struck_by = told.outcome.node;
-        told.strike_queue_ms = told.outcome.queue_ms;
-        told.strike_run_ms = told.outcome.run_ms;
-        told.strike_way_ms = took.count() - told.strike_queue_ms - told.strike_run_ms;
-        told.data_to_answer_ms = (sent - what.utc) * 1000 + took.count();
+        record.fate = "done";
+        record.struck_by = record.outcome.node;
+        record.strike_queue_ms = record.outcome.queue_ms;
+        record.strike_run_ms = record.outcome.run_ms;
+        record.strike_way_ms = took.count() - record.strike_queue_ms - record.strike_run_ms;
+        record.data_to_answer_ms = (sent - what.utc) * 1000 + took.count();
     } catch (const cles::error& e) {
-        told.fate = fate_of(e);
-        told.trouble = explain(e);
+        record.fate = fate_of(e);
+        record.trouble = explain(e);
     }
-    commander_.ended(told.fate);
-    const auto whom = told.fate == "done"
-                          ? " by " + told.struck_by + ", " + std::to_string(told.outcome.left) + " weapons left"
-                          : ": " + told.trouble;
-    tell_.tell("strike", "order " + told.order + " is " + told.fate + whom + to_text(told), told);
-    if (told.fate == "done" && !ending_) {
-        co_await assess(told.outcome);
+    commander_.ended(record.fate);
+    const auto whom = record.fate == "done"
+                          ? " by " + record.struck_by + ", " + std::to_string(record.outcome.left) + " weapons left"
+                          : ": " + record.trouble;
+    events_.log("strike", "order " + record.order + " is " + record.fate + whom + to_text(record), record);
+    if (record.fate == "done" && !ending_) {
+        co_await assess(record.outcome);
     }
-    end_if_all_is_done();
+    end_if_done();
 }
 
 boost::asio::awaitable<void> mission::assess(strike::outcome what) {
     const impact where{.x = what.aim_x, .y = what.aim_y, .utc = what.impact_utc};
-    const auto noun = wanted_.recon_name + ":impact";
+    const auto noun = args_.recon_name + ":impact";
     try {
         const auto seen = co_await node_.async_push<assessment>(noun, where);
-        tell_.tell("assessed",
-                   "order " + what.order + (seen.hit ? " hits" : " misses") + ": " + fixed(seen.missed_by, 1) +
-                       " pixels beside the target, " + fixed(what.flight_s, 2) + " s after its release",
-                   seen);
+        events_.log("assessed",
+                    "order " + what.order + (seen.hit ? " hits" : " misses") + ": " + fixed(seen.missed_by, 1) +
+                        " pixels from the target, " + fixed(what.flight_s, 2) + " s after its release",
+                    seen);
     } catch (const cles::error& e) {
-        tell_.tell("assessed", "order " + what.order + ": not seen: " + e.what());
+        events_.log("assessed", "order " + what.order + ": not seen: " + e.what());
     }
 }
 
@@ -197,8 +200,65 @@ std::string mission::explain(const cles::error& why) const {
     if (why.code() != cles::errc::no_target) {
         return why.what();
     }
-    return node_.peers().empty() ? "no node answers where it was told to ask (--strike): is clesd running there?"
+    return node_.peers().empty() ? "no node answers at the given address (--strike): is clesd running there?"
                                  : why.message() + ": is libcles-strike.so among the plugins of a node?";
+}
+
+// At most once per second, so that it can be read.
+void mission::show() {
+    if (received_utc_ - shown_utc_ < 1) {
+        return;
+    }
+    shown_utc_ = received_utc_;
+    const auto& seen = commander_.latest();
+    std::string text = std::to_string(seen.tracks.size()) + " targets";
+    for (const auto& t : seen.tracks) {
+        text += "\n    " + std::to_string(t.id) + "  at " + fixed(t.x, 0) + ", " + fixed(t.y, 0) + ", moving " +
+                fixed(t.vx, 0) + ", " + fixed(t.vy, 0) + " pixels per second, followed for " + std::to_string(t.age) +
+                " frames";
+    }
+    events_.log("picture", text + "\n    strike NUMBER, or quit:", seen);
+}
+
+boost::asio::awaitable<void> mission::read_orders() {
+    boost::system::error_code error;
+    keyboard_.assign(::dup(STDIN_FILENO), error);
+    std::string text;
+    while (!ending_ && !error) {
+        const auto [code, size] =
+            co_await boost::asio::async_read_until(keyboard_, boost::asio::dynamic_buffer(text, 4096), '\n',
+                                                   boost::asio::as_tuple(boost::asio::use_awaitable));
+        error = code;
+        if (!code) {
+            run_command(std::string_view{text}.substr(0, size - 1));
+            text.erase(0, size);
+        }
+    }
+    if (!ending_) {
+        operator_gone_ = true;
+        events_.log("operator", "the operator has left: " + error.message());
+        end_if_done();
+    }
+}
+
+void mission::run_command(std::string_view line) {
+    if (line == "quit") {
+        end();
+        return;
+    }
+    constexpr std::string_view word = "strike ";
+    std::uint64_t id = 0;
+    const auto number = line.substr(0, word.size()) == word ? line.substr(word.size()) : std::string_view{};
+    const auto [end_of_number, code] = std::from_chars(number.data(), number.data() + number.size(), id);
+    if (number.empty() || code != std::errc{} || end_of_number != number.data() + number.size()) {
+        events_.log("operator", "'" + std::string{line} + "' is not an order: write strike NUMBER, or quit");
+    } else if (commander_.fates().given >= args_.strikes) {
+        events_.log("operator", "no more orders: " + std::to_string(args_.strikes) + " were allowed (--strikes)");
+    } else if (const auto target = commander_.find(id)) {
+        decide(*target);
+    } else {
+        events_.log("operator", "there is no target " + std::to_string(id) + " now");
+    }
 }
 
 } // namespace jadc2

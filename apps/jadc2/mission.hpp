@@ -25,40 +25,40 @@ struct mission_options {
     std::string recon_name = "recon";
     std::string recon = "tcp://127.0.0.1:25373";
     std::vector<std::string> strikers{"tcp://127.0.0.1:25374"};
-    std::uint64_t strikes = 1; ///< after which it ends
-    int age = 15;              ///< frames that the scripted operator wants a target to have been followed for
-    bool by_hand = false;      ///< an operator at the terminal decides
-    double duration_s = 0;     ///< after which it ends in any case; 0: it does not
+    std::uint64_t strikes = 1; ///< number of strikes after which it ends
+    int age = 15; ///< frames for which a target must have been followed before the scripted operator strikes
+    bool has_operator = false; ///< an operator at the terminal decides
+    double duration_s = 0;     ///< after which it ends in any case; 0: no limit
     std::uint64_t deadline_ms = 3000;
     bool json = false;
 };
 
-/// The mission centre: bound to what the reconnaissance aircraft finds, it lets an operator decide, and delegates the
-/// strike to a node that offers it. A plain service, which listens nowhere.
+/// The mission centre: it binds to the tracks of the reconnaissance aircraft, lets an operator decide, and delegates
+/// the strike to a node that offers it. A plain service, which does not listen.
 class mission {
   public:
-    explicit mission(const mission_options& wanted);
+    explicit mission(const mission_options& args);
 
-    /// Until the strikes have their fates, or it is told to end. Gives the exit code.
+    /// Runs until all strikes have ended, or it is stopped. \return the exit code
     int run();
 
   private:
     boost::asio::awaitable<void> watch();
     boost::asio::awaitable<void> follow(cles::feed<picture> tracks);
     boost::asio::awaitable<void> read_orders();
-    boost::asio::awaitable<void> give(strike::order what, story told);
+    boost::asio::awaitable<void> give(strike::order what, story record);
     boost::asio::awaitable<void> assess(strike::outcome what);
     void see(picture what);
     void decide(const fmv::track& target);
-    void obey(std::string_view line);
+    void run_command(std::string_view line);
     void show();
-    void tell_trouble(const std::string& text);
+    void report_error(const std::string& text);
     void end();
-    void end_if_all_is_done();
+    void end_if_done();
     [[nodiscard]] std::string explain(const cles::error& why) const;
 
-    mission_options wanted_;
-    events tell_;
+    mission_options args_;
+    event_log events_;
     boost::asio::io_context io_{1};
     cles::service node_;
     boost::asio::signal_set signals_{io_, SIGINT, SIGTERM};
@@ -66,11 +66,11 @@ class mission {
     boost::asio::steady_timer limit_{io_};
     boost::asio::posix::stream_descriptor keyboard_{io_};
     commander commander_;
-    std::string run_;         ///< no other run has the same: orders are named after it
-    std::string trouble_;     ///< told last
+    std::string run_;         ///< unique: part of the names of orders
+    std::string error_;       ///< reported last
     double received_utc_ = 0; ///< of the newest picture
     double shown_utc_ = 0;
-    bool operator_gone_ = false; ///< nobody gives the orders that are left
+    bool operator_gone_ = false; ///< no more orders are given
     bool ending_ = false;
 };
 

@@ -2,7 +2,6 @@
 #include "recon.hpp"
 
 #include "fmv/base64.hpp"
-#include "some_run.hpp"
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -21,8 +20,8 @@ namespace {
 using steady = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr std::size_t most_times = 10'000;
-constexpr std::uint64_t settled = 10; ///< frames after which what is found is judged
+constexpr std::size_t max_times = 10'000;
+constexpr std::uint64_t settled = 10; ///< frames before tracks are scored
 
 double ms_since(steady::time_point begin) {
     return std::chrono::duration<double, std::milli>(steady::now() - begin).count();
@@ -56,16 +55,15 @@ double median_of(const std::vector<picture>& all, double picture::*member) {
 
 } // namespace
 
-recon::recon(const recon_options& wanted)
-    : wanted_(wanted), tell_(wanted.name, wanted.json),
-      ground_(io_, {.name = wanted.name, .listen = {wanted.listen}, .insecure = wanted.insecure}),
-      space_(io_,
-             {.name = wanted.name + "-camera", .gossip = cles::gossip(wanted.satellites), .routing = cles::routing()}),
-      scene_(wanted.seed), run_(some_run()) {
+recon::recon(const recon_options& args)
+    : args_(args), events_(args.name, args.json),
+      ground_(io_, {.name = args.name, .listen = {args.listen}, .insecure = args.insecure}),
+      space_(io_, {.name = args.name + "-camera", .gossip = cles::gossip(args.satellites), .routing = cles::routing()}),
+      scene_(args.seed), run_(run_id()) {
     ground_.on_bind("tracks", {.description = "What moves on the ground, frame by frame"});
     ground_.on_push("impact", [this](const impact& at) { return assess(at); },
-                    {.description = "Where and when something struck; what is seen of it is answered"});
-    tell_.tell("listening", "listening on " + ground_.endpoints().front());
+                    {.description = "Where and when something struck; the answer says what is seen of it"});
+    events_.log("listening", "listening on " + ground_.endpoints().front());
 }
 
 int recon::run() {
@@ -89,8 +87,8 @@ int recon::run() {
 boost::asio::awaitable<void> recon::film() {
     const auto begun = steady::now();
     begun_utc_ = utc_now();
-    for (std::uint64_t number = 0; wanted_.frames == 0 || number < wanted_.frames; ++number) {
-        const std::chrono::duration<double> after{static_cast<double>(number) / wanted_.fps};
+    for (std::uint64_t number = 0; args_.frames == 0 || number < args_.frames; ++number) {
+        const std::chrono::duration<double> after{static_cast<double>(number) / args_.fps};
         pace_.expires_at(begun + std::chrono::duration_cast<steady::duration>(after));
         co_await pace_.async_wait(boost::asio::as_tuple(boost::asio::use_awaitable));
         if (ending_) {
@@ -104,7 +102,7 @@ boost::asio::awaitable<void> recon::film() {
         }
     }
     ending_ = true;
-    while (fates_.open()) { // its deadline comes
+    while (fates_.open()) { // until its deadline at the latest
         pace_.expires_at(steady::time_point::max());
         co_await pace_.async_wait(boost::asio::as_tuple(boost::asio::use_awaitable));
     }
@@ -114,15 +112,15 @@ boost::asio::awaitable<void> recon::process(std::uint64_t number) {
     const auto pixels = scene_.frame(number);
     picture times{.frame = number, .captured = utc_now()};
     const auto begun = steady::now();
-    const fmv::frame_message message{.stream = wanted_.name + "-" + run_ + "-" + std::to_string(episode_),
+    const fmv::frame_message message{.stream = args_.name + "-" + run_ + "-" + std::to_string(episode_),
                                      .frame = number,
                                      .width = scene::size.width,
                                      .height = scene::size.height,
-                                     .deadline_ms = wanted_.deadline_ms,
+                                     .deadline_ms = args_.deadline_ms,
                                      .pixels = fmv::to_base64(pixels)};
     times.encode_ms = ms_since(begun);
     const auto noun = fates_.target() + ":FMV_Processing";
-    const auto options = cles::call_options{}.deadline(milliseconds{wanted_.deadline_ms});
+    const auto options = cles::call_options{}.deadline(milliseconds{args_.deadline_ms});
     std::optional<cles::error> failure;
     try {
         const auto seen = co_await space_.async_delegate<fmv::found>(noun, message, options);
@@ -134,7 +132,7 @@ boost::asio::awaitable<void> recon::process(std::uint64_t number) {
         failure = e;
     }
     if (failure) {
-        tell_trouble(*failure);
+        report_error(*failure);
     }
     if (ending_) {
         pace_.cancel();
@@ -147,24 +145,24 @@ void recon::take(std::uint64_t number, const fmv::found& seen, picture times) {
         ready_frames_ = 0;
     }
     if (fates_.done(seen.node)) {
-        tell_.tell("processing", seen.node + " processes the video, from frame " + std::to_string(number) + " on");
+        events_.log("processing", seen.node + " processes the video, from frame " + std::to_string(number) + " on");
     }
     times.by = seen.node;
     times.ready = seen.ready;
-    if (times_.size() == most_times) {
-        times_.erase(times_.begin(), times_.begin() + most_times / 2);
+    if (times_.size() == max_times) {
+        times_.erase(times_.begin(), times_.begin() + max_times / 2);
     }
     times_.push_back(times);
 
-    // What is found is told in pixels of the stream's first frame.
+    // Tracks are in pixels of the first frame of the stream.
     const auto from = scene_.camera(first_);
     std::vector<fmv::point> places;
     times.tracks = seen.tracks;
     for (auto& t : times.tracks) {
         t.x += from.x;
         t.y += from.y;
-        t.vx *= wanted_.fps;
-        t.vy *= wanted_.fps;
+        t.vx *= args_.fps;
+        t.vy *= args_.fps;
         places.push_back({t.x, t.y});
     }
     if (seen.ready && ++ready_frames_ > settled) {
@@ -174,18 +172,18 @@ void recon::take(std::uint64_t number, const fmv::found& seen, picture times) {
     ground_.update("tracks", times);
 }
 
-// The first of its kind, and then once a second, so that those who look at old tracks know that they are old.
-void recon::tell_trouble(const cles::error& why) {
+// Each new error, and then once per second, so that binders know that their tracks are old.
+void recon::report_error(const cles::error& why) {
     const auto asked = fates_.target();
-    const bool news = fates_.failed(why);
+    const bool is_new = fates_.failed(why);
     if (fates_.target() != asked) {
         ++episode_;
         fresh_ = true;
     }
-    if (const double now = utc_now(); news || now - told_utc_ >= 1) {
-        told_utc_ = now;
+    if (const double now = utc_now(); is_new || now - reported_utc_ >= 1) {
+        reported_utc_ = now;
         const auto text = explain(why);
-        tell_.tell("trouble", "no processing: " + text);
+        events_.log("trouble", "no processing: " + text);
         ground_.update("tracks", picture{.trouble = text, .published = now});
     }
 }
@@ -198,13 +196,13 @@ std::string recon::explain(const cles::error& why) const {
     for (const auto& other : space_.peers()) {
         names += (names.empty() ? "" : ", ") + other.node + " (" + std::string{to_string(other.state)} + ")";
     }
-    return names.empty() ? "no node answers where it was told to ask (--satellite): is clesd running there?"
+    return names.empty() ? "no node answers at the given address (--satellite): is clesd running there?"
                          : why.message() + ", of " + names + ": is libcles-fmv.so among the plugins of a node?";
 }
 
 assessment recon::assess(const impact& at) const {
     double nearest = std::numeric_limits<double>::infinity();
-    for (const auto& vehicle : scene_.truth((at.utc - begun_utc_) * wanted_.fps)) {
+    for (const auto& vehicle : scene_.truth((at.utc - begun_utc_) * args_.fps)) {
         nearest = std::min(nearest, std::hypot(vehicle.x - at.x, vehicle.y - at.y));
     }
     return {.missed_by = nearest, .hit = nearest <= score::near};
@@ -225,7 +223,7 @@ void recon::report() const {
     text += out.judged == 0
                 ? "none judged"
                 : "recall " + fixed(out.recall, 3) + ", " + fixed(out.false_per_frame, 3) + " false tracks a frame";
-    tell_.tell("report", text, out);
+    events_.log("report", text, out);
 }
 
 } // namespace jadc2

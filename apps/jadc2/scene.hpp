@@ -8,8 +8,8 @@
 
 namespace jadc2 {
 
-/// What the camera looks at, and what it shows of it: the same for a seed on every machine. Ground with a texture,
-/// some edges and vehicles that move, from a camera that shakes by parts of pixels, with noise.
+/// The ground and the frames of the camera: identical for a seed on every machine. Ground with a texture,
+/// some edges and vehicles that move, from a camera that shakes by fractions of pixels, with noise.
 ///
 /// Places are pixels of the ground: pixel (x, y) of a frame shows the ground at (x, y) + `camera(frame)`.
 class scene {
@@ -21,7 +21,7 @@ class scene {
 
     [[nodiscard]] fmv::grey frame(std::uint64_t number) const;
     [[nodiscard]] fmv::point camera(std::uint64_t number) const;
-    /// Where the vehicles are; time is counted in frames. It is for judging, and given to nobody who is to find them.
+    /// Where the vehicles are; time is counted in frames. It is only for scoring.
     [[nodiscard]] std::vector<fmv::point> truth(double time) const;
 
   private:

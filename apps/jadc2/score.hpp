@@ -8,10 +8,10 @@
 
 namespace jadc2 {
 
-/// How good what was found is, beside the truth.
+/// How well tracks match the truth.
 class score {
   public:
-    /// A track is of a vehicle where it is no further from it, in pixels.
+    /// The maximum distance of a track from its vehicle, in pixels.
     static constexpr double near = 6;
 
     struct totals {
@@ -21,7 +21,7 @@ class score {
         std::uint64_t false_tracks = 0;
     };
 
-    /// One frame's. Each vehicle has one track at most, the nearest ones first; all others are false.
+    /// Adds one frame. Each vehicle has one track at most, the nearest ones first; all others are false.
     void add(const std::vector<fmv::point>& truth, const std::vector<fmv::point>& tracks);
 
     [[nodiscard]] const totals& sums() const noexcept { return sums_; }

@@ -7,7 +7,7 @@
 namespace jadc2 {
 
 story begin_story(const picture& seen, const fmv::track& target, double received_utc, double decided_utc) {
-    const double told = (seen.published - seen.captured) * 1000;
+    const double until_published_ms = (seen.published - seen.captured) * 1000;
     return {.target = target.id,
             .frame = seen.frame,
             .processed_by = seen.by,
@@ -15,7 +15,7 @@ story begin_story(const picture& seen, const fmv::track& target, double received
             .fmv_way_ms = seen.way_ms,
             .fmv_queue_ms = seen.queue_ms,
             .fmv_run_ms = seen.run_ms,
-            .publish_ms = told - seen.encode_ms - seen.way_ms - seen.queue_ms - seen.run_ms,
+            .publish_ms = until_published_ms - seen.encode_ms - seen.way_ms - seen.queue_ms - seen.run_ms,
             .tracks_way_ms = (received_utc - seen.published) * 1000,
             .decide_ms = (decided_utc - received_utc) * 1000,
             .data_to_decision_ms = (decided_utc - seen.captured) * 1000};

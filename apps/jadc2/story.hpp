@@ -11,28 +11,28 @@
 
 namespace jadc2 {
 
-/// One strike, from the camera to the answer, step by step. Where a step begins on one host and ends on another, it is
-/// as good as their clocks agree.
+/// The steps of one strike, from the camera to the answer. The duration of a step between two hosts is as accurate as
+/// their clocks.
 struct story {
     std::string order{};
     std::uint64_t target = 0; ///< the track's number
-    std::uint64_t frame = 0;  ///< that led to the decision
+    std::uint64_t frame = 0;  ///< on which the decision is based
     std::string fate{};       ///< see `order_fates`
-    std::string trouble{};    ///< why it was not done
+    std::string trouble{};    ///< why it failed
     std::string processed_by{};
     std::string struck_by{};
-    double encode_ms = 0;  ///< the frame is captured, and is on its way
+    double encode_ms = 0;  ///< from capture until sending
     double fmv_way_ms = 0; ///< there and back
     double fmv_queue_ms = 0;
     double fmv_run_ms = 0;
     double publish_ms = 0;    ///< from the answer until it is published
-    double tracks_way_ms = 0; ///< from there until the mission centre has it
+    double tracks_way_ms = 0; ///< from there to the mission centre
     double decide_ms = 0;
-    double data_to_decision_ms = 0; ///< all of these
+    double data_to_decision_ms = 0; ///< the sum of these
     double strike_way_ms = 0;       ///< there and back
     double strike_queue_ms = 0;
     double strike_run_ms = 0;
-    double data_to_answer_ms = 0; ///< all of it
+    double data_to_answer_ms = 0; ///< the sum of all
     strike::outcome outcome{};
 };
 BOOST_DESCRIBE_STRUCT(story, (),
@@ -43,7 +43,7 @@ BOOST_DESCRIBE_STRUCT(story, (),
 /// The part until the decision.
 story begin_story(const picture& seen, const fmv::track& target, double received_utc, double decided_utc);
 
-/// A table of the steps, for people.
+/// A table of the steps.
 std::string to_text(const story& what);
 
 } // namespace jadc2

@@ -19,16 +19,16 @@ namespace {
 [[noreturn]] void fail(const char* what) { throw std::system_error(errno, std::generic_category(), what); }
 
 // Between fork and exec: nothing but system calls.
-[[noreturn]] void become(std::vector<char*>& words, int out, int err, pid_t parent) {
+[[noreturn]] void exec_child(std::vector<char*>& words, int out, int err, pid_t parent) {
     ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (::getppid() != parent) {
-        ::_exit(127); // it has gone meanwhile, and would not be missed
+        ::_exit(127); // the parent has ended meanwhile
     }
     const int nothing = ::open("/dev/null", O_RDONLY);
     ::dup2(nothing, STDIN_FILENO);
     ::dup2(out, STDOUT_FILENO);
     ::dup2(err, STDERR_FILENO);
-    ::setpgid(0, 0); // a terminal's SIGINT is for the whole group: the parent ends its children itself
+    ::setpgid(0, 0); // a terminal sends SIGINT to the whole group, but the parent stops its children itself
     ::execv("/proc/self/exe", words.data());
     ::_exit(127);
 }
@@ -55,7 +55,7 @@ child::child(const std::vector<std::string>& arguments) {
         fail("a vehicle's process");
     }
     if (pid_ == 0) {
-        become(words, out_, err_, parent);
+        exec_child(words, out_, err_, parent);
     }
 }
 

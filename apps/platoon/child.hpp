@@ -8,20 +8,20 @@
 
 namespace platoon {
 
-/// This program once more, as a process of its own, whose output is kept in files without a name. It ends with us.
+/// A child process that runs this program, with its output in unnamed files. It ends when its parent ends.
 class child {
   public:
-    /// \throws std::system_error where it cannot be started
+    /// \throws std::system_error if it cannot be started
     explicit child(const std::vector<std::string>& arguments);
     child(child&& other) noexcept;
     child& operator=(child&&) = delete;
     child(const child&) = delete;
     child& operator=(const child&) = delete;
-    /// Kills it where it still runs.
+    /// Kills it if it still runs.
     ~child();
 
     [[nodiscard]] pid_t pid() const noexcept { return pid_; }
-    /// Whether it still runs. Afterwards `status` tells how it ended.
+    /// Whether it still runs; if not, `status` is valid.
     bool running();
     [[nodiscard]] int status() const noexcept { return status_; }
     void signal(int number) const;

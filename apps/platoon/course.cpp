@@ -7,7 +7,7 @@
 namespace platoon {
 namespace {
 
-constexpr double fine = 0.01, coarse = 0.05; // s: for the verdict, and for the record
+constexpr double sample_step = 0.01, record_step = 0.05; // s: for the verdict, and for the record
 
 /// Each one's distance error to the vehicle that is ahead of it at that time, in the order of `where`.
 std::vector<double> errors_of(const std::vector<std::optional<motion>>& where, double spacing) {
@@ -32,46 +32,46 @@ recording course_of(const logbook& book, const std::vector<std::string>& first, 
                     double end, const drive_options& how) {
     recording out{.source = "driven",
                   .vehicles = how.vehicles,
-                  .hz = how.like.hz,
+                  .hz = how.setup.hz,
                   .loss = how.loss,
                   .delay_ms = how.delay * 1000,
-                  .spacing = how.like.spacing,
+                  .spacing = how.setup.spacing,
                   .seed = how.seed};
-    assessment judge{first.size(), how.like.spacing, how.like.limits.length};
+    assessment spacing_assessment{first.size(), how.setup.spacing, how.setup.limits.length};
     double least = NAN;
-    for (long step = 0; static_cast<double>(step) * fine < end; ++step) {
-        const double t = static_cast<double>(step) * fine;
+    for (long step = 0; static_cast<double>(step) * sample_step < end; ++step) {
+        const double t = static_cast<double>(step) * sample_step;
         std::vector<motion> those_first;
         std::vector<motion> present;
         std::vector<std::optional<motion>> where;
         for (const auto& name : all) {
-            where.push_back(book.where(name, t));
+            where.push_back(book.position(name, t));
             if (where.back()) {
                 present.push_back(*where.back());
             }
         }
         for (const auto& name : first) {
-            if (const auto at = book.where(name, t)) {
+            if (const auto at = book.position(name, t)) {
                 those_first.push_back(*at);
             }
         }
         if (those_first.size() == first.size()) {
-            judge.sample(those_first);
+            spacing_assessment.sample(those_first);
         }
-        least = std::fmin(least, least_gap(present, how.like.limits.length));
-        if (step % std::lround(coarse / fine) != 0) {
+        least = std::fmin(least, least_gap(present, how.setup.limits.length));
+        if (step % std::lround(record_step / sample_step) != 0) {
             continue;
         }
         out.t.push_back(t);
         out.courses.resize(all.size());
-        const auto errors = errors_of(where, how.like.spacing);
+        const auto errors = errors_of(where, how.setup.spacing);
         for (std::size_t i = 0; i < all.size(); ++i) {
             out.courses[i].vehicle = all[i];
             out.courses[i].speed.push_back(where[i] ? where[i]->v : NAN);
             out.courses[i].error.push_back(errors[i]);
         }
     }
-    out.verdict = judge.result();
+    out.verdict = spacing_assessment.result();
     out.verdict.least_gap = least;
     out.verdict.collision = least <= 0;
     return out;

@@ -9,8 +9,8 @@
 
 namespace platoon {
 
-/// What a drive was like, from its logbook. \param first those that began, in their order \param all those that took
-/// part
+/// The record of a drive, from its logbook. \param first the vehicles at the start, in their order \param all vehicles
+/// that took part
 recording course_of(const logbook& book, const std::vector<std::string>& first, const std::vector<std::string>& all,
                     double end, const drive_options& how);
 

@@ -29,14 +29,14 @@ using namespace std::chrono_literals;
 
 namespace {
 
-constexpr auto look = 20ms;
-constexpr auto hears_others_within = 400ms;
-constexpr double end_within = 10; // s
+constexpr auto poll_interval = 20ms;
+constexpr auto discovery_time = 400ms;
+constexpr double process_timeout = 10; // s
 
-class overseer {
+class drive_supervisor {
   public:
-    explicit overseer(const drive_options& options)
-        : options_(options), book_(options.like.limits.lag),
+    explicit drive_supervisor(const drive_options& options)
+        : options_(options), book_(options.setup.limits.lag),
           service_(io_, {.name = "platoon-" + std::to_string(::getpid()),
                          .insecure = options.insecure,
                          .multicast = options.group}),
@@ -46,7 +46,7 @@ class overseer {
 
     recording run() {
         std::exception_ptr failure;
-        asio::co_spawn(io_, oversee(), [&](const std::exception_ptr& why) {
+        asio::co_spawn(io_, supervise(), [&](const std::exception_ptr& why) {
             failure = why;
             service_.stop();
             io_.stop();
@@ -71,18 +71,18 @@ class overseer {
         for (;;) {
             const auto item = co_await feed.async_next();
             if (item.has_value()) {
-                book_.take(item.publisher, item.value);
-                stranger_ = children_.contains(item.publisher) ? stranger_ : item.publisher;
+                book_.add(item.publisher, item.value);
+                foreign_vehicle_ = children_.contains(item.publisher) ? foreign_vehicle_ : item.publisher;
             }
         }
     }
 
-    asio::awaitable<void> oversee() {
-        asio::co_spawn(io_, hear(), [this](const std::exception_ptr& why) { deaf_ = why; });
-        co_await pause(hears_others_within);
-        if (!stranger_.empty()) {
-            throw cles::error(cles::errc::busy, "another platoon drives in this group (" + stranger_ +
-                                                    " is heard): choose a port of your own with --multicast");
+    asio::awaitable<void> supervise() {
+        asio::co_spawn(io_, hear(), [this](const std::exception_ptr& why) { receive_failure_ = why; });
+        co_await pause(discovery_time);
+        if (!foreign_vehicle_.empty()) {
+            throw cles::error(cles::errc::busy, "another platoon uses this group (received " + foreign_vehicle_ +
+                                                    "): choose another port with --multicast");
         }
         const std::size_t n = options_.vehicles;
         start_ns_ = monotonic_ns() + 1'500'000'000 + 200'000'000 * static_cast<std::int64_t>(n);
@@ -93,46 +93,46 @@ class overseer {
                 first_.push_back(name_of(i));
             }
         }
-        co_await until_all_are_heard();
+        co_await wait_for_all();
         double shown = 0;
-        const double late = std::max(0.0, now()); // where processes take long to start, the drive is no shorter for it
-        end_ = late + (options_.seconds > 0 ? options_.seconds : options_.like.plan.end() + 5);
+        const double late = std::max(0.0, now()); // a slow start of processes does not shorten the drive
+        end_ = late + (options_.seconds > 0 ? options_.seconds : options_.setup.plan.end() + 5);
         while (!interrupted_ && now() < end_) {
-            co_await pause(look);
-            throw_if_deaf();
+            co_await pause(poll_interval);
+            check_receiver();
             check_children();
-            let_happen();
+            apply_incidents();
             if (now() >= shown + (options_.in_place ? 0.2 : 1)) {
                 shown = now();
                 show();
             }
         }
-        end_ = std::min(end_, now()) - 2 / options_.like.hz;
+        end_ = std::min(end_, now()) - 2 / options_.setup.hz;
         co_await end_all();
     }
 
-    void throw_if_deaf() const {
-        if (deaf_) {
-            std::rethrow_exception(deaf_);
+    void check_receiver() const {
+        if (receive_failure_) {
+            std::rethrow_exception(receive_failure_);
         }
     }
 
-    asio::awaitable<void> until_all_are_heard() {
+    asio::awaitable<void> wait_for_all() {
         for (;;) {
-            co_await pause(look);
-            throw_if_deaf();
+            co_await pause(poll_interval);
+            check_receiver();
             check_children();
             const auto missing = std::find_if(first_.begin(), first_.end(),
                                               [this](const auto& name) { return book_.last(name) == nullptr; });
             if (missing == first_.end() || interrupted_) {
                 co_return;
             }
-            if (book_.has_gone(*missing)) {
+            if (book_.has_ended(*missing)) {
                 throw cles::error(cles::errc::unavailable, *missing + " did not start: " + last_line(*missing));
             }
-            if (now() > end_within) {
-                throw cles::error(cles::errc::deadline,
-                                  *missing + " is not heard: does " + options_.group.interface + " carry multicast?");
+            if (now() > process_timeout) {
+                throw cles::error(cles::errc::deadline, *missing + " is not received: check that " +
+                                                            options_.group.interface + " supports multicast");
             }
         }
     }
@@ -142,11 +142,11 @@ class overseer {
                            [i](const incident& e) { return e.what == incident::join && e.vehicle == i; });
     }
 
-    void start(std::size_t i, const std::vector<std::string>& whither) {
-        const auto& like = options_.like;
-        const auto place = place_of(first_.size(), like.spacing, like.plan.speed);
+    void start(std::size_t i, const std::vector<std::string>& role_options) {
+        const auto& setup = options_.setup;
+        const auto place = start_position(first_.size(), setup.spacing, setup.plan.speed);
         std::vector<std::string> words{"vehicle", "--name", name_of(i), "--report"};
-        words.insert(words.end(), whither.begin(), whither.end());
+        words.insert(words.end(), role_options.begin(), role_options.end());
         const auto add = [&](const char* option, const auto& value) {
             words.emplace_back(option);
             words.push_back(std::to_string(value));
@@ -155,11 +155,11 @@ class overseer {
         add("--turn", i);
         add("--turns", options_.vehicles);
         add("--start-ns", start_ns_);
-        add("--hz", like.hz);
+        add("--hz", setup.hz);
         add("--loss", options_.loss * 100);
         add("--delay", options_.delay * 1000);
         add("--seed", options_.seed * 1000 + i);
-        words.insert(words.end(), {"--controller", like.uses_leader ? "leader" : "predecessor"});
+        words.insert(words.end(), {"--controller", setup.uses_leader ? "leader" : "predecessor"});
         words.insert(words.end(), {"--multicast", options_.group.interface + "," + options_.group.group + ":" +
                                                       std::to_string(options_.group.port)});
         if (options_.insecure) {
@@ -168,7 +168,7 @@ class overseer {
         children_.try_emplace(name_of(i), words);
     }
 
-    void let_happen() {
+    void apply_incidents() {
         const double t = now();
         std::erase_if(open_, [&](const incident& e) {
             if (e.at > t) {
@@ -180,12 +180,12 @@ class overseer {
                 start(e.vehicle, {"--join"});
             } else if (who != children_.end() && e.what == incident::vanish) {
                 who->second.signal(SIGKILL);
-                note(name, "killed", "as was asked for");
+                note(name, "killed", "as requested");
             } else if (who != children_.end()) {
                 service_.async_push(name + ":leave", cles::json_text{"{}"},
                                     [this, name](boost::system::error_code failed, const cles::json_text&) {
                                         if (failed) {
-                                            note(name, "stays", "it could not be told to leave: " + failed.message());
+                                            note(name, "stays", "the request to leave failed: " + failed.message());
                                         }
                                     });
             }
@@ -195,18 +195,18 @@ class overseer {
 
     void check_children() {
         for (auto& [name, process] : children_) {
-            if (process.running() || book_.has_gone(name)) {
+            if (process.running() || book_.has_ended(name)) {
                 continue;
             }
             const int status = process.status();
             const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
-            book_.gone(name, well);
-            unsteady_ = true;
-            note(name, well ? "left" : "gone", well ? "in good order" : how_ended(status) + last_line(name));
+            book_.record_end(name, well);
+            disturbed_ = true;
+            note(name, well ? "left" : "gone", well ? "in good order" : exit_text(status) + last_line(name));
         }
     }
 
-    static std::string how_ended(int status) {
+    static std::string exit_text(int status) {
         return WIFSIGNALED(status) ? "its process was ended by signal " + std::to_string(WTERMSIG(status)) + " "
                                    : "its process ended with " + std::to_string(WEXITSTATUS(status)) + " ";
     }
@@ -234,11 +234,11 @@ class overseer {
         for (const auto& [name, process] : children_) {
             names.push_back(name);
         }
-        const double silent = driver::silent_after / options_.like.hz;
+        const double silent = driver::silent_after / options_.setup.hz;
         if (!options_.in_place) {
-            std::fputs(line_of(book_, names, now(), options_.like.spacing, silent).c_str(), stdout);
+            std::fputs(line_of(book_, names, now(), options_.setup.spacing, silent).c_str(), stdout);
         } else {
-            std::printf("\x1b[H\x1b[J%s", table_of(book_, names, now(), options_.like.spacing, silent).c_str());
+            std::printf("\x1b[H\x1b[J%s", table_of(book_, names, now(), options_.setup.spacing, silent).c_str());
         }
         std::fflush(stdout);
     }
@@ -250,14 +250,14 @@ class overseer {
         const auto running = [this] {
             return std::any_of(children_.begin(), children_.end(), [](auto& one) { return one.second.running(); });
         };
-        for (const double until = now() + end_within; running() && now() < until;) {
-            co_await pause(look);
+        for (const double until = now() + process_timeout; running() && now() < until;) {
+            co_await pause(poll_interval);
         }
     }
 
     recording conclude() {
         recording out = course_of(book_, first_, children_names(), end_, options_);
-        out.steady = !unsteady_ && options_.incidents.empty();
+        out.steady = !disturbed_ && options_.incidents.empty();
         out.events = events_;
         std::vector<double> latencies;
         for (const auto& [name, process] : children_) {
@@ -265,7 +265,7 @@ class overseer {
             try {
                 report = cles::from_json<vehicle_report>(process.output());
             } catch (const cles::error&) {
-                continue; // it was killed, and its recorder with it
+                continue; // it was killed, so there is no report
             }
             out.sent += report.sent;
             out.received += report.received;
@@ -296,17 +296,17 @@ class overseer {
     asio::signal_set signals_;
     std::vector<incident> open_;
     std::map<std::string, child> children_;
-    std::vector<std::string> first_; ///< those that begin, the leader first
+    std::vector<std::string> first_; ///< the vehicles at the start, the leader first
     std::vector<event> events_;
-    std::string stranger_;
-    std::exception_ptr deaf_; ///< why vehicles are not heard any more
+    std::string foreign_vehicle_;
+    std::exception_ptr receive_failure_; ///< why updates are no longer received
     std::int64_t start_ns_ = 0;
     double end_ = 0;
-    bool interrupted_ = false, unsteady_ = false;
+    bool interrupted_ = false, disturbed_ = false;
 };
 
 } // namespace
 
-recording drive(const drive_options& options) { return overseer{options}.run(); }
+recording drive(const drive_options& options) { return drive_supervisor{options}.run(); }
 
 } // namespace platoon

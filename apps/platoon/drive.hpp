@@ -12,7 +12,7 @@
 
 namespace platoon {
 
-/// Something done to vehicle i at a time of the drive.
+/// What happens to a vehicle at a time of the drive.
 struct incident {
     enum kind { vanish, join, leave } what = vanish;
     std::size_t vehicle = 0;
@@ -21,19 +21,19 @@ struct incident {
 
 struct drive_options {
     std::size_t vehicles = 10;
-    double seconds = 0; ///< 0: as long as the leader's manoeuvre takes, and five more
+    double seconds = 0; ///< 0: until five seconds after the leader's manoeuvre
     double loss = 0, delay = 0;
     std::uint64_t seed = 1;
-    driver_setup like{}; ///< of each vehicle, but its name, place and whom it follows
+    driver_setup setup{}; ///< of each vehicle, without name, position and predecessor
     std::vector<incident> incidents{};
     cles::multicast_options group{};
-    bool insecure = false; ///< on a group beyond this host, where nobody proves who he is
-    bool quiet = false;    ///< shows nothing on the way
-    bool in_place = false; ///< shows a table that changes in place; otherwise a line each second
+    bool insecure = false; ///< allow a group beyond this host, where nodes are not authenticated
+    bool quiet = false;    ///< show no progress
+    bool in_place = false; ///< show a table that changes in place; otherwise a line each second
 };
 
 /// Starts each vehicle as a process of its own, watches them drive, and ends them.
-/// \throws cles::error where they cannot: the group cannot be had, others drive there, a vehicle does not start
+/// \throws cles::error if the group is not available, another platoon uses it, or a vehicle does not start
 recording drive(const drive_options& options);
 
 } // namespace platoon

@@ -7,15 +7,15 @@
 namespace platoon {
 namespace {
 
-constexpr double trend_time = 0.05;    // s, over which the change of the command is smoothed
-constexpr double patience = 1;         // s, at the start, for the first update
-constexpr double given_up_after = 0.5; // s of fallback: from then on those behind are to follow this vehicle
-constexpr double fallback_brake = 4;   // m/s², more than one that has lost its driver brakes by itself
-constexpr double fallback_growth = 15; // m/s² after 1 s, by its square: an update that comes after all has cost little
-constexpr double fallback_jerk = 5;    // m/s³, where nobody was ever heard
-constexpr double fades_within = 0.5;   // s, in which the leader's part fades out and in
-constexpr double close_up_speed = 1.5; // m/s
-constexpr double close_enough = 2;     // m: a distance that is right need not be approached
+constexpr double trend_time = 0.05;      // s, over which the change of the command is smoothed
+constexpr double start_timeout = 1;      // s, at the start, for the first update
+constexpr double lead_after = 0.5;       // s of fallback, after which this vehicle leads those behind
+constexpr double fallback_brake = 4;     // m/s², more than a vehicle without a driver
+constexpr double fallback_growth = 15;   // m/s² after 1 s, growing with the square: a late update changes little
+constexpr double fallback_jerk = 5;      // m/s³, if no update was ever received
+constexpr double fade_time = 0.5;        // s in which the weight of the leader fades out and in
+constexpr double close_up_speed = 1.5;   // m/s
+constexpr double distance_tolerance = 2; // m
 
 } // namespace
 
@@ -28,24 +28,24 @@ driver::driver(driver_setup setup, double now)
     }
 }
 
-std::set<std::string> driver::wanted() const {
+std::set<std::string> driver::needed() const {
     std::set<std::string> names{ahead_, next_, lead_};
-    std::erase_if(names, [this](const auto& name) { return !wants(name); });
+    std::erase_if(names, [this](const auto& name) { return !needs(name); });
     return names;
 }
 
-bool driver::wants(const std::string& whom) const {
-    return whom != setup_.name && !whom.empty() && (whom == ahead_ || whom == lead_ || whom == next_);
+bool driver::needs(const std::string& name) const {
+    return name != setup_.name && !name.empty() && (name == ahead_ || name == lead_ || name == next_);
 }
 
-const track* driver::heard(const std::string& whom) const {
-    const auto found = tracks_.find(whom);
+const track* driver::heard(const std::string& name) const {
+    const auto found = tracks_.find(name);
     return found != tracks_.end() && found->second.known() ? &found->second : nullptr;
 }
 
-bool driver::silent(const std::string& whom) const {
-    const auto* who = heard(whom);
-    return who == nullptr ? now_ - began_ > patience : who->silence(now_) > silent_after / setup_.hz;
+bool driver::silent(const std::string& name) const {
+    const auto* who = heard(name);
+    return who == nullptr ? now_ - began_ > start_timeout : who->silence(now_) > silent_after / setup_.hz;
 }
 
 void driver::enter(role mode, const std::string& why) {
@@ -59,13 +59,13 @@ void driver::enter(role mode, const std::string& why) {
 
 void driver::leave() { leaving_ = true; }
 
-void driver::take(const std::string& from, const state& heard_now, double now) {
-    if (!wants(from)) {
+void driver::receive(const std::string& from, const state& heard_now, double now) {
+    if (!needs(from)) {
         return;
     }
     bool anew = !tracks_.contains(from) || lead_ == setup_.name;
     auto& who = tracks_.try_emplace(from, setup_.limits.lag).first->second;
-    who.take(heard_now, now);
+    who.receive(heard_now, now);
     if (from == next_) {
         ahead_ = next_;
         next_.clear();
@@ -76,7 +76,7 @@ void driver::take(const std::string& from, const state& heard_now, double now) {
     }
     if (anew) {
         const double measured = who.at(now).x - advance(self_, command_, setup_.limits.lag, now - now_).x;
-        distance_ = std::abs(measured - setup_.spacing) < close_enough ? setup_.spacing : measured;
+        distance_ = std::abs(measured - setup_.spacing) < distance_tolerance ? setup_.spacing : measured;
     }
     choose_leader(who.last());
     if (who.last().mode == role::leave) {
@@ -86,7 +86,7 @@ void driver::take(const std::string& from, const state& heard_now, double now) {
 
 void driver::take_over(const state& from) {
     next_ = from.ahead;
-    if (next_.empty()) { // the leader leaves, and this one drives on in its place
+    if (next_.empty()) { // the leader leaves, and this vehicle takes its place
         ahead_.clear();
         lead_ = setup_.name;
         behind_ = 0;
@@ -98,7 +98,7 @@ void driver::take_over(const state& from) {
 void driver::choose_leader(const state& of_ahead) {
     if (lead_ != of_ahead.lead) {
         lead_ = of_ahead.lead;
-        weight_ = mode_ == role::follow && now_ - began_ < patience ? 1 : 0;
+        weight_ = mode_ == role::follow && now_ - began_ < start_timeout ? 1 : 0;
     }
     behind_ = distance_ + of_ahead.behind;
 }
@@ -135,20 +135,20 @@ void driver::follow(double dt) {
     }
     const bool counts = setup_.uses_leader && mode_ == role::follow && heard(lead_) != nullptr;
     doubt_ = counts ? 0 : doubt_ + dt;
-    const double left = 1 - std::pow(doubt_ / fades_within, 3); // so that a short doubt changes next to nothing
-    weight_ = counts ? std::min(1.0, weight_ + dt / fades_within) : std::clamp(left, 0.0, weight_);
+    const double left = 1 - std::pow(doubt_ / fade_time, 3); // so that a short interruption changes almost nothing
+    weight_ = counts ? std::min(1.0, weight_ + dt / fade_time) : std::clamp(left, 0.0, weight_);
     command_ = law(setup_.uses_leader ? weight_ : 0);
 }
 
 double driver::law(double weight) const {
-    const auto mark_at = [this](const std::string& whom, double distance) {
-        const auto* who = heard(whom);
+    const auto reference_to = [this](const std::string& name, double distance) {
+        const auto* who = heard(name);
         if (who == nullptr) {
-            return mark{};
+            return reference{};
         }
-        return mark{who->at(now_), who->command_at(now_), distance};
+        return reference{who->at(now_), who->command_at(now_), distance};
     };
-    return spacing_law(setup_.law, self_, mark_at(ahead_, distance_), mark_at(lead_, behind_),
+    return spacing_law(setup_.law, self_, reference_to(ahead_, distance_), reference_to(lead_, behind_),
                        heard(lead_) == nullptr ? 0 : weight);
 }
 
@@ -165,14 +165,14 @@ void driver::fall_back(double dt) {
               heard(ahead_) == nullptr ? ahead_ + " ahead was never heard" : ahead_ + " ahead is silent");
     }
     const double since = now_ - fallback_since_;
-    if (heard(ahead_) != nullptr && since <= given_up_after) { // what it would do, and more and more less than that
+    if (heard(ahead_) != nullptr && since <= lead_after) { // the normal command, reduced more and more
         const double as_before = law(weight_);
         command_ = std::max(as_before - fallback_growth * since * since, std::min(as_before, -fallback_brake));
     } else {
-        // One that braked harder already does so to the end: the one ahead may too.
+        // If it already brakes harder, it continues, because the one ahead may too.
         command_ = std::min(command_, std::max(command_ - fallback_jerk * dt, -fallback_brake));
     }
-    if (since > given_up_after && lead_ != setup_.name) {
+    if (since > lead_after && lead_ != setup_.name) {
         lead_ = setup_.name;
         behind_ = 0;
         weight_ = 0;

@@ -15,44 +15,45 @@ namespace platoon {
 
 struct driver_setup {
     std::string name{};
-    std::string ahead{};     ///< whom it follows; empty: it leads
-    double hz = 25;          ///< of updates, everybody's
+    std::string ahead{};     ///< the vehicle it follows; empty: it leads
+    double hz = 25;          ///< of updates, the same for all
     double spacing = 15;     ///< m, from front to front
-    bool uses_leader = true; ///< false: follows the one ahead alone, for comparison
+    bool uses_leader = true; ///< false: follows only the one ahead, for comparison
     motion start{};
-    manoeuvre plan{}; ///< where it leads
+    manoeuvre plan{}; ///< if it leads
     vehicle_limits limits{};
     gains law{};
 };
 
-/// Drives one vehicle: what it is told by others and the time go in, where it is and what it tells others come out.
-/// No clock, no network: the simulation and the process on the road run the same. Times are local, in seconds.
+/// Controls one vehicle: its inputs are the updates of others and the time; its outputs are its position and its own
+/// updates. It uses no clock and no network, so that the simulation and the process run the same code. Times are local,
+/// in seconds.
 class driver {
   public:
-    /// After so many periods without an update somebody counts as silent: the third is missed, and a quarter is for
-    /// one that is only late.
+    /// After this many periods without an update a vehicle counts as silent: three are missed, and a quarter is the
+    /// tolerance for a late one.
     static constexpr double silent_after = 3.25;
 
     driver(driver_setup setup, double now);
 
-    /// Whose updates it has to hear. Changes with what they say.
-    [[nodiscard]] std::set<std::string> wanted() const;
-    [[nodiscard]] bool wants(const std::string& whom) const;
-    /// An update of one of those has come. \param to the time for which `step` was called last, or a little later
-    void take(const std::string& from, const state& heard, double now);
-    /// Drives to this time with the present command, then decides on the next one.
+    /// The vehicles whose updates it needs, which depends on their updates.
+    [[nodiscard]] std::set<std::string> needed() const;
+    [[nodiscard]] bool needs(const std::string& name) const;
+    /// Processes an update of one of those. \param now the time of the last `step`, or a little later
+    void receive(const std::string& from, const state& heard, double now);
+    /// Advances to this time with the present command, then computes the next one.
     void step(double now);
-    /// From now on it tells that it leaves.
+    /// From now on its updates announce that it leaves.
     void leave();
 
-    /// What it tells others, as of the last step.
+    /// Its update, as of the last step.
     [[nodiscard]] state report() const;
-    [[nodiscard]] const motion& where() const noexcept { return self_; }
+    [[nodiscard]] const motion& position() const noexcept { return self_; }
     [[nodiscard]] double command() const noexcept { return command_; }
     [[nodiscard]] role mode() const noexcept { return mode_; }
     [[nodiscard]] double now() const noexcept { return now_; }
 
-    /// Is told when the mode changes, and why.
+    /// Called when the mode changes, with the reason.
     std::function<void(double now, role mode, const std::string& why)> on_change{};
 
   private:
@@ -63,8 +64,8 @@ class driver {
     void close_up(double dt);
     void take_over(const state& from);
     void choose_leader(const state& of_ahead);
-    [[nodiscard]] bool silent(const std::string& whom) const;
-    [[nodiscard]] const track* heard(const std::string& whom) const;
+    [[nodiscard]] bool silent(const std::string& name) const;
+    [[nodiscard]] const track* heard(const std::string& name) const;
 
     driver_setup setup_;
     motion self_;
@@ -72,9 +73,9 @@ class driver {
     double now_, began_;
     role mode_ = role::follow;
     bool leaving_ = false;
-    std::string ahead_, next_, lead_; ///< `next_`: who will be ahead when the one who is has left
-    double distance_;                 ///< to the one ahead, as wanted now: it closes up slowly to `setup.spacing`
-    double behind_ = 0;               ///< the leader, as wanted now
+    std::string ahead_, next_, lead_; ///< `next_`: the one ahead after the present one has left
+    double distance_;                 ///< desired distance to the one ahead, which slowly approaches `setup.spacing`
+    double behind_ = 0;               ///< desired distance to the leader
     double weight_ = 0;               ///< of the leader
     double doubt_ = 0;                ///< s, for which it has not counted
     double fallback_since_ = 0;

@@ -7,13 +7,13 @@
 
 namespace platoon {
 
-/// A bad radio: it loses updates and delays the others, drawn from a seed.
+/// A bad radio: it loses some updates and delays the others, determined by a seed.
 class impairment {
   public:
-    /// \param loss the part that is lost, 0 to 1 \param delay s, the most that an update takes; the least is half of it
-    impairment(double loss, double delay, std::uint64_t seed) : loss_(loss), delay_(delay), chance_(seed) {}
+    /// \param loss the share that is lost, 0 to 1 \param delay s, the maximum delay; the minimum is half of it
+    impairment(double loss, double delay, std::uint64_t seed) : loss_(loss), delay_(delay), generator_(seed) {}
 
-    /// How much later the next update comes; nothing: never.
+    /// The delay of the next update; nothing: it is lost.
     std::optional<double> next() {
         const bool lost = draw() < loss_;
         const double later = delay_ * (0.5 + draw() / 2);
@@ -22,10 +22,10 @@ class impairment {
 
   private:
     // From 0 to below 1; the same everywhere, which the standard's distributions are not.
-    double draw() { return static_cast<double>(chance_() >> 11U) * 0x1p-53; }
+    double draw() { return static_cast<double>(generator_() >> 11U) * 0x1p-53; }
 
     double loss_, delay_;
-    std::mt19937_64 chance_;
+    std::mt19937_64 generator_;
 };
 
 } // namespace platoon

@@ -22,28 +22,28 @@ motion between(const state& a, const state& b, double t) {
 
 } // namespace
 
-void logbook::take(const std::string& vehicle, const state& told) {
-    auto& all = told_[vehicle];
+void logbook::add(const std::string& vehicle, const state& told) {
+    auto& all = states_[vehicle];
     if (all.empty() || told.t > all.back().t) {
         all.push_back(told);
     }
 }
 
-void logbook::gone(const std::string& vehicle, bool left) { gone_.try_emplace(vehicle, left); }
+void logbook::record_end(const std::string& vehicle, bool left) { ended_.try_emplace(vehicle, left); }
 
 bool logbook::has_left(const std::string& vehicle) const {
-    const auto found = gone_.find(vehicle);
-    return found != gone_.end() && found->second;
+    const auto found = ended_.find(vehicle);
+    return found != ended_.end() && found->second;
 }
 
 const state* logbook::last(const std::string& vehicle) const {
-    const auto found = told_.find(vehicle);
-    return found == told_.end() ? nullptr : &found->second.back();
+    const auto found = states_.find(vehicle);
+    return found == states_.end() ? nullptr : &found->second.back();
 }
 
-std::optional<motion> logbook::where(const std::string& vehicle, double t) const {
-    const auto found = told_.find(vehicle);
-    if (found == told_.end() || t < found->second.front().t) {
+std::optional<motion> logbook::position(const std::string& vehicle, double t) const {
+    const auto found = states_.find(vehicle);
+    if (found == states_.end() || t < found->second.front().t) {
         return std::nullopt;
     }
     const auto& all = found->second;
@@ -52,11 +52,11 @@ std::optional<motion> logbook::where(const std::string& vehicle, double t) const
     if (next != all.end()) {
         return between(before, *next, t);
     }
-    const auto end = gone_.find(vehicle);
-    if (end != gone_.end() && end->second) {
+    const auto end = ended_.find(vehicle);
+    if (end != ended_.end() && end->second) {
         return std::nullopt;
     }
-    return advance(before.where(), end != gone_.end() ? without_driver(before.u) : before.u, lag_, t - before.t);
+    return advance(before.position(), end != ended_.end() ? failsafe_command(before.u) : before.u, lag_, t - before.t);
 }
 
 } // namespace platoon

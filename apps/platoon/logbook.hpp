@@ -11,26 +11,25 @@
 
 namespace platoon {
 
-/// What each vehicle told in the course of a drive, and so where each was at any time of it.
+/// The updates of each vehicle during a drive, and therefore its position at any time.
 class logbook {
   public:
     explicit logbook(double lag) : lag_(lag) {}
 
-    void take(const std::string& vehicle, const state& told);
-    /// Its process has gone at that time. \param left in good order: it is not on the lane any more; otherwise it stays
-    /// there, and its brakes apply
-    void gone(const std::string& vehicle, bool left);
-    /// Nothing before its first state and after it has left.
-    [[nodiscard]] std::optional<motion> where(const std::string& vehicle, double t) const;
-    /// The last it told; null: nothing yet.
+    void add(const std::string& vehicle, const state& told);
+    /// Its process has ended. \param left as planned: it is no longer on the lane; otherwise it stays there, and brakes
+    void record_end(const std::string& vehicle, bool left);
+    /// Nothing before its first update and after it has left.
+    [[nodiscard]] std::optional<motion> position(const std::string& vehicle, double t) const;
+    /// Its last update, or null.
     [[nodiscard]] const state* last(const std::string& vehicle) const;
-    [[nodiscard]] bool has_gone(const std::string& vehicle) const { return gone_.contains(vehicle); }
+    [[nodiscard]] bool has_ended(const std::string& vehicle) const { return ended_.contains(vehicle); }
     [[nodiscard]] bool has_left(const std::string& vehicle) const;
 
   private:
     double lag_;
-    std::map<std::string, std::vector<state>> told_; ///< of each, in the order of time
-    std::map<std::string, bool> gone_;               ///< whether by leaving
+    std::map<std::string, std::vector<state>> states_; ///< of each, in the order of time
+    std::map<std::string, bool> ended_;                ///< whether by leaving
 };
 
 } // namespace platoon

@@ -15,8 +15,8 @@
 
 namespace {
 
-/// What all commands understand.
-struct wishes {
+/// The arguments of all commands.
+struct arguments {
     std::size_t vehicles = 0;
     double hz = 25, seconds = 0, loss_percent = 0, delay_ms = 0;
     std::uint64_t seed = 1;
@@ -29,16 +29,16 @@ struct wishes {
     std::size_t turn = 0, turns = 1;
     std::int64_t start_ns = 0;
 
-    [[nodiscard]] platoon::driver_setup like() const {
+    [[nodiscard]] platoon::driver_setup setup() const {
         platoon::driver_setup setup{.hz = hz, .uses_leader = controller == "leader"};
         return setup;
     }
-    [[nodiscard]] cles::multicast_options where() const {
-        const char* wanted = std::getenv("CLES_MULTICAST");
-        const bool in_environment = wanted != nullptr && *wanted != '\0';
-        auto options = cles::parse_multicast(!group.empty() ? group : in_environment ? wanted : "lo");
+    [[nodiscard]] cles::multicast_options group_options() const {
+        const char* variable = std::getenv("CLES_MULTICAST");
+        const bool in_environment = variable != nullptr && *variable != '\0';
+        auto options = cles::parse_multicast(!group.empty() ? group : in_environment ? variable : "lo");
         if (!options.is_on()) {
-            throw cles::error(cles::errc::no_target, "vehicles hear each other by multicast, and it is off");
+            throw cles::error(cles::errc::no_target, "vehicles communicate by multicast, which is off");
         }
         return options;
     }
@@ -56,10 +56,10 @@ platoon::incident incident_of(platoon::incident::kind what, const std::string& t
     const char* const at = end + (numbered ? 1 : 0);
     out.at = numbered ? std::strtod(at, &end) : -1;
     if (!numbered || end == at || *end != '\0' || !(out.at >= 0 && out.at <= 3600)) {
-        throw usage_error("'" + text + "': a vehicle's number and a time are meant, as in 3@12.5");
+        throw usage_error("'" + text + "': write the number of a vehicle and a time, as in 3@12.5");
     }
     if (out.vehicle >= vehicles) {
-        throw usage_error("'" + text + "': there are vehicles 0 to " + std::to_string(vehicles - 1));
+        throw usage_error("'" + text + "': the vehicles are 0 to " + std::to_string(vehicles - 1));
     }
     if (out.vehicle == 0 && what == platoon::incident::join) {
         throw usage_error("'" + text + "': vehicle 0 leads, and cannot join");
@@ -67,149 +67,149 @@ platoon::incident incident_of(platoon::incident::kind what, const std::string& t
     return out;
 }
 
-int simulate(const wishes& wanted) {
-    platoon::scenario what{.vehicles = wanted.vehicles != 0 ? wanted.vehicles : 20,
-                           .seconds = wanted.seconds,
-                           .loss = wanted.loss_percent / 100,
-                           .delay = wanted.delay_ms / 1000,
-                           .like = wanted.like()};
-    if (!wanted.vanish.empty()) {
-        const auto which = incident_of(platoon::incident::vanish, wanted.vanish, what.vehicles);
+int simulate(const arguments& args) {
+    platoon::scenario what{.vehicles = args.vehicles != 0 ? args.vehicles : 20,
+                           .seconds = args.seconds,
+                           .loss = args.loss_percent / 100,
+                           .delay = args.delay_ms / 1000,
+                           .setup = args.setup()};
+    if (!args.vanish.empty()) {
+        const auto which = incident_of(platoon::incident::vanish, args.vanish, what.vehicles);
         what.vanish = static_cast<std::ptrdiff_t>(which.vehicle);
         what.vanish_at = which.at;
     }
-    return simulate_command(what, wanted.seeds, wanted.json, wanted.record);
+    return simulate_command(what, args.seeds, args.json, args.record);
 }
 
-int run(const wishes& wanted) {
-    platoon::drive_options options{.vehicles = wanted.vehicles != 0 ? wanted.vehicles : 10,
-                                   .seconds = wanted.seconds,
-                                   .loss = wanted.loss_percent / 100,
-                                   .delay = wanted.delay_ms / 1000,
-                                   .seed = wanted.seed,
-                                   .like = wanted.like(),
-                                   .group = wanted.where(),
-                                   .insecure = wanted.insecure,
-                                   .quiet = wanted.json,
-                                   .in_place = !wanted.json && (wanted.view || ::isatty(STDOUT_FILENO) == 1)};
+int run(const arguments& args) {
+    platoon::drive_options options{.vehicles = args.vehicles != 0 ? args.vehicles : 10,
+                                   .seconds = args.seconds,
+                                   .loss = args.loss_percent / 100,
+                                   .delay = args.delay_ms / 1000,
+                                   .seed = args.seed,
+                                   .setup = args.setup(),
+                                   .group = args.group_options(),
+                                   .insecure = args.insecure,
+                                   .quiet = args.json,
+                                   .in_place = !args.json && (args.view || ::isatty(STDOUT_FILENO) == 1)};
     const auto add = [&](platoon::incident::kind what, const std::vector<std::string>& texts) {
         for (const auto& text : texts) {
             options.incidents.push_back(incident_of(what, text, options.vehicles));
         }
     };
-    add(platoon::incident::vanish, wanted.vanishes);
-    add(platoon::incident::join, wanted.joins);
-    add(platoon::incident::leave, wanted.leaves);
-    if (!wanted.record.empty()) {
-        platoon::check_writable(wanted.record); // rather than after a drive of minutes
+    add(platoon::incident::vanish, args.vanishes);
+    add(platoon::incident::join, args.joins);
+    add(platoon::incident::leave, args.leaves);
+    if (!args.record.empty()) {
+        platoon::check_writable(args.record); // before a drive of minutes
     }
     const auto drive = platoon::drive(options);
-    std::puts(wanted.json ? cles::to_json(drive).c_str() : summary_of(drive).c_str());
+    std::puts(args.json ? cles::to_json(drive).c_str() : summary_of(drive).c_str());
     std::fflush(stdout);
-    if (!wanted.record.empty()) {
-        write(drive, wanted.record);
+    if (!args.record.empty()) {
+        write(drive, args.record);
     }
     return drive.verdict.collision ? 1 : 0;
 }
 
-int vehicle(const wishes& wanted) {
-    platoon::vehicle_options options{.setup = wanted.like(),
-                                     .joins = !wanted.lead && wanted.ahead.empty(),
-                                     .turn = wanted.turn,
-                                     .turns = wanted.turns,
-                                     .start_ns = wanted.start_ns,
-                                     .seconds = wanted.seconds,
-                                     .loss = wanted.loss_percent / 100,
-                                     .delay = wanted.delay_ms / 1000,
-                                     .seed = wanted.seed,
-                                     .group = wanted.where(),
-                                     .insecure = wanted.insecure};
-    options.setup.name = wanted.name;
-    options.setup.ahead = wanted.ahead;
-    options.setup.start = {wanted.x, options.setup.plan.speed, 0};
+int vehicle(const arguments& args) {
+    platoon::vehicle_options options{.setup = args.setup(),
+                                     .joins = !args.lead && args.ahead.empty(),
+                                     .turn = args.turn,
+                                     .turns = args.turns,
+                                     .start_ns = args.start_ns,
+                                     .seconds = args.seconds,
+                                     .loss = args.loss_percent / 100,
+                                     .delay = args.delay_ms / 1000,
+                                     .seed = args.seed,
+                                     .group = args.group_options(),
+                                     .insecure = args.insecure};
+    options.setup.name = args.name;
+    options.setup.ahead = args.ahead;
+    options.setup.start = {args.x, options.setup.plan.speed, 0};
     if (options.start_ns == 0) {
         options.start_ns = platoon::monotonic_ns();
     }
     const auto report = platoon::vehicle_node{std::move(options)}.run();
-    if (wanted.report) {
+    if (args.report) {
         std::puts(cles::to_json(report).c_str());
     }
     return 0;
 }
 
-void add_common(CLI::App& command, wishes& wanted) {
-    command.add_option("--hz", wanted.hz, "Updates of each vehicle in a second (25)")->check(CLI::Range(10.0, 50.0));
-    command.add_option("--seconds", wanted.seconds, "How long; as long as the leader's manoeuvre takes unless said")
+void add_common(CLI::App& command, arguments& args) {
+    command.add_option("--hz", args.hz, "Updates of each vehicle per second (25)")->check(CLI::Range(10.0, 50.0));
+    command.add_option("--seconds", args.seconds, "Duration (default: until the leader's manoeuvre ends)")
         ->check(CLI::Range(1.0, 600.0));
-    command.add_option("--loss", wanted.loss_percent, "Updates that each receiver loses, in percent (0)")
+    command.add_option("--loss", args.loss_percent, "Updates that each receiver loses, in percent (0)")
         ->check(CLI::Range(0.0, 100.0));
-    command.add_option("--delay", wanted.delay_ms, "How late updates are, in ms: half of it to all of it (0)")
+    command.add_option("--delay", args.delay_ms, "Delay of updates in ms: at least half of it, at most all of it (0)")
         ->check(CLI::Range(0.0, 1000.0));
-    command.add_option("--controller", wanted.controller, "Who counts: the leader too, or the predecessor alone")
+    command.add_option("--controller", args.controller, "Follow the leader too, or only the predecessor")
         ->check(CLI::IsMember({"leader", "predecessor"}));
 }
 
-void add_group(CLI::App& command, wishes& wanted) {
-    command.add_option("-m,--multicast", wanted.group, "Where they hear each other (CLES_MULTICAST, or else lo)")
+void add_group(CLI::App& command, arguments& args) {
+    command
+        .add_option("-m,--multicast", args.group, "Interface and group to communicate by (CLES_MULTICAST, or else lo)")
         ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto");
-    command.add_flag("--insecure", wanted.insecure, "On an interface beyond this host, where nobody proves who he is");
+    command.add_flag("--insecure", args.insecure,
+                     "Allow an interface beyond this host, where nodes are not authenticated");
 }
 
-int dispatch(const CLI::App& app, const wishes& wanted) {
+int dispatch(const CLI::App& app, const arguments& args) {
     if (app.got_subcommand("simulate")) {
-        return simulate(wanted);
+        return simulate(args);
     }
-    return app.got_subcommand("run") ? run(wanted) : vehicle(wanted);
+    return app.got_subcommand("run") ? run(args) : vehicle(args);
 }
 
 } // namespace
 
 int main(int argc, char** argv) {
-    wishes wanted;
-    CLI::App app{"A platoon of vehicles that hear each other by multicast.", "cles-platoon"};
+    arguments args;
+    CLI::App app{"A platoon of vehicles that communicate by multicast.", "cles-platoon"};
     app.require_subcommand(1);
-    app.footer("Exit codes: 0 ok, 1 a collision, 2 usage, 3 something is missing, 5 another error, 6 busy.");
-    auto& in_time = *app.add_subcommand("simulate", "Drive in virtual time, without a network");
-    auto& on_road = *app.add_subcommand("run", "Drive, each vehicle being a process of its own");
-    auto& one = *app.add_subcommand("vehicle", "Be one vehicle: lead, follow, or join the platoon that is heard");
+    app.footer("Exit codes: 0 ok, 1 a collision, 2 usage, 3 no vehicle or no multicast, 5 another error, 6 busy.");
+    auto& in_time = *app.add_subcommand("simulate", "Simulate a drive in virtual time, without a network");
+    auto& on_road = *app.add_subcommand("run", "Run a drive, with a process for each vehicle");
+    auto& one = *app.add_subcommand("vehicle", "Run one vehicle: lead, follow, or join a platoon");
     for (auto* command : {&in_time, &on_road, &one}) {
-        add_common(*command, wanted);
+        add_common(*command, args);
     }
-    in_time.add_option("-n,--vehicles", wanted.vehicles, "How many (20)")->check(CLI::Range(2, 100));
-    in_time.add_option("--seeds", wanted.seeds, "How many drives, each with losses of its own (1)")
+    in_time.add_option("-n,--vehicles", args.vehicles, "Number of vehicles (20)")->check(CLI::Range(2, 100));
+    in_time.add_option("--seeds", args.seeds, "Number of drives, each with its own losses (1)")
         ->check(CLI::Range(1, 1000));
-    in_time.add_option("--vanish", wanted.vanish, "Vehicle I falls silent at T")->type_name("I@T");
-    on_road.add_option("-n,--vehicles", wanted.vehicles, "How many (10)")->check(CLI::Range(2, 50));
-    on_road.add_option("--seed", wanted.seed, "Of the losses (1)");
-    on_road.add_option("--vanish", wanted.vanishes, "Vehicle I's process is killed at T")->type_name("I@T");
-    on_road.add_option("--join", wanted.joins, "Vehicle I joins at T, at the end")->type_name("I@T");
-    on_road.add_option("--leave", wanted.leaves, "Vehicle I leaves at T")->type_name("I@T");
-    on_road.add_flag("--view", wanted.view, "Show a table that changes in place, even if this is no terminal");
+    in_time.add_option("--vanish", args.vanish, "Vehicle I stops sending at T")->type_name("I@T");
+    on_road.add_option("-n,--vehicles", args.vehicles, "Number of vehicles (10)")->check(CLI::Range(2, 50));
+    on_road.add_option("--seed", args.seed, "Seed of the losses (1)");
+    on_road.add_option("--vanish", args.vanishes, "The process of vehicle I is killed at T")->type_name("I@T");
+    on_road.add_option("--join", args.joins, "Vehicle I joins the end of the platoon at T")->type_name("I@T");
+    on_road.add_option("--leave", args.leaves, "Vehicle I leaves at T")->type_name("I@T");
+    on_road.add_flag("--view", args.view, "Show a table that changes in place, even if stdout is not a terminal");
     for (auto* command : {&in_time, &on_road}) {
-        command->add_option("--record", wanted.record, "Write all there is to know, for plots")->type_name("FILE");
-        command->add_flag("--json", wanted.json, "Print an object, and nothing on the way");
+        command->add_option("--record", args.record, "Write a complete record, for plots")->type_name("FILE");
+        command->add_flag("--json", args.json, "Print a JSON object, and no progress");
     }
-    add_group(on_road, wanted);
-    add_group(one, wanted);
-    one.add_option("--name", wanted.name, "Its name")->required();
-    auto* const lead = one.add_flag("--lead", wanted.lead, "It leads");
-    auto* const ahead = one.add_option("--ahead", wanted.ahead, "Whom it follows")->excludes(lead);
-    one.add_flag("--join", wanted.join, "Joins the platoon that is heard, as it does where neither is said")
-        ->excludes(lead)
-        ->excludes(ahead);
-    one.add_option("--x", wanted.x, "Where it is at the start, m");
-    one.add_option("--turn", wanted.turn, "Which part of a period it sends in ...");
-    one.add_option("--turns", wanted.turns, "... of so many")->check(CLI::Range(1, 1000));
-    one.add_option("--start-ns", wanted.start_ns, "The start, by CLOCK_MONOTONIC; now unless said");
-    one.add_option("--seed", wanted.seed, "Of the losses (1)");
-    one.add_flag("--report", wanted.report, "Print at the end what its recorder holds");
+    add_group(on_road, args);
+    add_group(one, args);
+    one.add_option("--name", args.name, "The name of the vehicle")->required();
+    auto* const lead = one.add_flag("--lead", args.lead, "Lead the platoon");
+    auto* const ahead = one.add_option("--ahead", args.ahead, "The vehicle to follow")->excludes(lead);
+    one.add_flag("--join", args.join, "Join the platoon in the group (default)")->excludes(lead)->excludes(ahead);
+    one.add_option("--x", args.x, "Position at the start, m");
+    one.add_option("--turn", args.turn, "The slot of a period in which it sends ...");
+    one.add_option("--turns", args.turns, "... of this number of slots")->check(CLI::Range(1, 1000));
+    one.add_option("--start-ns", args.start_ns, "The start, by CLOCK_MONOTONIC (default: now)");
+    one.add_option("--seed", args.seed, "Seed of the losses (1)");
+    one.add_flag("--report", args.report, "Print the report of its recorder at the end");
     try {
         app.parse(argc, argv);
-        return dispatch(app, wanted);
-    } catch (const CLI::ParseError& wrong) { // or --help
-        return app.exit(wrong) == 0 ? 0 : 2;
-    } catch (const usage_error& wrong) {
-        std::fprintf(stderr, "cles-platoon: %s\n", wrong.what());
+        return dispatch(app, args);
+    } catch (const CLI::ParseError& error) { // or --help
+        return app.exit(error) == 0 ? 0 : 2;
+    } catch (const usage_error& error) {
+        std::fprintf(stderr, "cles-platoon: %s\n", error.what());
         return 2;
     } catch (const cles::error& e) {
         const bool exposed = e.code() == cles::errc::insecure_listen;

@@ -7,7 +7,7 @@
 namespace platoon {
 namespace {
 
-// Up to `level` and back to nothing, both at `jerk`, with the area that makes up `change` of speed.
+// Up to `level` and back to 0, both at `jerk`, with an area that equals the `change` of speed.
 double trapezoid(double t, double change, double level, double jerk) {
     if (change <= 0) {
         return 0;

@@ -3,7 +3,7 @@
 
 namespace platoon {
 
-/// What the leader does: it drives at a constant speed, brakes hard, drives slowly, and takes up speed again.
+/// The manoeuvre of the leader: it drives at a constant speed, brakes hard, drives slowly, and accelerates again.
 struct manoeuvre {
     double speed = 25;   ///< m/s
     double slow = 10;    ///< m/s, after braking
@@ -11,11 +11,11 @@ struct manoeuvre {
     double brake = 5;    ///< m/s²
     double speed_up = 1; ///< m/s²
     double slow_for = 5; ///< s
-    double jerk = 5;     ///< m/s³, at which its commands change at most
+    double jerk = 5;     ///< m/s³, the maximum change of its commands
 
     /// The acceleration commanded at that time.
     [[nodiscard]] double command(double t) const;
-    /// When it drives at its first speed again.
+    /// When it has its initial speed again.
     [[nodiscard]] double end() const;
 };
 

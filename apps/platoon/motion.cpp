@@ -8,8 +8,8 @@ namespace platoon {
 
 namespace {
 
-motion unhindered(const motion& from, double command, double lag, double dt) {
-    const double rest = (from.a - command) * std::exp(-dt / lag); // of what the acceleration still has to change
+motion integrate(const motion& from, double command, double lag, double dt) {
+    const double rest = (from.a - command) * std::exp(-dt / lag); // the remaining change of the acceleration
     const double gained = (from.a - command - rest) * lag;
     return {.x = from.x + from.v * dt + command * dt * dt / 2 + ((from.a - command) * dt - gained) * lag,
             .v = from.v + command * dt + gained,
@@ -19,17 +19,17 @@ motion unhindered(const motion& from, double command, double lag, double dt) {
 } // namespace
 
 motion advance(const motion& from, double command, double lag, double dt) {
-    const auto to = unhindered(from, command, lag, dt);
+    const auto to = integrate(from, command, lag, dt);
     if (to.v > 0 || dt <= 0) {
         return to;
     }
-    double moving = 0; // it stops between these two
+    double moving = 0; // it stops between these times
     double still = dt;
     for (int i = 0; i < 40; ++i) {
         const double middle = (moving + still) / 2;
-        (unhindered(from, command, lag, middle).v > 0 ? moving : still) = middle;
+        (integrate(from, command, lag, middle).v > 0 ? moving : still) = middle;
     }
-    return {.x = std::max(from.x, unhindered(from, command, lag, moving).x), .v = 0, .a = 0};
+    return {.x = std::max(from.x, integrate(from, command, lag, moving).x), .v = 0, .a = 0};
 }
 
 } // namespace platoon

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double budget_us = 100'000;
 
-[[noreturn]] void cannot_write(const std::string& path, int why) {
+[[noreturn]] void throw_cannot_write(const std::string& path, int why) {
     const boost::system::error_code code{why, boost::system::system_category()};
     throw cles::error(code, "cannot write " + path + ": " + code.message());
 }
@@ -58,12 +58,12 @@ std::string summary_of(const recording& drive) {
                           *most, most - v.error.begin(), v.string_ratio));
     }
     if (std::isnan(v.least_gap)) {
-        text += "gap       not seen: it ended before all were on the road\n";
+        text += "gap       unknown: the drive ended before all vehicles had started\n";
     } else {
         add(std::snprintf(line.data(), line.size(), "gap       %.3f m at least%s\n", v.least_gap,
                           v.collision ? ": A COLLISION" : ""));
     }
-    add(std::snprintf(line.data(), line.size(), "fallback  %ju times for want of updates\n",
+    add(std::snprintf(line.data(), line.size(), "fallback  %ju times because updates were missing\n",
                       std::uintmax_t{drive.fallbacks}));
     if (drive.latency.count != 0) {
         const auto& l = drive.latency;
@@ -78,7 +78,7 @@ std::string summary_of(const recording& drive) {
 void check_writable(const std::string& path) {
     auto* file = std::fopen(path.c_str(), "a");
     if (file == nullptr) {
-        cannot_write(path, errno);
+        throw_cannot_write(path, errno);
     }
     std::fclose(file);
 }
@@ -87,14 +87,14 @@ void write(const recording& drive, const std::string& path) {
     const auto text = cles::to_json(drive) + "\n";
     auto* file = std::fopen(path.c_str(), "w");
     if (file == nullptr) {
-        cannot_write(path, errno);
+        throw_cannot_write(path, errno);
     }
     int why = std::fwrite(text.data(), 1, text.size(), file) == text.size() ? 0 : errno;
     if (std::fclose(file) != 0 && why == 0) {
         why = errno;
     }
     if (why != 0) {
-        cannot_write(path, why);
+        throw_cannot_write(path, why);
     }
 }
 

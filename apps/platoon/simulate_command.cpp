@@ -12,7 +12,7 @@
 namespace platoon {
 namespace {
 
-/// What came out of all seeds.
+/// The results of all seeds.
 struct outcome {
     std::size_t vehicles = 0;
     double hz = 0, loss = 0, delay_ms = 0;
@@ -29,10 +29,10 @@ BOOST_DESCRIBE_STRUCT(outcome, (),
 recording record_of(scenario what) {
     recording out{.source = "simulated",
                   .vehicles = what.vehicles,
-                  .hz = what.like.hz,
+                  .hz = what.setup.hz,
                   .loss = what.loss,
                   .delay_ms = what.delay * 1000,
-                  .spacing = what.like.spacing,
+                  .spacing = what.setup.spacing,
                   .seed = what.seed,
                   .steady = what.vanish < 0};
     what.on_change = [&](double t, const std::string& vehicle, role mode, const std::string& why) {
@@ -48,7 +48,7 @@ recording record_of(scenario what) {
             return;
         }
         out.t.push_back(now);
-        const auto errors = spacing_errors(where, what.like.spacing);
+        const auto errors = spacing_errors(where, what.setup.spacing);
         for (std::size_t i = 0; i < where.size(); ++i) {
             out.courses[i].speed.push_back(where[i].v);
             out.courses[i].error.push_back(i == 0 ? NAN : errors[i - 1]);
@@ -61,10 +61,10 @@ recording record_of(scenario what) {
 
 int simulate_command(scenario what, unsigned seeds, bool json, const std::string& record) {
     outcome all{.vehicles = what.vehicles,
-                .hz = what.like.hz,
+                .hz = what.setup.hz,
                 .loss = what.loss,
                 .delay_ms = what.delay * 1000,
-                .controller = what.like.uses_leader ? "leader" : "predecessor",
+                .controller = what.setup.uses_leader ? "leader" : "predecessor",
                 .least_gap = INFINITY};
     for (what.seed = 1; what.seed <= seeds; ++what.seed) {
         const auto one = record_of(what);

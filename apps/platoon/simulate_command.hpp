@@ -8,9 +8,9 @@
 
 namespace platoon {
 
-/// Drives the scenario in virtual time from seeds 1 to `seeds`, and prints what came out of each.
+/// Simulates the scenario with seeds 1 to `seeds`, and prints the result of each.
 /// \param record a file for the first of them; empty: none
-/// \return 1 where vehicles collided
+/// \return 1 if vehicles collided
 int simulate_command(scenario what, unsigned seeds, bool json, const std::string& record);
 
 } // namespace platoon

@@ -6,18 +6,18 @@
 namespace platoon {
 namespace {
 
-constexpr double horizon = 1;         // s: what is older says nothing about the present
+constexpr double horizon = 1;         // s: older updates say nothing about the present
 constexpr double trend_horizon = 0.3; // s: no command changes at the same pace for long; two missed at 10 Hz
 constexpr double drift = 1e-4;        // s/s, by which two clocks may differ in their pace
 
 } // namespace
 
-void track::take(const state& heard, double now) {
+void track::receive(const state& heard, double now) {
     const bool restarted = last_ && heard.t < last_->t - horizon;
     if (last_ && !restarted && heard.t <= last_->t) {
-        return; // overtaken on its way
+        return; // overtaken by a newer one
     }
-    // The clocks have nothing in common, but what an update took longer than the fastest shows in their difference.
+    // The clocks are not synchronised, but the difference shows how much longer an update took than the fastest one.
     const double difference = now - heard.t;
     offset_ = !last_ || restarted ? difference : std::min(difference, offset_ + drift * (now - received_));
     last_ = heard;
@@ -31,7 +31,7 @@ double track::command_at(double now) const { return last_->u + last_->j * std::m
 motion track::at(double now) const {
     const double command = command_at(now);
     const double ramp = std::min(age(now), trend_horizon);
-    const auto then = advance(last_->where(), (last_->u + command) / 2, lag_, ramp);
+    const auto then = advance(last_->position(), (last_->u + command) / 2, lag_, ramp);
     return advance(then, command, lag_, age(now) - ramp);
 }
 

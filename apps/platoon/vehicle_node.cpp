@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "vehicle_node.hpp"
 
-#include "own_address.hpp"
 #include "simulation.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -9,19 +8,30 @@
 #include <boost/asio/use_awaitable.hpp>
 #include <boost/describe/enum_to_string.hpp>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <csignal>
 #include <cstdio>
+#include <memory>
+
+#include <arpa/inet.h>
+#include <ifaddrs.h>
+#include <net/if.h>
 
 namespace platoon {
 
 namespace asio = boost::asio;
+using namespace std::chrono_literals;
 using steady = std::chrono::steady_clock;
 
 namespace {
 
-constexpr std::size_t most_latencies = 1'000'000; // kept of one drive
-constexpr double leaves_for = 1;                  // s for which it tells that it leaves
+constexpr double approach_distance = 40; // m behind the last vehicle at the start
+constexpr double join_interval = 5;      // s in which only one vehicle may join
+constexpr double join_timeout = 2 * join_interval;
+constexpr std::size_t max_latencies = 1'000'000; // stored of one drive
+constexpr double leave_duration = 1;             // s in which it announces that it leaves
 
 std::string reason_of(const std::exception_ptr& failure) {
     try {
@@ -31,13 +41,43 @@ std::string reason_of(const std::exception_ptr& failure) {
     }
 }
 
-// By each interface at its address there, so that nodes on that network can reach this one.
-std::vector<std::string> listen_at(const cles::multicast_options& group) {
+// The IPv4 address of an interface of this host; 127.0.0.1 if it is loopback, or has none.
+std::string own_address(const std::string& interface_name) {
+    ifaddrs* first = nullptr;
+    const bool told = ::getifaddrs(&first) == 0;
+    const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> all{first, &::freeifaddrs};
+    for (const auto* each = told ? first : nullptr; each != nullptr; each = each->ifa_next) {
+        std::array<char, INET_ADDRSTRLEN> text{};
+        if (interface_name == each->ifa_name && (each->ifa_flags & IFF_LOOPBACK) == 0 && each->ifa_addr != nullptr &&
+            each->ifa_addr->sa_family == AF_INET) {
+            const auto* at = reinterpret_cast<const sockaddr_in*>(each->ifa_addr);
+            ::inet_ntop(AF_INET, &at->sin_addr, text.data(), text.size());
+            return text.data();
+        }
+    }
+    return "127.0.0.1";
+}
+
+// Its address on each interface, so that nodes on that network can reach it.
+std::vector<std::string> listen_urls(const cles::multicast_options& group) {
     std::vector<std::string> urls;
     for (const auto& interface : cles::interfaces_of(group)) {
         urls.push_back("tcp://" + own_address(interface) + ":0");
     }
     return urls;
+}
+
+/// The last vehicle of a platoon: the one that no other follows; of several, the rearmost.
+std::string last_vehicle(const std::map<std::string, state>& heard) {
+    std::string last;
+    for (const auto& [name, at] : heard) {
+        const bool followed = std::any_of(heard.begin(), heard.end(),
+                                          [&name = name](const auto& other) { return other.second.ahead == name; });
+        if (!followed && (last.empty() || at.x < heard.at(last).x)) {
+            last = name;
+        }
+    }
+    return last;
 }
 
 } // namespace
@@ -46,18 +86,18 @@ std::int64_t monotonic_ns() { return std::chrono::nanoseconds{steady::now().time
 
 vehicle_node::vehicle_node(vehicle_options options)
     : options_(std::move(options)), service_(io_, {.name = options_.setup.name,
-                                                   .listen = listen_at(options_.group),
+                                                   .listen = listen_urls(options_.group),
                                                    .insecure = options_.insecure,
                                                    .multicast = options_.group}),
       signals_(io_, SIGTERM, SIGINT), radio_(options_.loss, options_.delay, options_.seed) {
     report_.vehicle = options_.setup.name;
-    service_.on_push("join", [this](const applicant& who) { be_followed(who); },
+    service_.on_push("join", [this](const join_request& who) { accept_follower(who); },
                      {.description = "Follow this vehicle, the last one", .parameters = {}});
     service_.on_push("leave",
                      [this] {
                          if (driver_ && !left_at_) {
                              driver_->leave();
-                             left_at_ = now() + leaves_for;
+                             left_at_ = now() + leave_duration;
                          }
                      },
                      {.description = "Leave the platoon", .parameters = {}, .idempotent = true});
@@ -111,11 +151,79 @@ void vehicle_node::note(double at, const std::string& mode, const std::string& w
     report_.events.push_back({at, report_.vehicle, mode, why});
 }
 
+void vehicle_node::accept_follower(const join_request& who) {
+    if (!driver_ || left_at_) {
+        throw cles::error(cles::errc::busy, report_.vehicle + " is about to leave, or has not started yet");
+    }
+    if (!follower_.empty() && follower_ != who.name && now() < followed_at_ + join_interval) {
+        throw cles::error(cles::errc::busy, follower_ + " is joining behind " + report_.vehicle);
+    }
+    follower_ = who.name;
+    followed_at_ = now();
+}
+
+asio::awaitable<std::map<std::string, state>> vehicle_node::listen() {
+    std::map<std::string, state> heard;
+    auto feed = co_await service_.async_bind<state>("all:state");
+    asio::steady_timer enough{io_, 300ms + std::chrono::milliseconds{static_cast<int>(3000 / options_.setup.hz)}};
+    enough.async_wait([&feed](boost::system::error_code failed) {
+        if (!failed) {
+            feed.close();
+        }
+    });
+    try {
+        for (;;) {
+            const auto item = co_await feed.async_next();
+            if (item.has_value()) {
+                heard[item.publisher] = item.value;
+            }
+        }
+    } catch (const cles::error& e) {
+        if (e.code() != cles::errc::cancelled) {
+            throw;
+        }
+    }
+    co_return heard;
+}
+
+asio::awaitable<void> vehicle_node::join() {
+    const join_request self{options_.setup.name};
+    for (const double until = now() + join_timeout;;) {
+        const auto heard = co_await listen();
+        if (heard.empty()) {
+            throw cles::error(cles::errc::no_target, "there is no platoon: no vehicle was found in the group " +
+                                                         options_.group.group + ":" +
+                                                         std::to_string(options_.group.port));
+        }
+        if (heard.contains(self.name)) {
+            throw cles::error(cles::errc::invalid_name, "a vehicle named " + self.name + " is already on the road");
+        }
+        const auto last = last_vehicle(heard);
+        std::optional<cles::error> refused;
+        try {
+            co_await service_.async_push(last + ":join", self);
+        } catch (const cles::error& e) {
+            refused = e;
+        }
+        if (!refused) {
+            auto setup = options_.setup;
+            const auto& at = heard.at(last);
+            setup.ahead = last;
+            setup.start = {at.x - approach_distance, at.v, 0};
+            begin(setup);
+            co_return;
+        }
+        if (now() >= until) {
+            throw cles::error(refused->code(), refused->message());
+        }
+    }
+}
+
 asio::awaitable<void> vehicle_node::drive() {
     const double hz = options_.setup.hz;
     const auto decisions = std::int64_t{decisions_per_update(hz)};
     const double pace = 1 / (hz * static_cast<double>(decisions));
-    const double first = turn_of(options_.turn, options_.turns, hz);
+    const double first = send_offset(options_.turn, options_.turns, hz);
     asio::steady_timer timer{io_};
     for (auto count = static_cast<std::int64_t>(std::ceil((now() - first) / pace)); !left_at_ || now() < *left_at_;
          ++count) {
@@ -125,7 +233,7 @@ asio::awaitable<void> vehicle_node::drive() {
         co_await timer.async_wait(asio::use_awaitable);
         driver_->step(at);
         if (count % decisions == 0) {
-            tell();
+            publish_state();
         }
         if (options_.seconds > 0 && at >= options_.seconds) {
             break;
@@ -133,17 +241,17 @@ asio::awaitable<void> vehicle_node::drive() {
     }
 }
 
-void vehicle_node::tell() {
+void vehicle_node::publish_state() {
     auto told = driver_->report();
     told.sent_ns = monotonic_ns();
     service_.update("state", told);
     ++report_.sent;
-    for (const auto& whom : driver_->wanted()) {
-        if (bound_.insert(whom).second) {
-            asio::co_spawn(io_, hear(whom), [this, whom](const std::exception_ptr& failure) {
-                bound_.erase(whom); // and is tried again with the next update, where it is still wanted
-                const auto why = failure ? whom + " cannot be heard: " + reason_of(failure) : "";
-                if (failure && unheard_.insert(why).second) {
+    for (const auto& name : driver_->needed()) {
+        if (bound_.insert(name).second) {
+            asio::co_spawn(io_, hear(name), [this, name](const std::exception_ptr& failure) {
+                bound_.erase(name); // the next update retries it, if it is still needed
+                const auto why = failure ? name + " cannot be received: " + reason_of(failure) : "";
+                if (failure && reported_.insert(why).second) {
                     note(now(), "unheard", why);
                 }
             });
@@ -151,13 +259,13 @@ void vehicle_node::tell() {
     }
 }
 
-asio::awaitable<void> vehicle_node::hear(std::string whom) {
-    auto feed = co_await service_.async_bind<state>(whom + ":state", cles::bind_options{}.multicast());
-    bool first = true; // which may be an older one, repeated for us
-    while (driver_->wants(whom)) {
+asio::awaitable<void> vehicle_node::hear(std::string name) {
+    auto feed = co_await service_.async_bind<state>(name + ":state", cles::bind_options{}.multicast());
+    bool first = true; // may be an older one, repeated for this binder
+    while (driver_->needs(name)) {
         const auto item = co_await feed.async_next();
         if (item.has_value()) {
-            take(whom, item.value, !first);
+            receive(name, item.value, !first);
             first = false;
         } else if (item.kind == cles::feed_event::gap) {
             report_.missed += item.missed;
@@ -165,11 +273,11 @@ asio::awaitable<void> vehicle_node::hear(std::string whom) {
     }
 }
 
-void vehicle_node::take(const std::string& from, const state& heard, bool timely) {
-    const bool counts = timely && heard.t >= 0; // of the drive: they hear each other before it begins
+void vehicle_node::receive(const std::string& from, const state& heard, bool timely) {
+    const bool counts = timely && heard.t >= 0; // only during the drive: updates are exchanged before it starts too
     if (counts) {
         ++report_.received;
-        if (report_.latency_us.size() < most_latencies) {
+        if (report_.latency_us.size() < max_latencies) {
             report_.latency_us.push_back(static_cast<double>(monotonic_ns() - heard.sent_ns) * 1e-3);
         }
     }
@@ -177,13 +285,13 @@ void vehicle_node::take(const std::string& from, const state& heard, bool timely
     if (!later) {
         report_.lost += counts ? 1 : 0;
     } else if (*later == 0) {
-        driver_->take(from, heard, now());
+        driver_->receive(from, heard, now());
     } else {
         auto timer = std::make_shared<asio::steady_timer>(
             io_, std::chrono::duration_cast<steady::duration>(std::chrono::duration<double>{*later}));
         timer->async_wait([this, timer, from, heard](boost::system::error_code failed) {
             if (!failed) {
-                driver_->take(from, heard, now());
+                driver_->receive(from, heard, now());
             }
         });
     }

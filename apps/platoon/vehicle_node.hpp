@@ -5,7 +5,7 @@
 
 #include "driver.hpp"
 #include "impairment.hpp"
-#include "report.hpp"
+#include "recording.hpp"
 
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/io_context.hpp>
@@ -22,44 +22,44 @@ namespace platoon {
 
 struct vehicle_options {
     driver_setup setup{};
-    bool joins = false;              ///< at the end of the platoon that it receives, instead of where `setup` says
-    std::size_t turn = 0, turns = 1; ///< its part of each period, in which it sends
+    bool joins = false; ///< at the end of the platoon that it receives, instead of at the position in `setup`
+    std::size_t turn = 0, turns = 1; ///< the slot of each period in which it sends
     std::int64_t start_ns = 0;       ///< the time 0 of the drive, by CLOCK_MONOTONIC
-    double seconds = 0;              ///< of the drive; 0: until it is told to end
+    double seconds = 0;              ///< of the drive; 0: until it is stopped
     double loss = 0, delay = 0;
     std::uint64_t seed = 1;
     cles::multicast_options group{};
-    bool insecure = false; ///< on a group beyond this host, where nobody proves who he is
+    bool insecure = false; ///< allow a group beyond this host, where nodes are not authenticated
 };
 
-/// Who wants to join.
-struct applicant {
+/// The body of PUSH `join`.
+struct join_request {
     std::string name{};
 };
-BOOST_DESCRIBE_STRUCT(applicant, (), (name))
+BOOST_DESCRIBE_STRUCT(join_request, (), (name))
 
 /// A vehicle on the road: a driver, and the service that connects it with the others. It is bound by multicast
-/// to the leader and to the one ahead, and tells its own state `hz` times a second.
+/// to the leader and to the one ahead, and publishes its own state `hz` times per second.
 ///
-/// Tasks: BIND `state`; PUSH `join` asks it to be followed, PUSH `leave` to leave.
+/// Tasks: BIND `state`; PUSH `join` announces a follower, PUSH `leave` makes it leave.
 class vehicle_node {
   public:
     explicit vehicle_node(vehicle_options options);
 
-    /// Drives until it has left, is told to end (SIGTERM, SIGINT), or its time is over.
-    /// \throws cles::error `no_target` where there is nobody to join
+    /// Drives until it has left, is stopped (SIGTERM, SIGINT), or its time is over.
+    /// \throws cles::error `no_target` if there is no platoon to join
     vehicle_report run();
 
   private:
     boost::asio::awaitable<void> drive();
     boost::asio::awaitable<void> join();
     boost::asio::awaitable<std::map<std::string, state>> listen();
-    boost::asio::awaitable<void> hear(std::string whom);
-    void take(const std::string& from, const state& heard, bool timely);
-    void be_followed(const applicant& who);
+    boost::asio::awaitable<void> hear(std::string name);
+    void receive(const std::string& from, const state& heard, bool timely);
+    void accept_follower(const join_request& who);
     void begin(const driver_setup& setup);
     void note(double at, const std::string& mode, const std::string& why);
-    void tell();
+    void publish_state();
     void end();
     [[nodiscard]] double now() const;
 
@@ -70,15 +70,15 @@ class vehicle_node {
     impairment radio_;
     std::optional<driver> driver_;
     std::set<std::string> bound_;
-    std::set<std::string> unheard_; ///< why some could not be heard, each told once
-    std::string follower_;          ///< who has joined behind, at `followed_at_`
+    std::set<std::string> reported_; ///< why updates of some could not be received, each reported once
+    std::string follower_;           ///< the vehicle that joined behind, at `followed_at_`
     double followed_at_ = 0;
     std::optional<double> left_at_; ///< when it will have left
     std::exception_ptr failure_;
     vehicle_report report_;
 };
 
-/// CLOCK_MONOTONIC, which all processes of a machine share.
+/// CLOCK_MONOTONIC, which all processes of a host share.
 std::int64_t monotonic_ns();
 
 } // namespace platoon

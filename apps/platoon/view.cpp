@@ -22,11 +22,11 @@ std::vector<row> rows_of(const logbook& book, const std::vector<std::string>& ve
     std::vector<row> rows;
     for (const auto& name : vehicles) {
         const auto* last = book.last(name);
-        const auto where = book.where(name, t);
+        const auto where = book.position(name, t);
         if (last == nullptr || !where) {
             continue;
         }
-        const bool silent = book.has_gone(name) || t - last->t > silent_after;
+        const bool silent = book.has_ended(name) || t - last->t > silent_after;
         rows.push_back({name, silent ? "SILENT" : boost::describe::enum_to_string(last->mode, ""), *where});
         if (rows.back().mode == "fallback") {
             rows.back().mode = "FALLBACK";
@@ -71,7 +71,7 @@ std::string line_of(const logbook& book, const std::vector<std::string>& vehicle
                     double silent_after) {
     const auto rows = rows_of(book, vehicles, t, silent_after);
     if (rows.empty()) {
-        return "nobody is heard\n";
+        return "no vehicle is received\n";
     }
     double error = 0;
     double least = INFINITY;

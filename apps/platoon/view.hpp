@@ -8,8 +8,8 @@
 
 namespace platoon {
 
-/// The platoon at a glance, for a terminal: a line per vehicle, in the order in which they drive. A vehicle is silent
-/// when nothing was heard of it for so many seconds.
+/// An overview of the platoon for a terminal: a line per vehicle, in driving order. A vehicle is silent if no update
+/// was received for `silent_after` seconds.
 std::string table_of(const logbook& book, const std::vector<std::string>& vehicles, double t, double spacing,
                      double silent_after);
 /// The same in one line.

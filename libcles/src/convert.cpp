@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/convert.hpp>
 
+#include <bitset>
 #include <cstddef>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -58,6 +60,96 @@ void throw_broken_text(const json_writer& w) {
 
 bool fail_count(json_reader& r, std::string_view which, std::size_t wanted) {
     return r.fail(std::string{which} + " than " + std::to_string(wanted) + " elements");
+}
+
+namespace {
+
+std::size_t find_field(std::span<const field> fields, std::string_view name) noexcept {
+    std::size_t i = 0;
+    while (i < fields.size() && fields[i].name != name) {
+        ++i;
+    }
+    return i;
+}
+
+// Which of the fields have been read; without allocation for as many as most structs have.
+class seen_fields {
+  public:
+    explicit seen_fields(std::size_t count) : more_(count > few ? count - few : 0) {}
+
+    void add(std::size_t i) {
+        if (i < few) {
+            first_.set(i);
+        } else {
+            more_[i - few] = true;
+        }
+    }
+    [[nodiscard]] bool contains(std::size_t i) const { return i < few ? first_.test(i) : more_[i - few]; }
+
+  private:
+    static constexpr std::size_t few = 64;
+    std::bitset<few> first_;
+    std::vector<bool> more_;
+};
+
+} // namespace
+
+bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
+    seen_fields seen{fields.size()};
+    std::size_t next = 0; // members mostly come in their order
+    std::string_view key;
+    if (!r.begin_object()) {
+        return false;
+    }
+    for (;;) {
+        if (next < fields.size() && r.next_key_is(fields[next].name)) {
+            // as expected
+        } else if (!r.next_key(key)) {
+            break;
+        } else {
+            next = find_field(fields, key);
+        }
+        if (next == fields.size()) {
+            if (!r.skip()) {
+                return false;
+            }
+            continue;
+        }
+        if (!fields[next].read(r, object)) {
+            r.inside_member(fields[next].name);
+            return false;
+        }
+        seen.add(next++);
+    }
+    if (!r.ok()) {
+        return false;
+    }
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+        if (fields[i].required && !seen.contains(i)) {
+            r.fail("is missing");
+            r.inside_member(fields[i].name);
+            return false;
+        }
+    }
+    return true;
+}
+
+bool read_choice(json_reader& r, std::span<const std::string_view> names, std::size_t& index) {
+    std::string_view name;
+    if (!r.read(name)) {
+        return false;
+    }
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        if (names[i] == name) {
+            index = i;
+            return true;
+        }
+    }
+    std::string choices;
+    for (const auto choice : names) {
+        choices.append(choices.empty() ? "" : ", ").append(choice);
+    }
+    return r.fail("expected one of " + choices);
 }
 
 void write_text(json_writer& w, std::string_view json) {

@@ -11,8 +11,8 @@ namespace cles {
 
 gossip_options gossip(std::vector<std::string> seeds) {
     static constexpr detail::gossip_part part{
-        [](detail::engine& engine, std::uint32_t seed) -> std::unique_ptr<detail::gossip_host> {
-            return std::make_unique<shell::gossiper>(engine, seed);
+        [](shell::local_node& node, std::uint32_t seed) -> std::unique_ptr<detail::gossip_host> {
+            return std::make_unique<shell::gossiper>(node, seed);
         }};
     return {.seeds = std::move(seeds), .part = &part};
 }

@@ -113,7 +113,7 @@ std::vector<std::string> interfaces_of(const multicast_options& where) {
     }
     std::vector<std::string> names;
     try {
-        for (auto& each : transport::automatic(transport::interfaces_of_host())) {
+        for (auto& each : core::automatic(transport::interfaces_of_host())) {
             if (names.size() < multicast_options::most_interfaces) {
                 names.push_back(std::move(each.name));
             }

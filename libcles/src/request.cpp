@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/request.hpp>
 
+#include <charconv>
+#include <system_error>
 #include <vector>
 
 namespace cles {
@@ -44,6 +46,27 @@ std::shared_ptr<const request_data> own(const request_data& data) {
     copy->data.peer = &copy->peer;
     return {copy, &copy->data};
 }
+
+template <class T>
+bool read_number(std::string_view text, T& number) noexcept {
+    const auto* const end = text.data() + text.size();
+    const auto [stop, code] = std::from_chars(text.data(), end, number);
+    return code == std::errc{} && stop == end;
+}
+template bool read_number(std::string_view, char&) noexcept;
+template bool read_number(std::string_view, signed char&) noexcept;
+template bool read_number(std::string_view, unsigned char&) noexcept;
+template bool read_number(std::string_view, short&) noexcept;
+template bool read_number(std::string_view, unsigned short&) noexcept;
+template bool read_number(std::string_view, int&) noexcept;
+template bool read_number(std::string_view, unsigned&) noexcept;
+template bool read_number(std::string_view, long&) noexcept;
+template bool read_number(std::string_view, unsigned long&) noexcept;
+template bool read_number(std::string_view, long long&) noexcept;
+template bool read_number(std::string_view, unsigned long long&) noexcept;
+template bool read_number(std::string_view, float&) noexcept;
+template bool read_number(std::string_view, double&) noexcept;
+template bool read_number(std::string_view, long double&) noexcept;
 
 } // namespace detail
 

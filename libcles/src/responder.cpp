@@ -3,11 +3,20 @@
 
 #include "core/handler_failure.hpp"
 
-namespace cles::detail {
+#include <boost/asio/any_io_executor.hpp>
+
+namespace cles {
+namespace detail {
+
+boost::asio::any_io_executor call_control::executor() const { throw error(errc::failed, "a plugin has no executor"); }
 
 void fail_with(call_control& call, const std::exception_ptr& thrown) {
     const auto why = core::describe(thrown);
     call.fail(why.code, why.message);
 }
 
-} // namespace cles::detail
+} // namespace detail
+
+boost::asio::any_io_executor responder::get_executor() const { return call_->executor(); }
+
+} // namespace cles

@@ -3,21 +3,20 @@
 
 #include <cles/routing.hpp>
 
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 #include "shell/routing_part.hpp"
 #include "shell/ways.hpp"
 
 #include <memory>
-#include <random>
 
 namespace cles {
 namespace {
 
 class host final : public detail::routing_host {
   public:
-    explicit host(detail::engine& engine)
-        : ways_(engine), routing_(std::make_shared<core::routing>(engine.shared_node(), ways_, std::random_device{}(),
-                                                                  [&engine] { engine.turns().ask(); })) {}
+    explicit host(shell::local_node& node)
+        : ways_(node), routing_(std::make_shared<core::routing>(node.shared_node(), ways_, node.environment().random(),
+                                                                [&node] { node.turns().ask(); })) {}
 
     void hold() override { routing_->hold(); }
     void release(time_point now) override { routing_->release(now); }
@@ -39,7 +38,7 @@ class host final : public detail::routing_host {
 
 const detail::routing_part* routing() noexcept {
     static constexpr detail::routing_part part{
-        [](detail::engine& engine) -> std::unique_ptr<detail::routing_host> { return std::make_unique<host>(engine); }};
+        [](shell::local_node& node) -> std::unique_ptr<detail::routing_host> { return std::make_unique<host>(node); }};
     return &part;
 }
 

@@ -2,8 +2,8 @@
 #include <cles/error.hpp>
 #include <cles/run.hpp>
 
+#include "asio/real_time.hpp"
 #include "core/spin_budget.hpp"
-#include "shell/real_time.hpp"
 
 #include <boost/asio/io_context.hpp>
 
@@ -59,9 +59,9 @@ void check(const run_options& options) {
 std::size_t run(boost::asio::io_context& io, const run_options& options) {
     check(options);
     if (options.lock_memory) {
-        shell::lock_memory();
+        asio_port::lock_memory();
     }
-    std::optional<shell::fifo_scheduling> scheduling;
+    std::optional<asio_port::fifo_scheduling> scheduling;
     if (options.fifo_priority != 0) {
         scheduling.emplace(options.fifo_priority);
     }

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
+#include "api/engine.hpp"
+#include "api/feed_handle.hpp"
+#include "api/group_feed_handle.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/message.hpp"
 #include "shell/command.hpp"
-#include "shell/engine.hpp"
-#include "shell/feed_handle.hpp"
-#include "shell/group_feed_handle.hpp"
 #include "shell/option_checks.hpp"
 
+#include <boost/asio/dispatch.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/strand.hpp>
@@ -69,6 +70,37 @@ const strand* strand_of(bool pooled, const asio::any_io_executor& executor) noex
 }
 
 } // namespace
+
+namespace detail {
+
+void withdrawal::operator()() const {
+    if (const auto alive = service.lock()) {
+        alive->cancel(ticket);
+    }
+}
+
+void remote_withdrawal::operator()() const {
+    asio::dispatch(executor, [weak = service, begun = ticket] {
+        if (const auto alive = weak.lock(); alive && *begun != 0) {
+            alive->cancel(*begun);
+        }
+    });
+}
+
+void bind_withdrawal::operator()() const {
+    const auto withdraw = [made = feed] {
+        if (const auto alive = made->lock()) {
+            alive->cancel_start();
+        }
+    };
+    if (executor) {
+        asio::dispatch(executor, withdraw);
+    } else {
+        withdraw();
+    }
+}
+
+} // namespace detail
 
 service::service(asio::any_io_executor executor, service_options options)
     : pooled_(executor.target<asio::thread_pool::executor_type>() != nullptr) {
@@ -155,7 +187,7 @@ std::uint64_t service::close(detail::engine& inside, std::chrono::milliseconds l
 
 std::uint64_t service::send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
                             detail::pending_ptr operation) {
-    return inside.send(request, options, std::move(operation));
+    return inside.send(request.verb, request.noun, request.body, options, std::move(operation));
 }
 
 std::uint64_t service::send_command(detail::engine& inside, std::string_view command, const call_options& options,
@@ -163,29 +195,78 @@ std::uint64_t service::send_command(detail::engine& inside, std::string_view com
     return shell::send_command(inside, command, options, std::move(operation));
 }
 
-void service::cancel(detail::engine& inside, std::uint64_t ticket) { inside.cancel(ticket); }
+void service::send_elsewhere(const detail::remote_withdrawal& withdraw, const detail::outgoing& request,
+                             const call_options& options, detail::pending_ptr operation) {
+    asio::dispatch(get_executor(),
+                   [inside = engine_, ticket = withdraw.ticket, verb = request.verb, noun = std::string{request.noun},
+                    body = std::string{request.body}, options, operation = std::move(operation)]() mutable {
+                       *ticket = inside->send(verb, noun, body, options, std::move(operation));
+                   });
+}
+
+void service::send_command_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& command,
+                                     const call_options& options, detail::pending_ptr operation) {
+    asio::dispatch(get_executor(), [inside = engine_, ticket = withdraw.ticket, command, options,
+                                    operation = std::move(operation)]() mutable {
+        *ticket = shell::send_command(*inside, command, options, std::move(operation));
+    });
+}
+
+void service::publish_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& noun,
+                                const std::string& json, detail::pending_ptr operation) {
+    asio::dispatch(get_executor(), [inside = engine_, ticket = withdraw.ticket, noun, json,
+                                    operation = std::move(operation)]() mutable {
+        *ticket = inside->publish_when_room(noun, json, std::move(operation));
+    });
+}
+
+void service::close_elsewhere(const detail::remote_withdrawal& withdraw, std::chrono::milliseconds limit,
+                              detail::pending_ptr operation) {
+    asio::dispatch(get_executor(),
+                   [inside = engine_, ticket = withdraw.ticket, limit, operation = std::move(operation)]() mutable {
+                       *ticket = inside->close(limit, std::move(operation));
+                   });
+}
+
+void service::start_bind(const detail::bind_withdrawal& withdraw, detail::binding_ptr operation,
+                         const std::string& noun, const bind_options& options) {
+    constexpr auto start = [](const std::shared_ptr<detail::engine>& inside, std::weak_ptr<detail::feed_control>& made,
+                              detail::binding_ptr bound, const std::string& target, const bind_options& chosen) {
+        const auto control = make_feed(inside, target, chosen);
+        made = control;
+        bound->make_of(control);
+        control->start(detail::pending_ptr{bound.release()});
+    };
+    if (!withdraw.executor) {
+        start(engine_, *withdraw.feed, std::move(operation), noun, options);
+        return;
+    }
+    asio::dispatch(withdraw.executor, [start, inside = engine_, made = withdraw.feed, noun, options,
+                                       operation = std::move(operation)]() mutable {
+        start(inside, *made, std::move(operation), noun, options);
+    });
+}
 
 std::shared_ptr<detail::feed_control> service::make_feed(const std::shared_ptr<detail::engine>& inside,
                                                          std::string_view noun, const bind_options& options) {
     protocol::noun_view parts;
     std::string why;
     if (!protocol::parse_noun(noun, parts, why)) {
-        return shell::make_refused_feed(inside, errc::bad_request, why);
+        return api::make_refused_feed(inside, errc::bad_request, why);
     }
     if (auto wrong = shell::objection_to(options); !wrong.empty()) {
-        return shell::make_refused_feed(inside, errc::invalid_option, std::move(wrong));
+        return api::make_refused_feed(inside, errc::invalid_option, std::move(wrong));
     }
     if (inside->stopped()) {
-        return shell::make_refused_feed(inside, errc::stopped, "the service has been stopped");
+        return api::make_refused_feed(inside, errc::stopped, "the service has been stopped");
     }
     std::string scratch;
     const std::string path{protocol::canonical_path(parts, scratch)};
     const bool routes = inside->node().way != nullptr; // then `all` is bound by links, through this service itself
     if (options.multicast_ || (parts.target == "all" && options.at_.empty() && !routes)) {
-        return shell::make_group_feed(inside, parts, path, options);
+        return api::make_group_feed(inside, parts, path, options);
     }
-    auto made =
-        std::make_shared<shell::feed_handle>(inside, std::string{parts.target}, path, options.every_.count() > 0);
+    auto made = std::make_shared<api::feed_handle>(inside, std::string{parts.target}, path, options.every_.count() > 0);
     inside->feeds().enter(made->machine(), made,
                           {.noun = std::string{noun},
                            .at = options.at_,

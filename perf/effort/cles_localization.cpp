@@ -37,7 +37,7 @@ int main(int argc, char* argv[]) try {
     }
     const auto how = cles::call_options{}.at("tcp://"s + argv[2]).deadline(1s);
     for (std::string line; std::getline(std::cin, line);) {
-        io.poll(); // a link that was lost meanwhile is noticed, and made anew
+        io.poll(); // notices that a link was lost, and reconnects
         const auto at = cles::from_json<localization>(node.request("PULL self:localization", how));
         std::printf("%.0f %.6f %.6f %.2f %.2f\n", at.utc, at.lat, at.lon, at.velocity, at.acceleration);
         std::fflush(stdout);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Counts the source lines of the two programs of this folder that do the same (the paper's section 4.1).
+"""Counts the source lines of the two programs in this folder that do the same (the paper's section 4.1).
 
     count_lines.py [--json] [FILE...]
 
@@ -18,13 +18,13 @@ from pathlib import Path
 FOLDER = Path(__file__).parent
 PROGRAMS = ("cles_localization.cpp", "icd_localization.cpp")
 
-# Comments, and what may hold the signs of one without being one.
+# Comments, and literals that may look like comments.
 TOKEN = re.compile(r"""(?P<comment>//[^\n]*|/\*.*?\*/)|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])+'""", re.DOTALL)
 INCLUDE = re.compile(r"\s*#\s*include\b")
 
 
 def without_comments(text):
-    """The same text with as many lines."""
+    """The text without comments, with the same number of lines."""
     return TOKEN.sub(lambda m: "\n" * m[0].count("\n") if m["comment"] else m[0], text)
 
 

@@ -118,7 +118,7 @@ void tune(const descriptor& socket) {
     set_option(socket, SOL_SOCKET, SO_KEEPALIVE);
 }
 
-// The other end has closed the connection, and nothing has come of what was waited for.
+// The other end has closed the connection before the first byte.
 struct lost : std::runtime_error {
     lost() : std::runtime_error("the connection was lost") {}
 };
@@ -184,7 +184,7 @@ void serve(const descriptor& client) try {
         send_packet(client, pack(measure()));
     }
 } catch (const std::exception&) {
-    return; // that client is gone
+    return; // the client has disconnected
 }
 
 [[noreturn]] void run_server(std::uint16_t port) {
@@ -195,7 +195,7 @@ void serve(const descriptor& client) try {
     address.sin_port = htons(port);
     socklen_t length = sizeof address;
     auto* generic = reinterpret_cast<sockaddr*>(&address);
-    set_option(listener, SOL_SOCKET, SO_REUSEADDR); // or it could not be restarted at once
+    set_option(listener, SOL_SOCKET, SO_REUSEADDR); // otherwise it cannot be restarted at once
     checked(::bind(listener.get(), generic, length), "port " + std::to_string(port));
     checked(::listen(listener.get(), SOMAXCONN), "listen");
     checked(::getsockname(listener.get(), generic, &length), "getsockname");
@@ -229,7 +229,7 @@ class client {
             try {
                 return exchange(until);
             } catch (const lost&) {
-                socket_ = descriptor(); // the server may have been restarted: once more
+                socket_ = descriptor(); // the server may have been restarted: tries once more
             }
         }
         socket_ = connect(until);
@@ -243,7 +243,7 @@ class client {
         const auto bytes = std::as_writable_bytes(std::span{&reply, 1});
         receive(socket_, bytes.first(sizeof reply.head), until);
         if (reply.head != reply_head) {
-            throw std::runtime_error("the server sent what is no reply");
+            throw std::runtime_error("the server sent something that is not a reply");
         }
         receive(socket_, bytes.subspan(sizeof reply.head), until);
         return unpack(reply);
@@ -285,7 +285,7 @@ std::uint16_t to_port(std::string_view text) {
     std::uint16_t port = 0;
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
     if (error != std::errc{} || end != text.data() + text.size()) {
-        throw std::invalid_argument("'" + std::string{text} + "' is no port");
+        throw std::invalid_argument("'" + std::string{text} + "' is not a port");
     }
     return port;
 }

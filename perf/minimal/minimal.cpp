@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-// The smallest useful service: one task, typed, on one thread. What a weak node has to carry is measured by it.
+// The smallest useful service: one task, typed, on one thread. It shows what a small device needs for a node.
 //
-//     cles_minimal [URL]      listens on tcp://127.0.0.1:25370 where no URL is given
+//     cles_minimal [URL]      listens on tcp://127.0.0.1:25370 without a URL
 #include <cles/service.hpp>
 
 #include <boost/asio/io_context.hpp>

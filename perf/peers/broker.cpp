@@ -2,8 +2,8 @@
 #include "broker.hpp"
 
 #include "peer.hpp"
-#include "perf/descriptor.hpp"
-#include "perf/pinning.hpp"
+#include "perf/support/descriptor.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <cstdlib>
 #include <stdexcept>
@@ -20,7 +20,7 @@ namespace {
 std::filesystem::path made_folder() {
     auto name = (std::filesystem::temp_directory_path() / "cles-peer-XXXXXX").string();
     if (::mkdtemp(name.data()) == nullptr) {
-        throw std::runtime_error("no folder for the broker");
+        throw std::runtime_error("cannot create a folder for the broker");
     }
     return name;
 }
@@ -28,7 +28,7 @@ std::filesystem::path made_folder() {
 bool is_program(const std::string& path) { return ::access(path.c_str(), X_OK) == 0; }
 
 [[noreturn]] void become(std::vector<std::string> words) {
-    // What it says would stand between the figures.
+    // Its output would be mixed with the figures.
     const int nothing = ::open("/dev/null", O_RDWR | O_CLOEXEC);
     ::dup2(nothing, STDOUT_FILENO);
     ::dup2(nothing, STDERR_FILENO);

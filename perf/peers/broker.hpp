@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "perf/child_process.hpp"
+#include "perf/support/child_process.hpp"
 
 #include <cstdint>
 #include <filesystem>
@@ -11,14 +11,14 @@
 
 namespace cles::perf::peers {
 
-/// A program between the two ends, from its installed package, on the core of the server and with a folder of its own.
+/// A program between the two ends, as its package installed it, on the core of the server, with a folder of its own.
 /// It ends with this object.
 class broker {
   public:
-    /// Its program and arguments, where its folder is known; called in its process.
+    /// Returns its program and arguments, given its folder. Called in its process.
     using command = std::function<std::vector<std::string>(const std::filesystem::path& folder)>;
 
-    /// \throws not_offered where there is no such program
+    /// \throws not_offered if the program is not installed
     explicit broker(const command& with);
     broker(const broker&) = delete;
     broker& operator=(const broker&) = delete;
@@ -32,7 +32,7 @@ class broker {
     child_process process_;
 };
 
-/// A port of the loopback interface that is free now, for programs that do not say which one they were given.
+/// A port of the loopback interface that is free now, for programs that do not report the one that the system chose.
 std::uint16_t free_port(int kind_of_socket);
 
 } // namespace cles::perf::peers

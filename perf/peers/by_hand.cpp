@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
-// The hand-written exchange, against which all others are held: packed structs on blocking sockets.
+// The hand-written exchange, with which all others are compared: packed structs on blocking sockets.
 #include "packets.hpp"
 #include "peer.hpp"
-#include "perf/bare_socket.hpp"
-#include "perf/icd_binders.hpp"
-#include "perf/icd_exchange.hpp"
-#include "perf/icd_publisher.hpp"
+#include "perf/baseline/binders.hpp"
+#include "perf/baseline/exchange.hpp"
+#include "perf/baseline/publisher.hpp"
+#include "perf/support/bare_socket.hpp"
 
 #include <array>
 #include <optional>
@@ -15,7 +15,7 @@
 namespace cles::perf::peers {
 namespace {
 
-/// The task is no part of `icd::server`.
+/// `icd::server` does not have the task.
 void serve_tasks(const listener& at) {
     const auto client = accept_from(at);
     answering node;
@@ -125,7 +125,7 @@ class by_hand final : public peer {
   private:
     void refuse_multicast() const {
         if (group_) {
-            throw not_offered("by multicast it publishes only");
+            throw not_offered("multicast is for publications only");
         }
     }
 

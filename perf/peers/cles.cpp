@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
-// CLES itself: PULL, DELEGATE and UPDATE as a user writes them, in processes that sleep while nothing comes.
+// CLES itself: PULL, DELEGATE and UPDATE as a user writes them, in processes that sleep while they wait.
 #include <cles/run.hpp>
 #include <cles/service.hpp>
 #include <cles/version.hpp>
 
 #include "peer.hpp"
-#include "perf/delegate_load.hpp"
-#include "perf/fan_out_binders.hpp"
-#include "perf/fan_out_publisher.hpp"
-#include "perf/multicast_socket.hpp"
-#include "perf/pull_exchange.hpp"
+#include "perf/fan_out/fan_out_exchange.hpp"
+#include "perf/jobs/delegate_load.hpp"
+#include "perf/pull/pull_exchange.hpp"
+#include "perf/support/multicast_socket.hpp"
 
 #include <boost/asio/io_context.hpp>
 
@@ -53,7 +52,7 @@ class delegates final : public caller {
 
 class feeds final : public fan_out {
   public:
-    /// Each feed has a service of its own, and so a link: those of one service would share it.
+    /// Each feed has a service of its own, because feeds of one service would share a link.
     feeds(const std::string& where, const multicast_options& multicast, std::size_t count)
         : binding_{.style = handler_style::callback, .multicast = multicast.is_on()} {
         for (std::size_t i = 0; i < count; ++i) {
@@ -89,7 +88,7 @@ class cles_peer final : public peer {
 
     void serve(call what, const announce& tell) override {
         if (multicast_.is_on()) {
-            throw not_offered("what is asked of one node goes by a link, and not by multicast");
+            throw not_offered("requests to one node use a link, not multicast");
         }
         if (what == call::exchange) {
             serve_localization(listen_, {}, tell);

@@ -56,7 +56,7 @@ class context {
     }
     [[nodiscard]] coap_context_t* get() const noexcept { return self_; }
 
-    /// It does not tell the port that it was given, and so is given one.
+    /// libcoap does not report the port that the system chose, so a port is chosen here.
     std::uint16_t listen() {
         for (int attempt = 0; attempt < most_attempts; ++attempt) {
             const auto port = free_port(SOCK_DGRAM);
@@ -65,7 +65,7 @@ class context {
                 return port;
             }
         }
-        throw std::runtime_error("CoAP: no port");
+        throw std::runtime_error("CoAP: cannot find a free port");
     }
     coap_session_t* call(std::uint16_t port) {
         const auto at = loopback(port);
@@ -73,9 +73,9 @@ class context {
         require(made != nullptr, "a session");
         return made;
     }
-    /// Waits for so long at most, and takes what is there.
+    /// Waits no longer than this, and processes what has arrived.
     void turn(std::uint32_t milliseconds) { require(::coap_io_process(self_, milliseconds) >= 0, "the loop"); }
-    /// Takes what is there.
+    /// Processes what has arrived.
     void turn_once() { turn(COAP_IO_NO_WAIT); }
 
     coap_resource_t* add(const char* path, coap_request_t method, coap_method_handler_t handler, void* of) {
@@ -104,7 +104,7 @@ std::span<const std::byte> bytes_of(const coap_pdu_t* message) {
     return {reinterpret_cast<const std::byte*>(data), length};
 }
 
-/// A request for a path, with a token that comes back with the answer.
+/// A request for a path, with a token that the answer repeats.
 coap_pdu_t* request_for(coap_session_t* session, coap_request_t method, const char* path, std::uint64_t token,
                         bool observe = false) {
     auto* const made = ::coap_pdu_init(COAP_MESSAGE_CON, static_cast<coap_pdu_code_t>(method),
@@ -161,7 +161,7 @@ class coap_caller final : public caller {
     using clock = std::chrono::steady_clock;
 
     struct request {
-        std::uint64_t token = 0; ///< of what is awaited; 0: nothing
+        std::uint64_t token = 0; ///< of the pending request; 0: none
         clock::time_point began;
     };
 
@@ -171,7 +171,7 @@ class coap_caller final : public caller {
             const auto place = token % asked_.size();
             auto& asked = asked_[place];
             if (asked.token != token) {
-                return; // answered before
+                return; // already answered
             }
             check_answer(what_, bytes_of(received));
             record_->record(clock::now() - asked.began);
@@ -184,7 +184,7 @@ class coap_caller final : public caller {
         }
     }
 
-    /// The token tells the place, for answers may overtake each other.
+    /// The token identifies the slot, because answers may arrive in any order.
     void send(std::size_t place) {
         --to_ask_;
         const auto token = ++turn_ * asked_.size() + place;
@@ -199,7 +199,7 @@ class coap_caller final : public caller {
     context at_;
     coap_session_t* session_;
     latency_recorder* record_ = nullptr;
-    std::vector<request> asked_; ///< a place for each that may be in flight
+    std::vector<request> asked_; ///< a slot for each that may be in flight
     std::size_t to_ask_ = 0;
     std::uint64_t turn_ = 0;
     std::exception_ptr failure_;
@@ -240,7 +240,7 @@ class coap_subscriptions final : public subscriptions {
     void take(const coap_pdu_t* received) {
         try {
             const auto packet = bytes_of(received);
-            if (!packet.empty()) { // the answer to whoever comes before anything is published
+            if (!packet.empty()) { // the answer before anything is published
                 into_.take(token_of(received), read_update(packet));
             }
         } catch (...) {
@@ -279,7 +279,7 @@ class coap final : public peer {
         auto* const resource = at.add(path_of(call::exchange), COAP_REQUEST_GET, &show, &last);
         ::coap_resource_set_get_observable(resource, 1);
         publish_by_order(std::to_string(at.listen()), tell, [&](const publication& value) {
-            at.turn_once(); // who has come
+            at.turn_once(); // new subscribers
             const auto packet = icd::pack_update(1, value);
             last.assign(packet.begin(), packet.end());
             ::coap_resource_notify_observers(resource, nullptr);

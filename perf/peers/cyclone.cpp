@@ -20,12 +20,12 @@
 namespace cles::perf::peers {
 namespace {
 
-constexpr std::int32_t depth = 1024; // samples that are kept: more than are in flight
+constexpr std::int32_t depth = 1024; // samples that are kept: more than are ever in flight
 constexpr std::size_t taken_at_once = 64;
 constexpr std::chrono::milliseconds between_attempts{10};
 constexpr int most_attempts = 1000;
 
-// Nobody else's domain, and by the tag nobody else's discovery.
+// A domain of its own, and a tag that separates its discovery from others.
 const char* const settings = R"(<CycloneDDS><Domain id="any">
   <General>
     <Interfaces><NetworkInterface name="lo" multicast="true"/></Interfaces>
@@ -81,7 +81,7 @@ class participant {
     dds_qos_t* qos_ = nullptr;
 };
 
-/// Calls with what has come, without a copy of it.
+/// Passes on each sample that has arrived, without a copy.
 template <class Sample, class Take>
 void take_all(dds_entity_t reader, Take&& take) {
     std::array<void*, taken_at_once> loans{};
@@ -123,7 +123,7 @@ void answer_task(dds_entity_t reader, void* of) {
     });
 }
 
-/// Asks again from within the listener, as soon as an answer is there.
+/// Sends the next request in the listener, as soon as an answer has arrived.
 class cyclone_caller final : public caller {
   public:
     cyclone_caller(call what, const std::string& where) : bus_(where) {
@@ -133,7 +133,7 @@ class cyclone_caller final : public caller {
         } else {
             bus_.reader(cles_peers_done_desc, "reply", &take_done, this);
         }
-        // Each side finds the other in its own time: asks until there is an answer.
+        // Discovery takes time on each side: repeats the request until there is an answer.
         for (int attempt = 0; attempt < most_attempts; ++attempt) {
             std::unique_lock lock{guard_};
             write(0);
@@ -156,7 +156,7 @@ class cyclone_caller final : public caller {
         news_.wait(lock, [this] { return record_->full() || is_wrong_; });
         record_ = nullptr;
         if (is_wrong_) {
-            throw std::runtime_error("the values that came are not those that were sent");
+            throw std::runtime_error("the received values are not those that were sent");
         }
     }
 

@@ -7,7 +7,7 @@
 namespace cles::perf::peers {
 namespace {
 
-// The library is not asked for its JSON here: a peer's program is to hold that peer and no other.
+// Does not use CLES for the JSON, so that a peer's program contains only that peer.
 std::string quoted(std::string_view text) {
     std::string made{'"'};
     for (const char each : text) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "footprint.hpp"
+#include "figures.hpp"
 
 #include <algorithm>
 #include <array>
@@ -13,20 +13,20 @@
 namespace cles::perf::peers {
 namespace {
 
-// What every program in C++ has.
-constexpr std::array<std::string_view, 7> everybodys{"libc.",    "libm.",       "libstdc++.", "libgcc_s.",
-                                                     "ld-linux", "libpthread.", "libresolv."};
+// What every C++ program has.
+constexpr std::array<std::string_view, 7> common_libraries{"libc.",    "libm.",       "libstdc++.", "libgcc_s.",
+                                                           "ld-linux", "libpthread.", "libresolv."};
 
 bool is_counted(const std::string& path) {
     const auto name = std::filesystem::path{path}.filename().string();
-    return name.find(".so") != std::string::npos &&
-           std::none_of(everybodys.begin(), everybodys.end(), [&](auto known) { return name.starts_with(known); });
+    return name.find(".so") != std::string::npos && std::none_of(common_libraries.begin(), common_libraries.end(),
+                                                                 [&](auto known) { return name.starts_with(known); });
 }
 
 std::ifstream open_of(pid_t process, const char* file) {
     std::ifstream opened{"/proc/" + std::to_string(process) + '/' + file};
     if (!opened) {
-        throw std::runtime_error("the process has gone of which the footprint is wanted");
+        throw std::runtime_error("the process has ended, so that its footprint cannot be read");
     }
     return opened;
 }

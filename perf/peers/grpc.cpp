@@ -2,8 +2,8 @@
 // gRPC: unary calls to an asynchronous server with one completion queue and one thread. One call at a time blocks; many
 // wait on a completion queue. All go through one channel. The fan-out is a stream to each subscriber, by the callback
 // API on both sides, each subscriber with a channel and a connection of its own. The transport sets TCP_NODELAY itself.
-#include "grpc_calls.hpp"
-#include "grpc_streams.hpp"
+#include "grpc.hpp"
+
 #include "ordered_fan_out.hpp"
 #include "peer.hpp"
 
@@ -45,7 +45,7 @@ const description about{
     .carriers = "tcp unix",
     .settings =
         "unary calls on one channel, asynchronous server with one completion queue; streams by the callback API; both "
-        "ends on all cores, since it is several times slower where its threads share one",
+        "ends on all cores, because it is several times slower if its threads share one",
     .on_all_cores = true,
 };
 

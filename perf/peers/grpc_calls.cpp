@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "grpc_calls.hpp"
-
+#include "grpc.hpp"
 #include "localization.grpc.pb.h"
-#include "perf/localization.hpp"
+#include "perf/support/localization.hpp"
 
 #include <optional>
 #include <stdexcept>
@@ -49,7 +48,7 @@ struct task_call {
     static bool is_right(const reply&) { return true; }
 };
 
-/// One of the calls that the server awaits or answers at a time.
+/// A call that the server waits for or answers.
 template <class Call>
 class served {
   public:
@@ -106,7 +105,7 @@ void serve(const std::string& listen, const announce& tell) {
     }
 }
 
-/// A call in flight. Its context serves once.
+/// A call in flight. Its context cannot be used again.
 template <class Call>
 struct flight {
     std::chrono::steady_clock::time_point began;
@@ -161,7 +160,7 @@ class grpc_caller final : public caller {
             throw std::runtime_error("gRPC: " + status.error_message());
         }
         if (!Call::is_right(reply)) {
-            throw std::runtime_error("the values that came are not those that were sent");
+            throw std::runtime_error("the received values are not those that were sent");
         }
     }
 

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "grpc_streams.hpp"
-
-#include "grpc_calls.hpp"
+#include "grpc.hpp"
 #include "localization.grpc.pb.h"
 
 #include <condition_variable>

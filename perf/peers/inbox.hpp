@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "perf/fan_out.hpp"
+#include "perf/fan_out/fan_out.hpp"
 
 #include <chrono>
 #include <condition_variable>
@@ -13,27 +13,27 @@
 
 namespace cles::perf::peers {
 
-/// Where all subscribers bring what comes to them, on whatever thread it comes.
+/// Collects what all subscribers receive, on any thread.
 class inbox {
   public:
     explicit inbox(std::size_t subscribers) : reached_(subscribers) {}
 
-    /// Safe on any thread. Before `begin` it only shows that this subscriber is reached; later, what was published
-    /// earlier does not count.
+    /// Safe on any thread. Before `begin` it only marks this subscriber as reached; afterwards, earlier publications do
+    /// not count.
     void take(std::size_t subscriber, const publication& value);
-    /// Something is wrong: `wait_for` and `look` throw it.
+    /// `wait_for` and `look` throw this exception.
     void fail(std::exception_ptr why);
 
-    /// Everybody has had something.
+    /// Every subscriber has received something.
     [[nodiscard]] bool all_reached();
     void begin(const fan_out_order& order, latency_recorder* record);
-    /// How many came since, and whether that is all.
+    /// How many have arrived since, and whether that is all.
     struct state {
         std::uint64_t count = 0;
         bool complete = false;
     };
     state look();
-    /// Until everybody is reached or all has come, whichever is awaited, or so long.
+    /// Waits until all subscribers are reached, or all has arrived, but no longer than this.
     void wait_for(std::chrono::milliseconds at_most);
     fan_out_tally tally();
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The driver of every peer: each peer's program is this with the one file that defines that peer.
+// The driver of every peer: the program of a peer consists of this driver and the file that defines the peer.
 #include "figures.hpp"
 #include "options.hpp"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "figures.hpp"
-#include "perf/cpu_clock.hpp"
-#include "perf/pinning.hpp"
+#include "perf/support/clock.hpp"
+#include "perf/support/pinning.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -31,9 +31,9 @@ void run_on(const std::vector<int>& cores) {
 double microseconds(std::chrono::nanoseconds time) { return static_cast<double>(time.count()) / 1e3; }
 
 /// The processes of a measurement.
-class crew {
+class process_group {
   public:
-    crew(pid_t server, pid_t broker) : members_{{"client", ::getpid()}, {"server", server}} {
+    process_group(pid_t server, pid_t broker) : members_{{"client", ::getpid()}, {"server", server}} {
         if (broker > 0) {
             members_.emplace("broker", broker);
         }
@@ -53,7 +53,7 @@ class crew {
             all.emplace(role, footprint_of(id));
         }
         if (const auto broker = all.find("broker"); broker != all.end()) {
-            broker->second.libraries.clear(); // its memory counts; what it is made of concerns no node
+            broker->second.libraries.clear(); // its memory counts, but a node does not need its libraries
         }
         return all;
     }
@@ -62,7 +62,7 @@ class crew {
     std::map<std::string, pid_t> members_;
 };
 
-figures measure_calls(peer& with, call what, const std::string& where, const options& how, const crew& all) {
+figures measure_calls(peer& with, call what, const std::string& where, const options& how, const process_group& all) {
     const auto caller = with.call_at(what, where);
     latency_recorder warm_up{std::max<std::size_t>(how.count / 10, 2 * std::size_t{how.in_flight})};
     caller->ask(how.in_flight, warm_up);
@@ -80,7 +80,7 @@ figures measure_calls(peer& with, call what, const std::string& where, const opt
     return found;
 }
 
-figures measure_fan_out(peer& with, const std::string& where, const options& how, const crew& all) {
+figures measure_fan_out(peer& with, const std::string& where, const options& how, const process_group& all) {
     const auto binders = with.subscribe(where, how.subscribers);
     fan_out_order order{.binders = how.subscribers,
                         .updates = std::max<std::uint64_t>(how.count / 10, 1),
@@ -134,7 +134,7 @@ figures measure(const options& how) {
     if (!is_spread) {
         pin_to(ends.client);
     }
-    const crew all{server.id(), with->broker()};
+    const process_group all{server.id(), with->broker()};
     auto found = how.mode == mode::fan_out ? measure_fan_out(*with, where, how, all)
                                            : measure_calls(*with, what, where, how, all);
     found.program_bytes = loaded_program_bytes();

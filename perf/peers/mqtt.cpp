@@ -38,12 +38,12 @@ std::span<const std::byte> bytes_of(const mosquitto_message& message) {
     return {static_cast<const std::byte*>(message.payload), static_cast<std::size_t>(message.payloadlen)};
 }
 
-/// A connection to the broker. What comes goes to `on_message`, on the thread that turns the loop.
+/// A connection to the broker. `on_message` is called on the thread that runs the loop.
 class client {
   public:
     client() : self_(::mosquitto_new(nullptr, true, this)) {
         if (self_ == nullptr) {
-            throw std::runtime_error("MQTT: no client");
+            throw std::runtime_error("MQTT: cannot create a client");
         }
     }
     client(const client&) = delete;
@@ -52,7 +52,7 @@ class client {
 
     std::function<void(std::span<const std::byte>)> on_message;
 
-    /// Until the broker has taken the subscription, if there is to be one.
+    /// Waits until the broker has accepted the subscription, if there is one.
     void connect(int port, const char* topic) {
         require(::mosquitto_int_option(self_, MOSQ_OPT_TCP_NODELAY, 1), "TCP_NODELAY");
         ::mosquitto_connect_callback_set(
@@ -84,7 +84,7 @@ class client {
         require(::mosquitto_loop(self_, static_cast<int>(at_most.count()), 1), "the loop");
         throw_failure();
     }
-    /// Where its socket has something.
+    /// \pre its socket is readable
     void read() {
         require(::mosquitto_loop_read(self_, 1), "reading");
         require(::mosquitto_loop_misc(self_), "keeping the connection");
@@ -93,7 +93,7 @@ class client {
     [[nodiscard]] int socket() const { return ::mosquitto_socket(self_); }
 
   private:
-    // The library is in C, and lets no exception through.
+    // Exceptions must not pass through the library, which is written in C.
     void hand_over(std::span<const std::byte> bytes) {
         try {
             on_message(bytes);
@@ -112,7 +112,7 @@ class client {
         is_ready_ = false;
         for (int attempt = 0; !is_ready_; ++attempt) {
             if (attempt == most_attempts) {
-                throw std::runtime_error("MQTT: the broker does not take what it is asked");
+                throw std::runtime_error("MQTT: the broker does not accept requests");
             }
             turn(between_attempts);
         }
@@ -146,7 +146,7 @@ class mqtt_caller final : public caller {
   private:
     using clock = std::chrono::steady_clock;
 
-    // By one connection, answers come in the order of the requests.
+    // On one connection, answers arrive in the order of the requests.
     void take(std::span<const std::byte> answer) {
         check_answer(what_, answer);
         record_->record(clock::now() - began_[at_]);
@@ -184,7 +184,7 @@ class mqtt_subscriptions final : public polled_subscriptions {
     }
 
   private:
-    void read(std::size_t number, inbox&) override { all_[number]->read(); } // which tells what came
+    void read(std::size_t number, inbox&) override { all_[number]->read(); } // which calls on_message
 
     std::vector<std::unique_ptr<client>> all_;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// NNG: REQ asks REP by asynchronous operations, a context for each call in flight, as its manual has it for servers
+// NNG: REQ asks REP by asynchronous operations, a context for each call in flight, as its manual recommends for servers
 // and clients under load; PUB and SUB for the fan-out. Its TCP transport sets TCP_NODELAY unless told otherwise.
 #include "ordered_fan_out.hpp"
 #include "packets.hpp"
@@ -41,7 +41,7 @@ class socket {
     ~socket() { ::nng_close(socket_); }
     [[nodiscard]] nng_socket get() const noexcept { return socket_; }
 
-    /// Where it listens then, with the port that it was given.
+    /// The address at which it listens, with the port that the system chose.
     std::string listen(const std::string& where) {
         nng_listener listener{};
         require(::nng_listen(socket_, where.c_str(), &listener, 0), "listening");
@@ -103,7 +103,7 @@ class served {
         if (::nng_aio_result(waiting_.get()) != 0) {
             return; // closed
         }
-        // Told before the next operation starts, which may be done at once on another thread.
+        // Before the next operation starts, which may complete at once on another thread.
         is_answering_ = !is_answering_;
         if (!is_answering_) {
             ::nng_ctx_recv(context_, waiting_.get());
@@ -123,13 +123,13 @@ class served {
     operation<served, &served::next> waiting_{this};
 };
 
-/// What the lanes of a run share.
+/// What the lanes of a run have in common.
 class run_of_calls {
   public:
     run_of_calls(call what, std::size_t lanes, latency_recorder& record)
         : what_(what), record_(record), to_ask_(record.room()), lanes_(lanes) {}
 
-    /// Whether a lane is to ask once more; otherwise it has ended.
+    /// Whether a lane has to send another request; otherwise it has ended.
     bool next() {
         const std::lock_guard lock{guard_};
         if (to_ask_ > 0 && failure_.empty()) {

@@ -75,7 +75,7 @@ options read_options(std::span<char*> arguments) {
         } else if (word == "--help" || word == "-h") {
             read.help = true;
         } else {
-            throw std::invalid_argument("'" + std::string{word} + "' is not known; --help says what is");
+            throw std::invalid_argument("'" + std::string{word} + "' is not an option; --help lists them");
         }
     }
     if (std::uint64_t{read.count} * read.subscribers > 20'000'000) {

@@ -23,7 +23,7 @@ struct options {
 
 extern const char* const usage;
 
-/// \throws std::invalid_argument, with words for the user
+/// \throws std::invalid_argument, with a message for the user
 options read_options(std::span<char*> arguments);
 
 } // namespace cles::perf::peers

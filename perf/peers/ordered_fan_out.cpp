@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "ordered_fan_out.hpp"
 
-#include "perf/bare_socket.hpp"
-#include "perf/wait_until.hpp"
+#include "perf/support/bare_socket.hpp"
+#include "perf/support/clock.hpp"
 
 #include <array>
 #include <cstdint>
@@ -14,10 +14,10 @@
 namespace cles::perf::peers {
 namespace {
 
-// Subscriptions take hold at their own pace. Whoever is not reached by then never will be.
+// Subscriptions take effect after some time. A subscriber that is not reached by then has failed.
 constexpr std::chrono::milliseconds between_attempts{10};
 constexpr int most_attempts = 1000;
-// What has not come so long after all was published is lost. Only where something is does this take time.
+// What has not arrived this long after the last publication is lost. The wait takes place only if something is missing.
 constexpr std::chrono::milliseconds patience{1000};
 
 } // namespace
@@ -58,14 +58,14 @@ fan_out_tally ordered_fan_out::run(const fan_out_order& what, latency_recorder* 
             return inbox_.tally();
         }
         if (before.complete) {
-            pollfd word{.fd = control_.get(), .events = POLLIN, .revents = 0};
-            checked(::poll(&word, 1, -1), "poll");
+            pollfd control{.fd = control_.get(), .events = POLLIN, .revents = 0};
+            checked(::poll(&control, 1, -1), "poll");
         } else {
             subscriptions_->take_for(patience, inbox_);
         }
         const bool was_sent = all_sent;
         all_sent = all_sent || published();
-        // Where datagrams may be lost, the rest will not come.
+        // Datagrams may be lost.
         if (was_sent && inbox_.look().count == before.count) {
             return inbox_.tally();
         }
@@ -75,27 +75,27 @@ fan_out_tally ordered_fan_out::run(const fan_out_order& what, latency_recorder* 
 void ordered_fan_out::reach_all() {
     for (int attempt = 0; attempt < most_attempts; ++attempt) {
         order({.binders = 1, .updates = 1});
-        pollfd word{.fd = control_.get(), .events = POLLIN, .revents = 0};
-        checked(::poll(&word, 1, -1), "poll");
+        pollfd control{.fd = control_.get(), .events = POLLIN, .revents = 0};
+        checked(::poll(&control, 1, -1), "poll");
         (void)published();
         subscriptions_->take_for(between_attempts, inbox_);
         if (inbox_.all_reached()) {
             return;
         }
     }
-    throw std::runtime_error("not all subscribers are reached");
+    throw std::runtime_error("not all subscribers were reached");
 }
 
 void ordered_fan_out::order(const fan_out_order& what) { send_all(control_.get(), std::as_bytes(std::span{&what, 1})); }
 
 bool ordered_fan_out::published() {
-    pollfd word{.fd = control_.get(), .events = POLLIN, .revents = 0};
-    if (checked(::poll(&word, 1, 0), "poll") == 0) {
+    pollfd control{.fd = control_.get(), .events = POLLIN, .revents = 0};
+    if (checked(::poll(&control, 1, 0), "poll") == 0) {
         return false;
     }
     std::array<std::byte, 1> byte{};
     if (!receive_all(control_.get(), byte)) {
-        throw std::runtime_error("the publisher has gone");
+        throw std::runtime_error("the publisher closed the connection");
     }
     return true;
 }

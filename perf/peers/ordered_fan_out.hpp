@@ -3,7 +3,7 @@
 
 #include "inbox.hpp"
 #include "peer.hpp"
-#include "perf/descriptor.hpp"
+#include "perf/support/descriptor.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -11,30 +11,30 @@
 #include <memory>
 #include <string>
 
-/// How a publisher of any middleware is told what to publish: by a socket beside it, so that the middleware carries
-/// nothing but what is measured.
+/// How a publisher of any middleware receives its orders: by a separate socket, so that the middleware carries only
+/// what is measured.
 namespace cles::perf::peers {
 
-/// Announces where the middleware publishes, together with where orders are taken, and publishes as ordered until the
-/// one who orders has gone.
+/// Announces the address of the control socket together with `where` the middleware publishes, and publishes as ordered
+/// until the control connection is closed.
 void publish_by_order(const std::string& where, const announce& tell,
                       const std::function<void(const publication&)>& publish);
 
-/// The subscriptions of a middleware, as long as this lives. Where it has threads of its own, they bring to the inbox
-/// what comes.
+/// The subscriptions of a middleware, while this object exists. If the middleware has threads of its own, they fill the
+/// inbox.
 class subscriptions {
   public:
     subscriptions() = default;
     subscriptions(const subscriptions&) = delete;
     subscriptions& operator=(const subscriptions&) = delete;
     virtual ~subscriptions() = default;
-    /// Brings what comes, for so long or until the inbox has all that it waits for.
+    /// Fills the inbox until it has all that it waits for, but no longer than this.
     virtual void take_for(std::chrono::milliseconds at_most, inbox& into) { into.wait_for(at_most); }
 };
 
 class ordered_fan_out final : public fan_out {
   public:
-    /// Gets where the middleware publishes, and an inbox for as many subscribers.
+    /// Creates subscriptions, given where the middleware publishes, and an inbox.
     using subscribe = std::function<std::unique_ptr<subscriptions>(const std::string& where, inbox& into)>;
 
     /// \param announced by `publish_by_order`
@@ -44,7 +44,7 @@ class ordered_fan_out final : public fan_out {
   private:
     void reach_all();
     void order(const fan_out_order& what);
-    /// Whether what was ordered has been published.
+    /// Whether all has been published.
     bool published();
 
     inbox inbox_;

@@ -33,34 +33,34 @@ std::span<const std::byte> answering::answer(std::span<const std::byte> request)
         done_ = short_packet(done_type);
         return done_;
     }
-    throw std::runtime_error("what came is no request");
+    throw std::runtime_error("the message is not a request");
 }
 
 void check_answer(call what, std::span<const std::byte> answer) {
     if (what == call::task) {
         if (!is_packet(answer, short_packet(done_type))) {
-            throw std::runtime_error("what came does not answer the task");
+            throw std::runtime_error("the message is not the answer to the task");
         }
         return;
     }
     icd::reply_bytes bytes{};
     if (answer.size() != bytes.size()) {
-        throw std::runtime_error("what came is no localization");
+        throw std::runtime_error("the message is not a localization");
     }
     std::copy(answer.begin(), answer.end(), bytes.begin());
     const auto value = icd::unpack_reply(bytes);
     if (!value || !is_sample(*value)) {
-        throw std::runtime_error("the values that came are not those that were sent");
+        throw std::runtime_error("the received values are not those that were sent");
     }
 }
 
 publication read_update(std::span<const std::byte> packet) {
     if (packet.size() != sizeof(icd::update_packet)) {
-        throw std::runtime_error("what came is no update");
+        throw std::runtime_error("the message is not an update");
     }
     const auto update = icd::unpack_update(packet);
     if (!update) {
-        throw std::runtime_error("what came is no update");
+        throw std::runtime_error("the message is not an update");
     }
     return update->value;
 }

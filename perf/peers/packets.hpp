@@ -2,14 +2,14 @@
 #pragma once
 
 #include "peer.hpp"
-#include "perf/icd_packet.hpp"
-#include "perf/icd_update.hpp"
+#include "perf/baseline/packet.hpp"
+#include "perf/baseline/update_packet.hpp"
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
-/// The two calls as packets of the hand-written exchange, for those peers that move bytes and bring no encoding:
+/// The two calls as packets of the hand-written exchange, for peers that carry bytes and have no encoding:
 ///
 /// | bytes | task's request  | task's reply    |
 /// | ----- | --------------- | --------------- |
@@ -22,10 +22,10 @@ inline constexpr std::uint16_t done_type = 5;
 
 icd::request_bytes request_of(call what) noexcept;
 
-/// The node's side.
+/// The server's side.
 class answering {
   public:
-    /// The answer, valid until the next call. \throws std::runtime_error where this is no request
+    /// The answer, valid until the next call. \throws std::runtime_error if this is not a request
     std::span<const std::byte> answer(std::span<const std::byte> request);
 
   private:
@@ -34,11 +34,11 @@ class answering {
     icd::request_bytes done_{};
 };
 
-/// The caller's side. \throws std::runtime_error where this is no answer to that call, or its values are not those
+/// The caller's side. \throws std::runtime_error if this is not an answer to that call, or its values are not those
 /// that were sent
 void check_answer(call what, std::span<const std::byte> answer);
 
-/// \throws std::runtime_error where this is no update
+/// \throws std::runtime_error if this is not an update
 publication read_update(std::span<const std::byte> packet);
 
 } // namespace cles::perf::peers

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "polled_subscriptions.hpp"
 
-#include "perf/descriptor.hpp"
+#include "perf/support/descriptor.hpp"
 
 namespace cles::perf::peers {
 

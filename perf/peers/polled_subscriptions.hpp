@@ -12,7 +12,7 @@
 
 namespace cles::perf::peers {
 
-/// A connection for each subscription; one thread waits for all, and reads where something is.
+/// A connection for each subscription; one thread waits for all, and reads from those that are readable.
 class polled_subscriptions : public subscriptions {
   public:
     void take_for(std::chrono::milliseconds at_most, inbox& into) final;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Redis, by hiredis: a store between the two ends. The localization is what the node has SET, and GET fetches it from
 // the store without asking the node. A task is pushed to a list, which the node waits for (BLPOP), as work queues on
-// Redis do; those who push want no reply of the store. The fan-out is PUBLISH and SUBSCRIBE.
+// Redis do; clients that push turn off its replies. The fan-out is PUBLISH and SUBSCRIBE.
 #include "broker.hpp"
 #include "ordered_fan_out.hpp"
 #include "packets.hpp"
@@ -36,7 +36,7 @@ class connection {
     connection& operator=(const connection&) = delete;
     ~connection() { ::redisFree(self_); }
 
-    /// `with` fills the place of "%b".
+    /// `with` replaces "%b".
     void put(const char* command, std::span<const std::byte> with) {
         require(::redisAppendCommand(self_, command, with.data(), with.size()));
     }
@@ -46,13 +46,13 @@ class connection {
             require(::redisBufferWrite(self_, &done));
         }
     }
-    /// Sends what was put, if it is not sent, and waits.
+    /// Sends what is buffered, and waits for a reply.
     reply_ptr get() {
         void* reply = nullptr;
         require(::redisGetReply(self_, &reply));
         return owned(reply);
     }
-    /// What is there after one read; empty where that was all.
+    /// A reply that has been read; empty if there is no more.
     reply_ptr next_read() {
         void* reply = nullptr;
         require(::redisGetReplyFromReader(self_, &reply));
@@ -60,7 +60,7 @@ class connection {
     }
     void read() { require(::redisBufferRead(self_)); }
     [[nodiscard]] int socket() const noexcept { return self_->fd; }
-    /// From now on the store says nothing to what it is told.
+    /// Turns off replies.
     void want_no_replies() {
         put("CLIENT REPLY OFF");
         flush();
@@ -80,7 +80,7 @@ class connection {
             if (attempt == most_attempts) {
                 throw std::runtime_error("Redis: the store does not answer");
             }
-            std::this_thread::sleep_for(between_attempts); // it has just been started
+            std::this_thread::sleep_for(between_attempts); // it may still be starting
         }
     }
     void require(int code) const {
@@ -109,7 +109,7 @@ class redis_caller final : public caller {
     }
 
     void ask(std::size_t in_flight, latency_recorder& record) override {
-        // Answers come in the order of the requests.
+        // Answers arrive in the order of the requests.
         std::vector<clock::time_point> began(in_flight);
         auto to_ask = record.room();
         for (std::size_t i = 0; i < in_flight && to_ask > 0; ++i, --to_ask) {
@@ -255,7 +255,7 @@ const description about{
     .name = "redis",
     .carriers = "unix tcp",
     .settings =
-        "GET of what the node has SET, tasks through lists, PUBLISH; no persistence, no replies to those who push",
+        "GET of what the node has SET, tasks through lists, PUBLISH; no persistence, no replies to clients that push",
 };
 
 std::string version() {

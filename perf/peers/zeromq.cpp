@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // ZeroMQ: a DEALER asks a ROUTER, which needs no empty frame between address and packet; PUB and SUB for the fan-out.
-// libzmq sets TCP_NODELAY itself. One I/O thread on each side, as a context has unless told otherwise.
+// libzmq sets TCP_NODELAY itself. One I/O thread on each side, which is the default of a context.
 #include "ordered_fan_out.hpp"
 #include "packets.hpp"
 #include "peer.hpp"
@@ -33,7 +33,7 @@ class zeromq_caller final : public caller {
     }
 
     void ask(std::size_t in_flight, latency_recorder& record) override {
-        // Answers of one server come in the order of the requests.
+        // Answers of one server arrive in the order of the requests.
         std::vector<clock::time_point> began(in_flight);
         auto to_ask = record.room();
         for (std::size_t i = 0; i < in_flight && to_ask > 0; ++i, --to_ask) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Builds what is measured, as far as it is missing."""
+"""Builds the programs that are measured, if they are not up to date."""
 
 import fnmatch
 import os
@@ -13,8 +13,8 @@ class Failed(Exception):
 
 
 def build(targets, say):
-    """From the root of the project: installs what is missing, configures where needed, and builds those of the targets
-    that there are."""
+    """Installs missing packages, configures the build if needed, and builds the targets that exist. Runs in the project's
+    root folder."""
     os.makedirs(BUILD, exist_ok=True)
     log = os.path.join(BUILD, "evaluate.log")
     _run(["scripts/setup", "--evaluate"], log)
@@ -32,7 +32,7 @@ def build(targets, say):
 
 
 def _run(command, log):
-    """What it printed, which is in the log too."""
+    """Returns the output, which is also in the log."""
     environment = {"CMAKE_BUILD_PARALLEL_LEVEL": str(os.cpu_count() or 1), **os.environ}
     with open(log, "w+", encoding="utf-8", errors="replace") as out:
         try:
@@ -48,7 +48,7 @@ def _run(command, log):
 
 
 def compiler(build_folder):
-    """As "g++ (Debian 12.2.0-14) 12.2.0, -O2 -DNDEBUG"; what is not known is left out."""
+    """As "g++ (Debian 12.2.0-14) 12.2.0, -O2 -DNDEBUG"; unknown parts are left out."""
     cache = {}
     try:
         with open(os.path.join(build_folder, "CMakeCache.txt"), encoding="utf-8") as file:
@@ -69,7 +69,7 @@ def compiler(build_folder):
 
 
 def commit():
-    """What was measured, as git names it; empty where there is no git."""
+    """The commit that was measured, as git describes it; empty without git."""
     try:
         return subprocess.run(["git", "describe", "--always", "--dirty"], capture_output=True, text=True,
                               check=True).stdout.strip()

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The pictures of distributed stochastic gradient descent: Table 2, how long each row took, beside the paper's; the data
-set with its classifier, and the same where the classes meet (Figs. 5 and 6)."""
+"""The pictures of distributed stochastic gradient descent: Table 2, how long each row took, with the paper's; the data
+set with its classifier, and a detail of it at the boundary between the classes (Figs. 5 and 6)."""
 
 from .gnuplot import block, draw
 

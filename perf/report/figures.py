@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""One form for every figure, whichever script measured it."""
+"""One form for all figures, whatever script measured them."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,21 +10,21 @@ class Figure:
     name: str
     what: str
     value: Any  # the median
-    low: Any = None  # within these the median lies with 95 % confidence
+    low: Any = None  # low and high are the 95 % interval of the median
     high: Any = None
     runs: Any = None
     unit: str = ""
     paper: Any = None
     target: Any = None
-    reached: Any = None  # nothing where there is no target
+    reached: Any = None  # None without a target
 
 
 class Malformed(Exception):
-    """What a script wrote cannot be read; says what."""
+    """The output of a script cannot be read; the message says what is wrong."""
 
 
 def figures_of(raw):
-    """Of whatever form, those of Table 2 or a list of figures; none where the script writes only rows."""
+    """The figures of Table 2 or a list of figures; none if the script writes only rows."""
     try:
         if "figures" in raw:
             return [_of_figure(each) for each in raw["figures"]]
@@ -42,7 +42,7 @@ def _of_figure(each):
 
 
 def _of_table(raw):
-    """Those of distributed stochastic gradient descent, as perf/evaluate/dsgd.py writes them."""
+    """The figures of distributed stochastic gradient descent, as perf/evaluation/dsgd.py writes them."""
     checks = raw["checks"]
     for row in raw["rows"]:
         yield _summarised(row["elapsed_ms"], row["name"], row["meaning"] + ", elapsed", "ms", paper=row["paper_ms"])
@@ -73,7 +73,7 @@ UNITS = {"us": "\u00b5s", "times": "\u00d7"}
 
 
 def text_of(value):
-    """A value for people: as many digits as it is worth."""
+    """A value with a suitable number of digits."""
     if value is None:
         return "\u2013"
     if isinstance(value, bool):

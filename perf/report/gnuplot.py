@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Draws by gnuplot, as SVG that can stand in a page beside others."""
+"""Draws with gnuplot, as SVG that can be combined with others in one page."""
 
 import re
 import shutil
 import subprocess
 
-# Told apart without colour too: each has its own point.
+# Each has its own point, so that they differ without colour too.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#333333", "#56b4e9", "#8a6d00")
 POINTS = (7, 5, 9, 13, 11, 3, 2)
 
@@ -18,21 +18,21 @@ set style fill solid 0.85 noborder
 """
 
 
-# The key stands beside the plot: left to itself it takes more room than its text.
+# The key is beside the plot. Its automatic size is larger than its text.
 KEY_BESIDE = "set rmargin at screen 0.67\nset key at screen 0.685,0.95 left top Left reverse samplen 3\n"
 
 
 class Missing(Exception):
-    """Says why there is no picture."""
+    """Why there is no picture."""
 
 
 def quoted(text):
-    """As a string of gnuplot's."""
+    """Quoted as a string of gnuplot."""
     return "'" + str(text).replace("'", "''").replace("\n", " ") + "'"
 
 
 def block(name, rows):
-    """A named block of data; what is missing in a row is nothing to be drawn."""
+    """A named data block; missing values in a row are not drawn."""
     lines = ["\t".join("NaN" if cell is None else f'"{cell}"' if isinstance(cell, str) else repr(cell) for cell in row)
              for row in rows]
     return "\n".join([f"${name} << EOD", *lines, "EOD", ""])
@@ -46,13 +46,13 @@ def line_style(index, dashed=False):
 
 
 def curve_style(index):
-    """For `plot ... with lines`, told apart without colour by dashes."""
+    """For `plot ... with lines`. Dashes make them differ without colour too."""
     dashes = ("1", "(10,4)", "(3,3)", "(10,3,3,3)", "(16,6)")
     return f"linecolor '{COLOURS[index % len(COLOURS)]}' linewidth 1.8 dashtype {dashes[index % len(dashes)]}"
 
 
 def draw(name, script, width=760, height=400, note=""):
-    """The SVG of a script, whose identifiers begin with a name, so that pictures do not mix theirs."""
+    """The SVG of a gnuplot script. Its identifiers begin with `name`, so that they are unique in a page."""
     program = shutil.which("gnuplot")
     if not program:
         raise Missing("there is no gnuplot: scripts/setup --evaluate installs it")

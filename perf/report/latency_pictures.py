@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Pictures of what perf/evaluate/latency.py timed across links: how long, over the share that took longer."""
+"""Pictures of what perf/evaluation/latency.py timed across links: latency by the share that took longer."""
 
 from .series_pictures import quantiles
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The report as one page of HTML, well-formed as XML, which needs no other file."""
+"""The report as one self-contained page of HTML, which is well-formed XML."""
 
 import os
 from dataclasses import replace
@@ -13,7 +13,7 @@ from .running import FAILED, KEPT, RAN
 
 
 def page_of(sections, outcomes, raws, run):
-    """Of sections in order, {name: Outcome}, {name: what its script wrote}, and what is to be told of the whole run."""
+    """Arguments: the sections in order, {name: Outcome}, {name: output of its script}, and data about the run."""
     parts = [_section(section, outcomes[section.name], raws.get(section.name)) for section in sections]
     with open(os.path.join(os.path.dirname(__file__), "style.css"), encoding="utf-8") as file:
         style = file.read()
@@ -79,7 +79,7 @@ def _glance(sections, raws):
 
 
 def _figures(raw):
-    """Those that can be read, and why others cannot. Those of a quick run are not judged."""
+    """The figures that can be read, and why others cannot. Those of a quick run are not compared with targets."""
     try:
         found = figures_of(raw or {})
     except Malformed as failure:
@@ -123,7 +123,7 @@ def _section(section, outcome, raw):
     if figures:
         parts.append(_figure_table([_figure_row(figure) for figure in figures], False))
     if peers.is_of_peers(raw):
-        parts.append(f"<p>{escape(peers.TOLD)}</p>" + table_of_rows(peers.readable(raw["rows"])))
+        parts.append(f"<p>{escape(peers.EXPLANATION)}</p>" + table_of_rows(peers.readable(raw["rows"])))
     elif raw.get("rows") and not any("elapsed_ms" in row for row in raw["rows"] if isinstance(row, dict)):
         parts.append(table_of_rows(raw["rows"]))
     machine = raw.get("machine")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""What perf/evaluate/peers.py measured of other middleware: rows that can be read, and a picture."""
+"""What perf/evaluation/peers.py measured of other middleware, as a table and a picture."""
 
 from .gnuplot import Missing, block, draw, quoted
 
@@ -10,13 +10,13 @@ def is_of_peers(raw):
 
 
 def readable(rows):
-    """For a table: ratios to the hand-written exchange over TCP, and what each takes."""
+    """For a table: ratios to the hand-written exchange over TCP, and sizes."""
     return [{"": row["name"], **{heading: _times(value) for heading, value in row["ratios"].items()},
              "memory, KiB": row.get("memory_kib"), "libraries, KiB": _kib(row.get("library_bytes")),
              "program, KiB": _kib(row.get("program_bytes")), "version": str(row.get("version") or "")} for row in rows]
 
 
-TOLD = ("Ratios of medians to the hand-written exchange over TCP, which is the row of 1; times below 1 and rates above 1 are "
+EXPLANATION = ("Ratios of medians to the hand-written exchange over TCP, which is the row of 1; times below 1 and rates above 1 are "
         "better. A dash is what a peer does not offer, or nobody measured.")
 
 

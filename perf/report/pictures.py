@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Which pictures belong to what was measured."""
+"""The pictures of each section."""
 
 import re
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 from . import bench_pictures, dsgd_picture, latency_pictures, peers, series_pictures, strike_picture
 from .gnuplot import Missing
 
-BUSY = 0.2  # cores that others use; past it figures are not to be trusted
+BUSY = 0.2  # cores that other processes use; above this, figures are not reliable
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Picture:
     name: str
     caption: str
     svg: str = ""
-    missing: str = ""  # why there is none
+    missing: str = ""  # why there is no picture
 
 
 def pictures_of(section, raw):
@@ -24,7 +24,7 @@ def pictures_of(section, raw):
 
 
 def _kinds(section, raw):
-    """(name, caption, function that draws or raises Missing)"""
+    """(name, caption, function that draws it or raises Missing)"""
     note = note_of(raw)
     if section == "bench":
         return bench_pictures.kinds(raw.get("series") or {}, note)
@@ -48,14 +48,14 @@ def _drawn(name, caption, draw):
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as failure:
         return Picture(name, caption, missing=f"what was measured cannot be drawn: {failure!r}")
     except ElementTree.ParseError as failure:
-        return Picture(name, caption, missing=f"it is no XML: {failure}")
+        return Picture(name, caption, missing=f"it is not XML: {failure}")
     if not root.tag.endswith("svg"):
-        return Picture(name, caption, missing="it is no SVG")
+        return Picture(name, caption, missing="it is not SVG")
     return Picture(name, caption, svg)
 
 
 def note_of(raw):
-    """Where and when, to stand in the picture."""
+    """The note in the picture: where and when it was measured."""
     machine = raw.get("machine")
     where = f"{machine.get('cores', '?')} cores of {machine.get('processor', '?')}" if isinstance(machine, dict) else machine
     busy = f" beside other work ({busy_of(raw):g} cores busy)" if busy_of(raw) > BUSY else ""
@@ -64,6 +64,6 @@ def note_of(raw):
 
 
 def busy_of(raw):
-    """How many cores others kept busy when the measurement began, as far as it is known."""
+    """How many cores other processes kept busy when the measurement began; 0 if unknown."""
     machine = raw.get("machine")
     return (machine.get("busy_cores") if isinstance(machine, dict) else None) or 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""A table of rows that are told as they are: a column for each key."""
+"""A table of rows with a column for each key."""
 
 from html import escape
 

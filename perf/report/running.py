@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Runs one section's script, passes its progress on, and says what became of it."""
+"""Runs the script of a section, shows its progress, and determines the outcome."""
 
 import json
 import os
@@ -10,7 +10,7 @@ import time
 from dataclasses import asdict, dataclass
 
 RAN, FAILED, SKIPPED, KEPT = "ran", "failed", "skipped", "kept"
-GRACE_S = 15  # to clean up in, once told to stop
+GRACE_S = 15  # for cleaning up after SIGTERM
 NOTHING_TO_MEASURE = 77  # a script's exit code, as in other test harnesses
 
 
@@ -24,7 +24,7 @@ class Outcome:
 
 
 class Progress:
-    """Lines on stderr, each beginning with the time since the start of all; on a terminal they replace each other."""
+    """Lines on stderr that begin with the time since the start; on a terminal each replaces the previous one."""
 
     def __init__(self):
         self.start, self.on_terminal, self.open = time.monotonic(), sys.stderr.isatty(), False
@@ -51,7 +51,7 @@ class Progress:
 
 
 def run(script, output, quick, programs, limit_s, progress):
-    """The outcome. The output is there afterwards exactly where the script wrote JSON, even if it failed after that."""
+    """Returns the outcome. Afterwards the output file exists if, and only if, the script wrote JSON, even if it failed."""
     if not os.path.exists(script):
         return Outcome(SKIPPED, f"there is no {script}")
     if os.path.exists(output):
@@ -59,24 +59,24 @@ def run(script, output, quick, programs, limit_s, progress):
     begun = time.monotonic()
     try:
         words = [sys.executable, "-B", script, *(["--quick"] if quick else []), *_programs(script, programs), "-o", output]
-        code, told = _watch(words, limit_s, progress)
+        code, last_lines = _watch(words, limit_s, progress)
     except (OSError, subprocess.SubprocessError) as failure:
         return Outcome(FAILED, f"{script} cannot be run: {failure}")
-    return _judge(script, output, code, told, limit_s, round(time.monotonic() - begun, 1))
+    return _judge(script, output, code, last_lines, limit_s, round(time.monotonic() - begun, 1))
 
 
 def _programs(script, programs):
-    """Where it finds programs, if it asks."""
+    """The option for the folder of the programs, if the script has it."""
     helped = subprocess.run([sys.executable, "-B", script, "--help"], capture_output=True, text=True, timeout=30, check=False)
     return ["--programs", programs] if "--programs" in helped.stdout else []
 
 
 def _watch(words, limit_s, progress):
-    """Its exit code, nothing where it had to be stopped; and the last lines that it printed."""
-    # A group of its own, so that what it started ends with it.
+    """Its exit code, or None if it had to be stopped; and the last lines that it printed."""
+    # A process group of its own, so that what it started can be ended with it.
     process = subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                start_new_session=True)
-    told, part, deadline = [], b"", time.monotonic() + limit_s
+    last_lines, part, deadline = [], b"", time.monotonic() + limit_s
     try:
         os.set_blocking(process.stdout.fileno(), False)
         while True:
@@ -85,28 +85,28 @@ def _watch(words, limit_s, progress):
             if read:
                 *lines, part = (part + read).replace(b"\r", b"\n").split(b"\n")
                 for line in filter(str.strip, (each.decode(errors="replace") for each in lines)):
-                    told = [*told[-19:], line]
+                    last_lines = [*last_lines[-19:], line]
                     progress.update(line)
             elif ended:
                 last = part.decode(errors="replace").strip()
                 if last:
-                    told = [*told, last]
+                    last_lines = [*last_lines, last]
                     progress.update(last)
-                return process.returncode, told
+                return process.returncode, last_lines
             elif time.monotonic() > deadline:
-                return None, told
+                return None, last_lines
             else:
-                time.sleep(0.05)  # no waiting for the pipe's end: what it left behind may hold that
+                time.sleep(0.05)  # does not wait for the end of the pipe, which a remaining process may hold open
     finally:
         _end(process)
 
 
 def _end(process):
-    """It and all that it started are told to end, and made to if they do not: also what it left behind when it ended."""
+    """Ends the script and everything that it started, first by SIGTERM, then by SIGKILL."""
     _signal_group(process.pid, signal.SIGTERM)
     deadline = time.monotonic() + GRACE_S
     while _signal_group(process.pid, 0) and time.monotonic() < deadline:
-        process.poll()  # a group is there until its last member has been waited for
+        process.poll()  # a group exists until its last member has been waited for
         time.sleep(0.02)
     _signal_group(process.pid, signal.SIGKILL)
     process.wait()
@@ -114,7 +114,7 @@ def _end(process):
 
 
 def _signal_group(group, number):
-    """Whether there is anybody in it."""
+    """Whether the group has members."""
     try:
         os.killpg(group, number)
         return True
@@ -122,7 +122,7 @@ def _signal_group(group, number):
         return False
 
 
-def _judge(script, output, code, told, limit_s, seconds):
+def _judge(script, output, code, last_lines, limit_s, seconds):
     try:
         with open(output, encoding="utf-8") as file:
             complete = isinstance(json.load(file), dict)
@@ -130,7 +130,7 @@ def _judge(script, output, code, told, limit_s, seconds):
         complete = False
     if not complete and os.path.exists(output):
         os.remove(output)
-    last = told[-1].strip() if told else "it said nothing"
+    last = last_lines[-1].strip() if last_lines else "no output"
     if code is None:
         return Outcome(FAILED, f"stopped after {limit_s:.0f} s; last: {last}", seconds)
     if code == NOTHING_TO_MEASURE:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""What is measured: a script of perf/evaluate for each section of the report, in the order in which they are told."""
+"""The sections of the report, in order. Each is measured by a script in perf/evaluation."""
 
 import os
 from dataclasses import dataclass
@@ -9,20 +9,20 @@ from dataclasses import dataclass
 class Section:
     name: str  # of the script, without its suffix
     title: str
-    paper: str  # what the paper reports there; empty where nothing
-    targets: tuple = ()  # of the build, as patterns; as far as there are such
-    programs: str = "apps"  # where in the build its script looks for them
+    paper: str  # what the paper reports about it; empty if nothing
+    targets: tuple = ()  # of the build, as patterns; those that exist are built
+    programs: str = "apps"  # the folder of the build in which its script looks for them
 
 
 SECTIONS = (
     Section("bench", "Point to point against a hand-written exchange",
             "Section 4.1, Fig. 3: a PULL of the localization takes about 1.5 ms longer than the traditional packet by a "
             "minimal TCP client and server; its 132 bytes are three times as many, and fit into a frame of 1500. Parsing "
-            "is constant for a request whose length is, and O(n) of the message.", ("cles_command",)),
+            "is constant for a request whose length is, and O(n) of the message.", ("cles_command", "cles_bench")),
     Section("latency", "Latency across links, packet size and effort",
             "Section 4 and 4.1: at most 100 ms for platooning, of which the overhead should be within a tenth; BIND and UPDATE "
             "save half of the round trip; measured on one machine and across WiFi. 30 lines of code with CLES, a tenth of "
-            "what the packet with its own TCP client and server takes.", ("cles_command", "cles_link_*", "*_localization")),
+            "what the packet with its own TCP client and server takes.", ("cles_command", "cles_bench", "cles_link_*", "*_localization")),
     Section("dsgd", "Distributed stochastic gradient descent",
             "Section 4.2, Table 2: a classifier trained by threads, and by daemons to which shards are delegated; 10 ms of "
             "overhead on one machine, less than 0.5 % of the whole.", ("clesd", "cles_dsgd", "cles_plugin_sgd")),
@@ -36,7 +36,7 @@ SECTIONS = (
 
 
 def known(folder):
-    """Those of the table, then what else in the folder can be run."""
+    """Those of the table, then all other executable scripts in the folder."""
     names = {section.name for section in SECTIONS}
     others = sorted(entry[:-3] for entry in os.listdir(folder)
                     if entry.endswith(".py") and entry[:-3] not in names and os.access(os.path.join(folder, entry), os.X_OK))

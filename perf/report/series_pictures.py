@@ -10,7 +10,7 @@
 
 from .gnuplot import KEY_BESIDE, Missing, block, curve_style, draw, line_style, quoted
 
-MOST_POINTS = 2000  # of a line; more are not to be told apart
+MAX_POINTS = 2000  # of a line; more cannot be distinguished
 
 
 def kinds(section, raw, note):
@@ -27,7 +27,7 @@ def _given(each):
     def svg():
         text = each.get("svg") or ""
         if "<svg" not in text:
-            raise Missing("its script gave no SVG")
+            raise Missing("its script did not write SVG")
         return text[text.index("<svg"):]
 
     return svg
@@ -48,11 +48,11 @@ def draw_series(name, label, form, note):
         if all(values and isinstance(values[0], (list, tuple)) for values in form.values()):
             return lines(name, form, "", "", "", note)
         return quantiles(name, form, note)
-    raise Missing("its series is in no form that can be drawn")
+    raise Missing("its series does not have a form that can be drawn")
 
 
 def thinned(points):
-    step = -(-len(points) // MOST_POINTS)
+    step = -(-len(points) // MAX_POINTS)
     return points[::step] if step > 1 else points
 
 
@@ -76,7 +76,7 @@ set ylabel {quoted(y)}
 
 
 def quantiles(name, labelled, note, y=""):
-    """Value over the share that is greater, so that the tail can be seen."""
+    """Value by the share that is greater, so that the tail is visible."""
     blocks, plots, most = [], [], 1
     for n, (label, values) in enumerate(labelled.items()):
         found = sorted(float(value) for value in values)
@@ -84,7 +84,7 @@ def quantiles(name, labelled, note, y=""):
             continue
         most = max(most, len(found))
         tail = [((len(found) - i) / len(found), value) for i, value in enumerate(found)]
-        ends = len(tail) - 200  # the tail in full, the rest thinned
+        ends = len(tail) - 200  # the complete tail, and a sample of the rest
         blocks.append(block(f"line{n}", thinned(tail[:ends]) + tail[ends:] if ends > 0 else tail))
         plots.append(f"$line{n} using 1:2 with lines {curve_style(n)} title {quoted(label)}")
     if not plots:
@@ -94,7 +94,7 @@ def quantiles(name, labelled, note, y=""):
     while share >= 1 / most and share > 1e-7:
         ticks.append(f"'{text}' {share:g}")
         share /= 10
-        text = f"{share * 100:.6g} %%"  # twice, since it is a format
+        text = f"{share * 100:.6g} %%"  # twice, because it is a format
     return draw(name, "".join(blocks) + f"""set logscale xy
 set xrange [1:{1 / most / 1.2}] reverse
 set xtics ({', '.join(ticks)})

@@ -27,7 +27,7 @@ struct tracked {
 /// moved, is confirmed; noise does the first seldom, and what a false background shows does not do the second.
 class tracker {
   public:
-    /// The detections of the frame that comes so many after the last one.
+    /// The detections of the frame that follows `frames` after the last one.
     void step(std::span<const detection> seen, int frames = 1);
     /// Those that are confirmed.
     [[nodiscard]] std::vector<tracked> confirmed() const;

@@ -8,7 +8,7 @@
 namespace primes {
 
 /// Counts the primes from one number up to another, stretch by stretch (the sieve of Eratosthenes, in segments), so
-/// that the requester can be told how far it is, and stop it.
+/// that it can report progress, and be cancelled.
 class prime_counter {
   public:
     /// From `from` on, and below `below`.

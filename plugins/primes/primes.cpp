@@ -54,14 +54,14 @@ void count(const cles::request& asked, const cles::responder& answer, std::uint6
     const auto wanted = asked.as<range>();
     check(wanted.below, limit);
     prime_counter counter{wanted.from.value_or(0), wanted.below};
-    int told = 0;
+    int reported = 0;
     while (counter.step()) {
         if (answer.stopped()) {
             answer.fail(errc::cancelled, "stopped");
             return;
         }
-        if (const auto percent = static_cast<int>(counter.part_done() * 100); percent > told) {
-            told = percent;
+        if (const auto percent = static_cast<int>(counter.part_done() * 100); percent > reported) {
+            reported = percent;
             answer.progress(counter.part_done(), found{counter.count(), counter.largest()});
         }
     }
@@ -74,8 +74,8 @@ class division_of_labour : public std::enable_shared_from_this<division_of_labou
     division_of_labour(cles::responder answer, std::size_t parts)
         : answer_(std::move(answer)), left_(parts), of_(parts) {}
 
-    void ask(const std::string& whom, const range& part) {
-        const auto command = "DELEGATE " + whom + ":primes " + cles::to_json(part);
+    void ask(const std::string& node, const range& part) {
+        const auto command = "DELEGATE " + node + ":primes " + cles::to_json(part);
         answer_.delegate(command,
                          [self = shared_from_this()](boost::system::error_code failed, std::string_view json,
                                                      std::string_view words) { self->take(failed, json, words); });
@@ -115,13 +115,13 @@ class division_of_labour : public std::enable_shared_from_this<division_of_labou
     found total_;
 };
 
-void divide(const cles::request& asked, const cles::responder& answer, std::uint64_t limit, const std::string& whom) {
+void divide(const cles::request& asked, const cles::responder& answer, std::uint64_t limit, const std::string& node) {
     const auto wanted = asked.as<division>();
     check(wanted.below, limit);
     const auto parts = std::clamp<std::uint64_t>(wanted.parts.value_or(default_parts), 1, most_parts);
     const auto work = std::make_shared<division_of_labour>(answer, static_cast<std::size_t>(parts));
     for (std::uint64_t i = 0; i < parts; ++i) {
-        work->ask(whom, {.from = wanted.below * i / parts, .below = wanted.below * (i + 1) / parts});
+        work->ask(node, {.from = wanted.below * i / parts, .below = wanted.below * (i + 1) / parts});
     }
     // Returns here, and so holds no worker while the others count.
 }
@@ -149,8 +149,8 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                    {.description = "Counts the primes from 'from' up to 'below'", .idempotent = true});
     to.on_delegate(
         "primes_in_parts",
-        [limit, whom = wanted.parts_by.value_or("any")](const cles::request& asked, const cles::responder& answer) {
-            divide(asked, answer, limit, whom);
+        [limit, node = wanted.parts_by.value_or("any")](const cles::request& asked, const cles::responder& answer) {
+            divide(asked, answer, limit, node);
         },
         {.description = "Counts the primes below 'below', in 'parts' that others count", .idempotent = true});
 }

@@ -13,7 +13,7 @@ namespace primes {
 
 struct settings {
     std::optional<std::uint64_t> limit;    ///< up to where primes are looked for; 10^9 unless set, at most 10^12
-    std::optional<std::string> parts_by{}; ///< whom `primes_in_parts` asks: `any` unless set, or a node's name
+    std::optional<std::string> parts_by{}; ///< the node for the parts of `primes_in_parts`: a name, or `any` (default)
 
     /// \throws cles::setting_error
     void check() const;

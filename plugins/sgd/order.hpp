@@ -16,7 +16,7 @@ namespace sgd {
 struct order {
     std::uint64_t first = 0;
     std::uint64_t count = 0;               ///< from `first` on
-    std::optional<std::uint64_t> epochs{}; ///< steps are so many times the points; 1 unless set
+    std::optional<std::uint64_t> epochs{}; ///< steps per point; default 1
     std::optional<double> rate{};          ///< 1e-4 unless set
     std::optional<std::uint64_t> seed{};   ///< of the draws; 1 unless set
     std::optional<recipe> data{};          ///< refused where the node has other data

@@ -54,14 +54,14 @@ void train(const cles::request& asked, const cles::responder& answer, const data
     const auto how = checked(what, data);
     training work{data, {.first = what.first, .count = what.count}, how, what.start.value_or(classifier{})};
     bool heard = true;
-    int told = 0;
+    int reported = 0;
     while (work.step()) {
         if (answer.stopped()) {
             answer.fail(errc::cancelled, "stopped");
             return;
         }
-        if (const auto percent = static_cast<int>(work.part_done() * 100); heard && percent > told) {
-            told = percent;
+        if (const auto percent = static_cast<int>(work.part_done() * 100); heard && percent > reported) {
+            reported = percent;
             heard = answer.progress(work.part_done());
         }
     }

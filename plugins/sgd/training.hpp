@@ -27,7 +27,7 @@ struct schedule {
 
 /// Stochastic gradient descent for a linear classifier (paper, Algorithm 1), in one thread: each step draws a point of
 /// the shard and moves the classifier against the gradient of (value - label)^2 / 2 there. It goes on in stretches, so
-/// that the requester can be told how far it is, and stop it. The same data, shard and schedule give the same bits
+/// that it can report progress, and be cancelled. The same data, shard and schedule give the same bits
 /// everywhere.
 class training {
   public:

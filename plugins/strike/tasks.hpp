@@ -24,7 +24,7 @@ BOOST_DESCRIBE_STRUCT(settings, (), (weapons, x, y, speed, oldest_s))
 /// A strike aircraft's ability (paper, sections 2.2 and 4.3).
 ///
 /// - DELEGATE strike {"id","x","y","vx","vy","utc","deadline_ms"}: see `order` and `outcome`. Not idempotent: where the
-///   answer is lost nobody repeats it. So quick that it runs on the I/O thread, and waits for no worker.
+///   answer is lost it is not repeated. It is short enough to run on the I/O thread, without waiting for a worker.
 /// - PULL strike: what is left, and the orders that were carried out
 void register_tasks(cles::registrar& to, const settings& wanted);
 

@@ -42,7 +42,7 @@ void sampler::run() {
         for (const auto& [noun, read] : all) {
             try {
                 (*read)();
-            } catch (const std::exception&) { // what cannot be read now is not published; a PULL tells why
+            } catch (const std::exception&) { // what cannot be read is not published; a PULL returns the reason
             }
         }
         lock.lock();

@@ -14,7 +14,7 @@
 
 namespace sysinfo {
 
-/// Publishes what somebody is bound to, at an interval, from a thread of its own: reading a thousand processes takes
+/// Publishes the topics that have binders, at an interval, from a thread of its own: reading a thousand processes takes
 /// milliseconds that no other thread should spend. The thread starts with the first BIND, and ends with this object.
 class sampler {
   public:

@@ -24,7 +24,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                [greeting = wanted.greeting.value_or("Hello")](const cles::request& asked) {
                    return greeting + ", " + asked.parameter<std::string>(0) + "!";
                },
-               {.description = "Greets whom you name", .parameters = {"name"}});
+               {.description = "Greets the name that is given", .parameters = {"name"}});
 
     // DELEGATE node:minutes {"km":30,"kmh":60}
     to.on_delegate("minutes",

@@ -4,12 +4,15 @@
 
 import json
 import os
+import shutil
+import signal
 import subprocess
 import sys
+import tempfile
 import unittest
 from xml.etree import ElementTree
 
-from support import NodeTest, cles, environment, on_terminal
+from support import CLES, NodeTest, cles, environment, on_terminal, start, wait_until
 
 SHORT = ("--requests", "200", "--rounds", "2")
 
@@ -166,7 +169,7 @@ class Parse(unittest.TestCase):
     def test_the_plot_is_made_of_the_json(self):
         code, out, err = cles("bench", "--parse", "--requests", "2", "--rounds", "1", "-o", "json")
         self.assertEqual((code, err), (0, ""))
-        script = os.path.join(os.path.dirname(__file__), "..", "..", "perf", "plot_parse.py")
+        script = os.path.join(os.path.dirname(__file__), "..", "..", "perf", "messages", "plot_parse.py")
         plot = subprocess.run([sys.executable, script], input=out, capture_output=True, text=True, check=True).stdout
         lines = [each for each in ElementTree.fromstring(plot).iter() if each.tag.endswith("polyline")]
         self.assertEqual([len(each.get("points").split()) for each in lines], [8] * 6)
@@ -246,6 +249,71 @@ class Usage(unittest.TestCase):
         code, out, err = cles("bench", "--against", "unix:///nowhere/at/all.sock")
         self.assertEqual((code, out), (1, ""))
         self.assertIn("unix:///nowhere/at/all.sock", err)
+
+
+def command_of(process):
+    with open(f"/proc/{process.pid}/cmdline", encoding="utf-8") as cmdline:
+        return cmdline.read().replace("\0", " ")
+
+
+class Program(unittest.TestCase):
+    """`cles bench` starts `cles-bench`."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory(prefix="cles-bench-")
+        self.addCleanup(folder.cleanup)
+        self.alone = os.path.join(folder.name, "alone", "cles")  # a copy with nothing beside it
+        self.path = os.path.join(folder.name, "path")
+        os.mkdir(os.path.dirname(self.alone))
+        os.mkdir(self.path)
+        shutil.copy(shutil.which(CLES) or CLES, self.alone)
+
+    def write_program(self, folder, text):
+        program = os.path.join(folder, "cles-bench")
+        with open(program, "w", encoding="utf-8") as file:
+            file.write("#!/bin/sh\n" + text)
+        os.chmod(program, 0o755)
+
+    def run_alone(self, *arguments):
+        done = subprocess.run([self.alone, *arguments], capture_output=True, text=True, timeout=30, check=False,
+                              env=environment(PATH=self.path))
+        return done.returncode, done.stdout, done.stderr
+
+    def test_one_line_says_how_to_get_it(self):
+        code, out, err = self.run_alone("bench", "--bytes")
+        self.assertEqual((code, out), (1, ""))
+        self.assertRegex(err, r"^cles: cannot find cles-bench[^\n]*CLES_BUILD_PERF[^\n]*\n$")
+
+    def test_help_and_completion_do_not_need_it(self):
+        self.assertEqual(self.run_alone("bench", "--help"), cles("bench", "--help"))
+        self.assertEqual(self.run_alone("__complete", "bench", "--transp")[1].split("\t")[0], "--transport")
+        self.assertEqual(self.run_alone("__complete", "bench", "--transport", "un"), (0, "unix\t\n", ""))
+
+    def test_it_gets_the_options_and_its_exit_code_counts(self):
+        self.write_program(self.path, 'echo "in PATH:" "$@"; exit 7\n')
+        self.assertEqual(self.run_alone("-v", "bench", "--rounds", "3", "-o", "json"),
+                         (7, "in PATH: --rounds 3 -o json\n", ""))
+        self.write_program(os.path.dirname(self.alone), 'echo "beside:" "$@"\n')
+        self.assertEqual(self.run_alone("bench", "--requests=1 000", "--bytes")[0], 2)  # refused before
+        self.assertEqual(self.run_alone("bench", "--against", "a b"), (0, "beside: --against a b\n", ""))
+
+    def test_one_that_cannot_be_started_is_reported(self):
+        self.write_program(self.path, "exit 0\n")
+        os.chmod(os.path.join(self.path, "cles-bench"), 0o644)
+        self.assertEqual(self.run_alone("bench"), (1, "", "cles: cannot start cles-bench: Permission denied\n"))
+
+    def test_a_signal_ends_it(self):
+        with start("bench", "--bytes", "--requests", "100000000") as process:
+            wait_until(lambda: command_of(process).startswith("cles-bench "), "cles-bench runs")
+            process.send_signal(signal.SIGTERM)
+            self.assertEqual(process.wait(30), -signal.SIGTERM)
+
+    def test_started_directly_it_is_the_same(self):
+        program = os.path.join(os.path.dirname(os.path.realpath(shutil.which(CLES) or CLES)), "cles-bench")
+        for arguments in (("--help",), ("--rounds", "0"), ("--binders", "2"), ("-v", "--binders", "2")):
+            done = subprocess.run([program, *arguments], capture_output=True, text=True, timeout=30, check=False,
+                                  env=environment())
+            self.assertEqual((done.returncode, done.stdout, done.stderr), cles("bench", *arguments))
 
 
 class Terminal(unittest.TestCase):

@@ -69,7 +69,7 @@ class WithoutNodes(unittest.TestCase):
         self.assertEqual(list(offered("pull", "--output=j")), ["--output=json"])
         self.assertEqual(set(offered("ping", "-o", "")), {"json", "text"})
         self.assertEqual(set(offered("top", "--sort", "")), {"load", "name"})
-        self.assertEqual(offered("pull", "--coun")["--count"], "How often")
+        self.assertEqual(offered("pull", "--coun")["--count"], "Number of requests")
         self.assertEqual(offered("pull", "-n", ""), {})
         self.assertEqual(set(offered("completion", "")), {"bash", "zsh", "fish"})
 
@@ -95,8 +95,8 @@ class WithoutNodes(unittest.TestCase):
         env = environment(CLES_MULTICAST=f"lo,239.255.25.38:{free_port()}")
         self.assertEqual(list(offered("pull", "", env=env)), ["self:", "any:", "all:"])
         self.assertEqual(offered("pull", "car1:", env=env), {})
-        self.assertEqual(offered("pull", "a", env=env), {"any:": "one that offers the task",
-                                                         "all:": "all that offer the task"})
+        self.assertEqual(offered("pull", "a", env=env), {"any:": "a node that offers the task",
+                                                         "all:": "all nodes that offer the task"})
 
     def test_it_never_fails(self):
         for words in ((), ("",), ("pull", "--at", "nowhere", ""), ("pull", "-p", "", ""), ("pull", "--nonsense", "x"),
@@ -128,7 +128,7 @@ class Nouns(unittest.TestCase):
         found = soon("pull", "car1:")
         self.assertEqual(set(found), {"car1:localization", "car1:echo/", "car1:cles", "car1:cles/metrics",
                                       "car1:cles/peers"})
-        self.assertEqual(found["car1:echo/"], "Gives its parameters back")
+        self.assertEqual(found["car1:echo/"], "Returns its parameters")
         self.assertEqual(list(soon("pull", "car1:loc")), ["car1:localization"])
         self.assertEqual(set(soon("push", "car1:")), {"car1:echo"})
         self.assertEqual(set(soon("delegate", "car1:")), {"car1:echo", "car1:sleep/", "car1:fail"})
@@ -293,10 +293,10 @@ class Shells(unittest.TestCase):
             wait_until(ask, f"fish completes '{typed}'")
             return found
 
-        self.assertEqual(completions("cles pin"), {"ping": "Measure round trips of a small PULL"})
+        self.assertEqual(completions("cles pin"), {"ping": "Measure the round trip time of a small PULL"})
         self.assertEqual(set(completions("cles pull car")), {"car1:"})
         self.assertEqual(set(completions("cles pull car1:loc")), {"car1:localization"})
-        self.assertEqual(completions("cles pull car1:e")["car1:echo/"], "Gives its parameters back")
+        self.assertEqual(completions("cles pull car1:e")["car1:echo/"], "Returns its parameters")
         self.assertEqual(set(completions("cles delegate car1:")), {"car1:echo", "car1:sleep/", "car1:fail"})
         self.assertEqual(set(completions("cles pull --output=j")), {"--output=json"})
         self.assertIn("self:localization", completions("cles pull --at " + self.node.url + " self:"))

@@ -133,9 +133,9 @@ class Doctor(unittest.TestCase):
         self.assertEqual(list(found), ["config", "interfaces", "multicast", "ports", "nodes", "clock", "limits"])
         self.assertEqual([each["text"] for each in found["ports"]],
                          ["tcp://127.0.0.1:25370 is free", "udp://127.0.0.1:25370 is free"])
-        self.assertEqual(found["nodes"][0]["text"], "nobody is heard")
+        self.assertEqual(found["nodes"][0]["text"], "no nodes found")
         self.assertIn("v0 10.77.0.1", found["interfaces"][0]["text"])
-        self.assertIn("239.255.25.37:25370 on lo is heard", found["multicast"][0]["text"])
+        self.assertIn("datagrams to 239.255.25.37:25370 on lo are received", found["multicast"][0]["text"])
 
     def test_as_text(self):
         self.clesd("echo 'clesd: x.yaml:3: workers: wrong' >&2; exit 2")
@@ -143,7 +143,7 @@ class Doctor(unittest.TestCase):
         self.assertEqual(code, 1)
         first, second, third = out.splitlines()[:3]
         self.assertEqual(first, "failure  config      clesd: x.yaml:3: workers: wrong")
-        self.assertRegex(second, r"^ {21}-> mend it")
+        self.assertRegex(second, r"^ {21}-> correct it")
         self.assertRegex(third, r"^ok       interfaces  ")
 
     def test_the_configuration(self):
@@ -153,7 +153,7 @@ class Doctor(unittest.TestCase):
         self.clesd("kill -9 $$")
         self.failure(self.examine()[1], "config", "did not end by itself")
         self.clesd("exit 1")
-        self.failure(self.examine()[1], "config", "refuses its configuration")
+        self.failure(self.examine()[1], "config", "rejects its configuration")
 
     def test_plugins_that_are_not_required(self):
         self.clesd("echo 'clesd: a.yaml:3: plugins[0].path: a.so: there is no such file (it is not required)' >&2; "
@@ -198,35 +198,35 @@ class Doctor(unittest.TestCase):
         self.assertRegex(by_tcp["text"], r"^tcp://127.0.0.1:25370: the node sat1 is there, version \d")
         # It has more to say of itself than goes into a datagram.
         self.assertRegex(by_udp["text"], r"^udp://127.0.0.1:25370: a node is there, which answers: sat1: .* use TCP$")
-        self.assertEqual(found["nodes"][0]["text"], "one is heard")
+        self.assertEqual(found["nodes"][0]["text"], "1 node found")
         self.assertFalse([each for each in found["clock"] if "sat1" in each["text"]])  # whose clock is this host's
 
     def test_an_interface_that_is_not_there(self):
         code, found = self.examine(CLES_MULTICAST="nowhere0")
         self.assertEqual(code, 1)
-        self.failure(found, "interfaces", "by nowhere0, and there is none")
+        self.failure(found, "interfaces", "for nowhere0, which does not exist")
         self.failure(found, "multicast", "cannot join the group 239.255.25.37 on nowhere0")
         self.assertIn("ports", found)  # the rest is looked at all the same
 
     def test_an_interface_that_is_down(self):
         self.hosts._ip(self.hosts.near, "link", "set", "v0", "down")
         _, found = self.examine("-m", "v0")
-        self.failure(found, "interfaces", "by v0, which is down")
+        self.failure(found, "interfaces", "for v0, which is down")
         self.failure(found, "multicast", "v0")
 
     def test_what_two_machines_take(self):
         takes = ("to reach other hosts: CLES_MULTICAST=v0 (there their own interface), nodes with --listen "
                  "tcp://10.77.0.1 --insecure, and UDP port 25370 open")
         on_loopback = self.examine()[1]["interfaces"][1]
-        self.assertEqual(on_loopback["text"], "multicast goes by lo: only nodes on this host find each other")
+        self.assertEqual(on_loopback["text"], "multicast uses lo: only nodes on this host find each other")
         self.assertEqual(on_loopback["advice"], takes)
         self.assertEqual(self.examine("-m", "v0")[1]["interfaces"][1]["advice"], takes)
 
     def test_another_interface(self):
         code, found = self.examine("-m", "v0")
         self.assertEqual(code, 0, found)
-        self.assertEqual(found["interfaces"][1]["text"], "multicast goes by v0")
-        self.assertIn("25370 on v0 is heard", found["multicast"][0]["text"])
+        self.assertEqual(found["interfaces"][1]["text"], "multicast uses v0")
+        self.assertIn("25370 on v0 are received", found["multicast"][0]["text"])
 
     def test_no_multicast_wanted(self):
         code, found = self.examine("-m", "off")
@@ -239,17 +239,17 @@ class Doctor(unittest.TestCase):
         self.assertEqual(code, 0, found)
         for each, way in zip(found["ports"], ("tcp", "udp")):
             self.assertRegex(each["text"], rf"^{way}://127.0.0.1:25370: the node car1 is there, version \d")
-        self.assertEqual(found["nodes"][0]["text"], "one is heard")
+        self.assertEqual(found["nodes"][0]["text"], "1 node found")
 
     def test_a_stranger_at_the_usual_port(self):
         stranger = self.start(sys.executable, "-c", STRANGER, "tcp", wait_for="up")
-        failure = self.failure(self.examine()[1], "ports", r"tcp://127\.0\.0\.1:25370: .* it is no node")
+        failure = self.failure(self.examine()[1], "ports", r"tcp://127\.0\.0\.1:25370: .* which is not a node")
         self.assertRegex(failure["text"], rf"python\S* \(process {stranger.pid}\)")
 
     def test_a_stranger_at_the_port_of_the_group(self):
         self.start(sys.executable, "-c", STRANGER, "udp", wait_for="up")
         _, found = self.examine()
-        self.failure(found, "multicast", "cannot listen to udp port 25370: Address already in use")
+        self.failure(found, "multicast", "cannot listen at udp port 25370: Address already in use")
         self.failure(found, "ports", "udp://127.0.0.1:25370")
 
     def test_two_nodes_of_one_name(self):
@@ -259,15 +259,15 @@ class Doctor(unittest.TestCase):
 
         def clash():
             found.update(self.examine()[1])
-            return any("two nodes call themselves car1" in each["text"] for each in found["nodes"])
+            return any("two nodes have the name car1" in each["text"] for each in found["nodes"])
 
         wait_until(clash, "the clash is told")
-        self.failure(found, "nodes", "two nodes call themselves car1")
+        self.failure(found, "nodes", "two nodes have the name car1")
 
     def test_a_node_that_does_not_answer(self):
         self.start(sys.executable, "-c", GHOST, "silent", "0", wait_for="up")
         _, found = self.examine()
-        self.failure(found, "nodes", "ghost announces itself, and does not answer at tcp://127.0.0.1:")
+        self.failure(found, "nodes", "ghost announces itself, but does not answer at tcp://127.0.0.1:")
 
     def test_another_clock(self):
         for offset, says in (("3600", "ahead of"), ("-3600", "behind")):
@@ -276,7 +276,7 @@ class Doctor(unittest.TestCase):
             self.assertEqual(code, 0, found)
             told = [each for each in found["clock"] if "ghost" in each["text"]]
             self.assertEqual([each["verdict"] for each in told], ["warning"])
-            self.assertRegex(told[0]["text"], rf"^ghost is 3(600|599)\.\d+ s {says} this host$")
+            self.assertRegex(told[0]["text"], rf"^the clock of ghost is 3(600|599)\.\d+ s {says} that of this host$")
             ghost.kill()
             ghost.wait()
         self.start(sys.executable, "-c", GHOST, "answers", "0", wait_for="up")

@@ -78,7 +78,7 @@ class Interfaces(unittest.TestCase):
         self.assertEqual(self.found_at(far, "v1,w1"), [("car1", "live", [f"tcp://10.77.0.1:{port}"])])
         code, out, err = self.run_at(far, "lo", "ls", "-o", "json")
         self.assertEqual((code, json.loads(out)["peers"]), (0, []))
-        self.assertIn("nobody has announced itself on lo;", err)
+        self.assertIn("no node has announced itself on lo;", err)
 
     def test_what_listens_on_loopback_alone_is_asked_by_loopback(self):
         port = self.serve("v0,lo", "car1", listen="tcp://127.0.0.1:0")
@@ -183,16 +183,16 @@ class Interfaces(unittest.TestCase):
         code, out, err = self.run_at(self.hosts.near, "lo,v0,x0", "doctor", "-o", "json")
         self.assertEqual((code, err), (1, ""))
         found = [(e["check"], e["verdict"], e["text"]) for e in json.loads(out)["findings"]]
-        self.assertIn(("interfaces", "ok", "multicast goes by lo, for nodes on this host"), found)
-        self.assertIn(("interfaces", "ok", "multicast goes by v0"), found)
-        self.assertIn(("interfaces", "failure", "multicast is to go by x0, which has no IPv4 address"), found)
+        self.assertIn(("interfaces", "ok", "multicast uses lo, for nodes on this host"), found)
+        self.assertIn(("interfaces", "ok", "multicast uses v0"), found)
+        self.assertIn(("interfaces", "failure", "multicast is configured for x0, which has no IPv4 address"), found)
         for name in ("lo", "v0"):
-            self.assertIn(("multicast", "ok", f"what is sent to 239.255.25.37:25370 on {name} is heard"), found)
-        advice = [e.get("advice", "") for e in json.loads(out)["findings"] if e["text"] == "multicast goes by v0"]
+            self.assertIn(("multicast", "ok", f"datagrams to 239.255.25.37:25370 on {name} are received"), found)
+        advice = [e.get("advice", "") for e in json.loads(out)["findings"] if e["text"] == "multicast uses v0"]
         self.assertIn("CLES_MULTICAST=lo,v0,x0 (there their own interface)", advice[0])
         code, out, _ = self.run_at(self.hosts.near, "auto", "doctor", "-o", "json")
         self.assertEqual([e["text"] for e in json.loads(out)["findings"] if e["check"] == "multicast"],
-                         [f"what is sent to 239.255.25.37:25370 on {name} is heard" for name in ("lo", "v0", "w0")])
+                         [f"datagrams to 239.255.25.37:25370 on {name} are received" for name in ("lo", "v0", "w0")])
 
 
 if __name__ == "__main__":

@@ -117,7 +117,7 @@ class Found(Group):
         first, second = err.splitlines()
         self.assertRegex(first, r"^cles: no_target: cles-\d+ cannot find 'car9': nobody of that name has announced "
                                 r"itself on lo; give its URL$")
-        self.assertEqual(second, "cles: cles ls shows who is there; --at URL or --peer NAME=URL says where else to ask")
+        self.assertEqual(second, "cles: cles ls lists the nodes; --at URL or --peer NAME=URL gives the address of another one")
 
     def test_self_is_who_listens_at_the_default_address(self):
         code, _, err = by_name("pull", "self:cles", "--at", self.nodes[1].url)
@@ -140,7 +140,7 @@ class Alone(unittest.TestCase):
         empty = environment(CLES_MULTICAST=f"lo,239.255.25.38:{free_port()}")
         code, out, err = cles("ls", "-o", "json", env=empty)
         self.assertEqual((code, out), (0, '{"peers":[]}\n'))
-        self.assertEqual(err, "cles: nobody has announced itself on lo; --multicast says where else to listen\n")
+        self.assertEqual(err, "cles: no node has announced itself on lo; --multicast selects other interfaces\n")
 
     def test_without_multicast(self):
         for options in ({"env": environment(CLES_MULTICAST="off")}, {"env": ENVIRONMENT}):

@@ -25,7 +25,7 @@ class Answers(NodeTest):
         self.assertEqual((code, out), (0, '{"parameters":[]}\n'))
         code, out, err = cles("pull", "car3:echo", "--peer", f"car1={self.node.url}")
         self.assertEqual((code, out), (3, ""))
-        self.assertEqual(err, "cles: no_target: no --peer is called 'car3', and there is no --at\n")
+        self.assertEqual(err, "cles: no_target: there is no --peer 'car3', and no --at\n")
         code, out, _ = cles("pull", "self:echo", "--peer", "car2=tcp://127.0.0.1:1", "--at", self.node.url)
         self.assertEqual((code, out), (0, '{"parameters":[]}\n'))
 

@@ -218,7 +218,7 @@ class Info(NodeTest):
         self.assertRegex(out, r"(?m)^uptime     \d+ (ms|s)")
         self.assertIn(f"endpoints  {self.node.url}\n           {self.node.unix}\n", out)
         self.assertRegex(out, r"(?m)^VERB +TASK +DESCRIPTION$")
-        self.assertRegex(out, r"(?m)^DELEGATE +sleep/<ms> +Takes so many milliseconds")
+        self.assertRegex(out, r"(?m)^DELEGATE +sleep/<ms> +Waits that many milliseconds")
 
     def test_json_when_piped(self):
         about = self.run_json("info")

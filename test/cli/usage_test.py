@@ -65,14 +65,14 @@ class Usage(unittest.TestCase):
 
     def test_numbers(self):
         for text in ("x", "", "-1s", "1h30", "5 s", "inf", "nan", "1e3", "0x10"):
-            self.refused("pull", "car1:a", f"--timeout={text}", says="" if text == "" else "no time")
+            self.refused("pull", "car1:a", f"--timeout={text}", says="" if text == "" else "not a duration")
         self.refused("pull", "car1:a", "-t", "0", says="too short")
-        self.refused("pull", "car1:a", "-t", "90000", says="more than a day")
-        self.refused("pull", "car1:a", "-i", "soon", says="no time")
+        self.refused("pull", "car1:a", "-t", "90000", says="longer than a day")
+        self.refused("pull", "car1:a", "-i", "soon", says="not a duration")
         for text in ("x", "-1", "1.5"):
             self.refused("pull", "car1:a", "-n", text, says="--count")
         self.refused("bind", "car1:a", "--keep", "0", says="--keep")
-        self.refused("bind", "car1:a", "--every", "x", says="no time")
+        self.refused("bind", "car1:a", "--every", "x", says="not a duration")
         self.refused("hz", "car1:a", "-w", "0", says="--window")
 
     def test_top(self):

@@ -73,8 +73,22 @@ def check_daemon(consumer: Consumer, clesd: Path) -> None:
     expect(daemon.returncode == 0 and "plugin system" in log, f"clesd ended with {daemon.returncode}:\n{log}")
 
 
+def check_case_studies(consumer: Consumer, prefix: Path) -> None:
+    """The programs and plugins of the case studies are only installed as a component."""
+    wanted = {"cles-dsgd", "cles-jadc2", "cles-platoon", "libcles-fmv.so", "libcles-sgd.so", "libcles-strike.so"}
+    by_default = wanted & {file.name for file in prefix.rglob("*")}
+    expect(not by_default, f"installed without being asked for: {by_default}")
+
+    component = consumer.scratch / "case_studies"
+    consumer.run(consumer.options.cmake, "--install", consumer.options.build, "--prefix", component,
+                 "--component", "case_studies")
+    installed = {file.name for file in component.rglob("*") if file.is_file()}
+    expect(installed == wanted, f"the component contains {installed}, not {wanted}")
+
+
 def install(consumer: Consumer) -> None:
     prefix = consumer.install()
+    check_case_studies(consumer, prefix)
     source = consumer.options.source
     for public in (source / "libcles" / "include").rglob("*.hpp"):
         name = public.relative_to(source / "libcles")
@@ -108,6 +122,10 @@ def find_package(consumer: Consumer) -> None:
                                f"-DEXPECTED_VERSION={consumer.options.version}")
     consumer.run(consumer.options.cmake, "--build", build)
     consumer.check(build / "my_program")
+    # Compiled with Asio's functions from the library or with its own, or partly with each.
+    consumer.check(build / "my_header_only_program")
+    printed = consumer.run(build / "my_mixed_program")
+    expect(printed == 'one category, 2 signals, {"value":27.5}\n', f"the mixed program printed {printed!r}")
 
 
 def pkg_config(consumer: Consumer) -> None:
@@ -115,17 +133,19 @@ def pkg_config(consumer: Consumer) -> None:
     places = {"PKG_CONFIG_PATH": str(next(prefix.rglob("cles.pc")).parent)}
     version = consumer.run("pkg-config", "--modversion", "cles", environment=places).strip()
     expect(version == consumer.options.version, f"pkg-config says version {version}")
-    flags = consumer.run("pkg-config", "--cflags", "--libs", "cles", environment=places).split()
-    program = consumer.scratch / "my_program"
     launcher = [found] if (found := shutil.which("ccache")) else []
-    compiled = [flag for flag in flags if flag.startswith(("-I", "-D", "-isystem", "-pthread"))]
-    linked = [flag for flag in flags if flag not in compiled or flag == "-pthread"]
-    # In two steps, which ccache remembers.
-    object_file = consumer.scratch / "consumer.o"
-    consumer.run(*launcher, consumer.options.compiler, "-std=c++20", "-c", HERE / "consumer.cpp", "-o", object_file,
-                 *compiled)
-    consumer.run(consumer.options.compiler, object_file, "-o", program, *linked)
-    consumer.check(program)
+    for asio_flags, separate in (((), True), (("--define-variable=asio_cflags=",), False)):
+        flags = consumer.run("pkg-config", *asio_flags, "--cflags", "--libs", "cles", environment=places).split()
+        expect(("-DBOOST_ASIO_SEPARATE_COMPILATION" in flags) == separate, f"with {asio_flags} the flags are {flags}")
+        compiled = [flag for flag in flags if flag.startswith(("-I", "-D", "-isystem", "-pthread"))]
+        linked = [flag for flag in flags if flag not in compiled or flag == "-pthread"]
+        # In two steps, which ccache remembers.
+        object_file = consumer.scratch / "consumer.o"
+        consumer.run(*launcher, consumer.options.compiler, "-std=c++20", "-c", HERE / "consumer.cpp", "-o", object_file,
+                     *compiled)
+        program = consumer.scratch / "my_program"
+        consumer.run(consumer.options.compiler, object_file, "-o", program, *linked)
+        consumer.check(program)
 
 
 def add_subdirectory(consumer: Consumer) -> None:

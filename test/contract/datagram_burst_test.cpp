@@ -36,7 +36,7 @@ struct fixture {
             text += line;
         }
         int calls = 0;
-        cles::transport::lines_done done;
+        cles::core::lines_done done;
         for (std::string_view rest = text; !rest.empty(); ++calls) {
             const auto sent = burst.send(rest);
             BOOST_REQUIRE(sent.bytes > 0U);

@@ -3,6 +3,7 @@
 #include "support/group_address.hpp"
 #include "support/run_until.hpp"
 #include "transport/group_port.hpp"
+#include "transport/ip_interface.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/multicast.hpp>
@@ -32,7 +33,7 @@ using asio::ip::udp;
 
 namespace {
 
-struct member final : cles::transport::group_events {
+struct member final : cles::core::group_listener {
     member(asio::io_context& io, const cles::multicast_options& where)
         : port(std::make_shared<cles::transport::group_port>(io.get_executor(),
                                                              cles::transport::find_interface(where.interface), where)) {
@@ -40,10 +41,10 @@ struct member final : cles::transport::group_events {
     }
     ~member() { port->close(); }
 
-    void on_datagram(const cles::transport::group_datagram& datagram) override {
+    void on_datagram(const cles::core::group_datagram& datagram) override {
         heard.emplace_back(datagram.text);
         sources.push_back(datagram.from);
-        said.push_back(datagram.said != nullptr);
+        said.push_back(datagram.request != nullptr);
         if (during) {
             during();
         }
@@ -60,7 +61,7 @@ struct member final : cles::transport::group_events {
 
     std::shared_ptr<cles::transport::group_port> port;
     std::vector<std::string> heard;
-    std::vector<udp::endpoint> sources;
+    std::vector<cles::core::group_source> sources;
     std::deque<bool> said;
     std::function<void()> during{};
     int batches = 0;
@@ -83,7 +84,7 @@ BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixtu
     BOOST_TEST(two.heard[0] == "BIND all:x\n");
     BOOST_TEST((two.sources[0] == one.port->source()));
     BOOST_TEST((one.port->source() != two.port->source()));
-    BOOST_TEST(one.port->source().address().is_loopback());
+    BOOST_TEST(one.port->source().is_loopback());
     BOOST_TEST(two.said[0]);
     one.port->send("garbage\n");
     run_until(io, [&] { return two.heard.size() == 2; });
@@ -249,7 +250,8 @@ BOOST_FIXTURE_TEST_CASE(datagrams_go_out_with_a_TTL_of_1, fixture) {
     sniffer.set_option(asio::socket_base::reuse_address{true});
     sniffer.bind({asio::ip::make_address_v4(where.group), where.port});
     const auto by = cles::transport::find_interface("lo");
-    sniffer.set_option(asio::ip::multicast::join_group{asio::ip::make_address_v4(where.group), by.address});
+    sniffer.set_option(
+        asio::ip::multicast::join_group{asio::ip::make_address_v4(where.group), asio::ip::address_v4{by.address}});
     const int on = 1;
     BOOST_REQUIRE(::setsockopt(sniffer.native_handle(), IPPROTO_IP, IP_RECVTTL, &on, sizeof on) == 0);
     sniffer.non_blocking(true);

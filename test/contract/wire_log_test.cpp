@@ -3,8 +3,8 @@
 
 #include <cles/link.hpp>
 
+#include "client/wire_log.hpp"
 #include "support/link_pair.hpp"
-#include "wire_log.hpp"
 
 #include <boost/test/data/monomorphic.hpp>
 #include <boost/test/data/test_case.hpp>

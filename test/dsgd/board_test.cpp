@@ -76,7 +76,7 @@ BOOST_AUTO_TEST_CASE(any_is_asked_again_until_there_is_nobody) {
 
 BOOST_AUTO_TEST_CASE(a_busy_node_is_asked_again_but_not_for_ever) {
     auto all = four({"a", "b"});
-    for (std::size_t i = 1; i < dsgd::board::most_attempts; ++i) {
+    for (std::size_t i = 1; i < dsgd::board::max_attempts; ++i) {
         BOOST_TEST(all.failed(0, error(errc::busy)));
         BOOST_TEST(all.shards()[0].target == "a");
     }

@@ -183,7 +183,7 @@ class Manager(unittest.TestCase):
     def test_no_node_is_there(self):
         code, out, err = run("--at", "tcp://127.0.0.1:1")
         self.assertEqual((code, out), (3, ""))
-        self.assertEqual(err, "cles-dsgd: no node answers where it was told to ask (--at): is clesd running there?\n")
+        self.assertEqual(err, "cles-dsgd: no node answers at the given address (--at): is clesd running there?\n")
 
     def test_no_node_has_the_plugin(self):
         with node("sat1", plugin="") as daemon:

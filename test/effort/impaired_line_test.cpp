@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "perf/link_relay/impaired_line.hpp"
+#include "perf/links/impaired_line.hpp"
 
 #include <boost/test/unit_test.hpp>
 

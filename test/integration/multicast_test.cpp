@@ -8,6 +8,7 @@
 #include "support/group_address.hpp"
 #include "support/run_until.hpp"
 #include "transport/group_port.hpp"
+#include "transport/ip_interface.hpp"
 
 #include <boost/describe/class.hpp>
 #include <boost/test/unit_test.hpp>
@@ -79,14 +80,14 @@ std::uint64_t metric(cles::service& of, const std::string& name) {
 }
 
 /// Somebody in the group who is no node: hears all, and says what a test wants.
-struct stranger final : cles::transport::group_events {
+struct stranger final : cles::core::group_listener {
     stranger(boost::asio::io_context& io, const cles::multicast_options& where)
         : port(std::make_shared<cles::transport::group_port>(io.get_executor(),
                                                              cles::transport::find_interface(where.interface), where)) {
         port->start(*this);
     }
     ~stranger() { port->close(); }
-    void on_datagram(const cles::transport::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
+    void on_datagram(const cles::core::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
     void on_batch() override {}
     void on_room() override {}
     void say(std::string_view line) { port->send(line); }

@@ -18,31 +18,31 @@ BOOST_AUTO_TEST_SUITE(commander)
 
 BOOST_AUTO_TEST_CASE(the_oldest_that_is_in_sight_is_worth_it) {
     jadc2::commander c;
-    BOOST_TEST(!c.worth_striking(10));
-    c.see(picture_of(
+    BOOST_TEST(!c.select_target(10));
+    c.set_picture(picture_of(
         {{.id = 1, .age = 9}, {.id = 2, .age = 12}, {.id = 3, .age = 50, .missed = 1}, {.id = 4, .age = 30}}));
-    BOOST_TEST_REQUIRE(c.worth_striking(10).has_value());
-    BOOST_TEST(c.worth_striking(10)->id == 4U);
-    BOOST_TEST(!c.worth_striking(31));
+    BOOST_TEST_REQUIRE(c.select_target(10).has_value());
+    BOOST_TEST(c.select_target(10)->id == 4U);
+    BOOST_TEST(!c.select_target(31));
 }
 
 BOOST_AUTO_TEST_CASE(against_one_target_there_is_one_order) {
     jadc2::commander c;
-    c.see(picture_of({{.id = 1, .age = 20}, {.id = 2, .age = 12}}));
-    c.ordered(*c.worth_striking(10));
-    BOOST_TEST_REQUIRE(c.worth_striking(10).has_value());
-    BOOST_TEST(c.worth_striking(10)->id == 2U);
-    c.ordered(*c.worth_striking(10));
-    BOOST_TEST(!c.worth_striking(10));
+    c.set_picture(picture_of({{.id = 1, .age = 20}, {.id = 2, .age = 12}}));
+    c.ordered(*c.select_target(10));
+    BOOST_TEST_REQUIRE(c.select_target(10).has_value());
+    BOOST_TEST(c.select_target(10)->id == 2U);
+    c.ordered(*c.select_target(10));
+    BOOST_TEST(!c.select_target(10));
     auto other = picture_of({{.id = 1, .age = 20}}); // another node's first is another target
     other.by = "sat2";
-    c.see(other);
-    BOOST_TEST(c.worth_striking(10).has_value());
+    c.set_picture(other);
+    BOOST_TEST(c.select_target(10).has_value());
 }
 
 BOOST_AUTO_TEST_CASE(a_target_is_found_by_its_number) {
     jadc2::commander c;
-    c.see(picture_of({{.id = 3, .x = 7}}));
+    c.set_picture(picture_of({{.id = 3, .x = 7}}));
     BOOST_TEST_REQUIRE(c.find(3).has_value());
     BOOST_TEST(c.find(3)->x == 7);
     BOOST_TEST(!c.find(4));

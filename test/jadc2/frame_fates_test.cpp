@@ -33,7 +33,7 @@ BOOST_AUTO_TEST_CASE(where_it_is_lost_any_is_asked) {
         BOOST_TEST(!all.failed(why)); // no news
         all.captured();
         BOOST_TEST(all.done("sat2"));
-        BOOST_TEST(all.trouble().empty());
+        BOOST_TEST(all.error().empty());
     }
 }
 

@@ -32,7 +32,7 @@ class Missing(unittest.TestCase):
     def test_no_satellite(self):
         recon = self.fleet.recon([f"tcp://127.0.0.1:{free_port()}"], "--frames", "20")
         self.assertEqual(recon.end(), 3)
-        self.assertEqual(recon.all("trouble")[0]["text"], "no processing: no node answers where it was told to ask "
+        self.assertEqual(recon.all("trouble")[0]["text"], "no processing: no node answers at the given address "
                                                           "(--satellite): is clesd running there?")
         frames = recon.all("report")[0]["data"]["frames"]
         self.assertEqual((frames["captured"], frames["done"]), (20, 0))
@@ -66,7 +66,7 @@ class Missing(unittest.TestCase):
                          {"given": 1, "done": 0, "refused": 1, "failed": 0, "unknown": 0, "open": 0})
 
     def test_no_strike_aircraft(self):
-        self.check_refused([f"tcp://127.0.0.1:{free_port()}"], "no node answers where it was told to ask (--strike)")
+        self.check_refused([f"tcp://127.0.0.1:{free_port()}"], "no node answers at the given address (--strike)")
 
     def test_a_strike_aircraft_without_the_plugin(self):
         self.check_refused([self.fleet.striker(plugins=[])], "is libcles-strike.so among the plugins of a node?")

@@ -95,7 +95,7 @@ class Story(unittest.TestCase):
             mission.wait_for("picture")
             self.assertEqual(mission.all("decided"), [])  # nobody but the operator does
             type_in("strike")
-            mission.wait_for("operator", "'strike' is no order")
+            mission.wait_for("operator", "'strike' is not an order")
             type_in("strike 999999")
             mission.wait_for("operator", "there is no target 999999 now")
             decided = mission.order_by_hand()["data"]

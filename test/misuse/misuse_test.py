@@ -5,7 +5,7 @@
     misuse_test.py --compiler CXX --include DIR... --define NAME... --scratch DIR
 
 Of each program the first error must be the library's own, and the only one. Programs that look alike and are right must
-compile. All share one precompiled header.
+compile. All that include nothing share one precompiled header.
 """
 
 import argparse
@@ -113,6 +113,11 @@ WRONG = {
         coroutine('auto feed = co_await node.async_bind<undescribed>("a:b"); co_await feed.async_next();'),
         "this type cannot be read from JSON",
     ),
+    "coroutine_header_missing": (
+        "#include <cles/registrar.hpp>\n#include <boost/asio/awaitable.hpp>\n"
+        'void f(cles::registrar& to) { to.on_pull("x", []() -> boost::asio::awaitable<int> { co_return 1; }); }',
+        "a handler that is a coroutine needs #include <cles/coroutine_handler.hpp>",
+    ),
     "default_of_no_member": (
         "struct old { int a = 0; int b = 0; }; BOOST_DESCRIBE_STRUCT(old, (), (a, b)) CLES_DEFAULTS(old, (c))\n"
         'int f() { return cles::from_json<old>("{}").a; }',
@@ -166,6 +171,10 @@ RIGHT = {
         node.update("note", note{"x"});
         """
     ),
+    "coroutine_header": (
+        "#include <cles/coroutine_handler.hpp>\n"
+        'void f(cles::registrar& to) { to.on_pull("x", []() -> boost::asio::awaitable<int> { co_return 1; }); }'
+    ),
     "handlers": """
         int free_function(position) { return 1; }
         struct counter { int operator()(const cles::request&) const { return 1; } };
@@ -194,8 +203,9 @@ LONGEST = 400  # characters of a line that somebody reads
 
 def compile_one(arguments, name: str, program: str, standard: str = "c++20") -> list[str]:
     source = arguments.scratch / f"{name}.cpp"
-    include = '#include "misuse.hpp"\n' if standard == "c++20" else "#include <cles/service.hpp>\n"
-    source.write_text(include + program + "\n", encoding="utf-8")
+    if not program.startswith("#include"):
+        program = ('#include "misuse.hpp"\n' if standard == "c++20" else "#include <cles/service.hpp>\n") + program
+    source.write_text(program + "\n", encoding="utf-8")
     done = subprocess.run(
         [*arguments.command, f"-std={standard}", "-fsyntax-only", str(source)],
         capture_output=True,

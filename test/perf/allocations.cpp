@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// In steady state, a PULL allocates nothing at the service. The service runs in this process, whose every allocation is
-// counted; the client in another.
+// In steady state, a PULL allocates nothing at the service. The service runs in this process, whose allocations are
+// counted; the client in another one.
 #include <cles/service.hpp>
 
 #include "scripted_client.hpp"
@@ -20,7 +20,7 @@
 
 // --- Counting --------------------------------------------------------------------------------------------------------
 
-// glibc's own names, below the ones that are replaced here. `operator new` comes by `malloc` too.
+// The names that glibc uses for the functions that are replaced here. `operator new` calls `malloc` too.
 extern "C" {
 void* __libc_malloc(std::size_t);
 void* __libc_calloc(std::size_t, std::size_t);
@@ -69,7 +69,7 @@ constexpr std::uint64_t counted = 10'000;
 // A handler of `std::function` and the like must not be what makes the difference: the client sends some requests more.
 constexpr std::uint64_t sent = warm_up + counted + 64;
 
-/// How many allocations there were between the first counted request and the last.
+/// The number of allocations between the first counted request and the last.
 std::uint64_t allocations_of(const char* listen, const std::function<void(const std::string&)>& client) {
     boost::asio::io_context io{1};
     cles::service car{io, {.name = "car1", .listen = {listen}}};
@@ -102,7 +102,7 @@ std::uint64_t allocations_of(const char* listen, const std::function<void(const 
             ::_exit(1);
         }
     }
-    // Should the client fail, the service learns it by the end of its link only: it must not wait for ever.
+    // If the client fails, the service only notices the end of its link, and must not wait for ever.
     io.run_for(std::chrono::seconds{30});
     ::kill(child, SIGKILL);
     ::waitpid(child, nullptr, 0);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs `scripts/evaluate --quick` over all the sections that there are: that it works, not how fast anything is.
+"""Runs `scripts/evaluate --quick` over all the sections that there are: checks that it works, not how fast anything is.
 
     evaluate_test.py ROOT BUILD
 """
@@ -18,7 +18,7 @@ ROOT, BUILD = Path(sys.argv[1]), Path(sys.argv[2])
 sys.path[:0] = [str(ROOT / "perf")]
 from report import figures  # noqa: E402
 
-LIMIT_S = 1680  # less than it has, so that what was started is ended
+LIMIT_S = 1680  # less than the timeout of this test, so that what it started is ended
 
 
 class Quick(unittest.TestCase):
@@ -32,8 +32,8 @@ class Quick(unittest.TestCase):
             page = ElementTree.parse(Path(folder) / "index.html").getroot()
             raws = {path.stem: json.loads(path.read_text(encoding="utf-8")) for path in (Path(folder) / "raw").glob("*.json")}
         for name, told in run["sections"].items():
-            there = (ROOT / "perf" / "evaluate" / f"{name}.py").exists()
-            if name != "peers":  # which only a build that was asked for has programs for
+            there = (ROOT / "perf" / "evaluation" / f"{name}.py").exists()
+            if name != "peers":  # whose programs are only in some builds
                 self.assertEqual(told["state"], "ran" if there else "skipped", (name, told))
             if told["state"] == "ran":
                 with self.subTest(section=name):

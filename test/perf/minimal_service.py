@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""The minimal service fits a weak node: its size, what it links, the memory it takes while it serves.
+"""The minimal service is suitable for small devices: its size, the libraries it links, its memory while it serves.
 
     minimal_service.py STRIPPED_PROGRAM
 """
@@ -36,7 +36,7 @@ def linked_libraries(program: str) -> list[str]:
 
 
 def memory_of(process: int) -> dict[str, int]:
-    """Bytes by the names that the kernel gives them."""
+    """{name in smaps: bytes}"""
     text = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
     return {name: int(kib) * 1024 for name, kib in re.findall(r"^(\w+):\s+(\d+) kB", text, re.MULTILINE)}
 
@@ -68,7 +68,7 @@ def main(program: str) -> int:
     foreign = [name for name in libraries if not ALLOWED.search(name)]
     expect(not foreign, f"links {' '.join(libraries)}" + (f": foreign are {' '.join(foreign)}" if foreign else ""))
 
-    # Until it is on the disk, all of a file that was just linked counts as written.
+    # A file that was just linked counts as written until it is on the disk.
     with open(program, "rb") as file:
         os.fsync(file.fileno())
 

@@ -22,8 +22,8 @@ RECORDED = Path(__file__).with_name("peers_recorded.jsonl")
 sys.path.insert(0, str(FOLDER))
 import peers_rows  # noqa: E402
 
-# Says what was recorded of the peer whose name it bears, to the arguments that it was recorded for. A shell starts at
-# once, and it is started often.
+# Prints what was recorded of the peer with its name, for the arguments with which it was recorded. It is a shell script
+# because it is started often, and a shell starts quickly.
 REPLAY = """#!/bin/sh
 peer=${0##*/cles_peer_}
 if [ "$1" = --about ]; then

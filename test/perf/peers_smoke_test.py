@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""A few exchanges, tasks and publications with a peer, by each of its carriers: that it works, not how fast.
+"""A few exchanges, tasks and publications with a peer, by each of its carriers: checks that it works, not how fast.
 
     peers_smoke_test.py PROGRAM
 """
@@ -27,7 +27,7 @@ class Peer(unittest.TestCase):
         self.assertTrue(self.about["version"] and self.about["settings"])
 
     def measured(self, *arguments):
-        """By each carrier that offers it; one does at least."""
+        """By each carrier that offers it, which is at least one."""
         found = []
         for over in self.about["carriers"].split():
             with self.subTest(over=over, arguments=arguments):
@@ -65,7 +65,7 @@ class Peer(unittest.TestCase):
 
     def test_publications_reach_all_subscribers(self):
         for each in self.measured("--mode", "fanout", "--subscribers", "3", "--count", "50"):
-            if each["over"] in ("udp", "multicast"):  # which may lose some on a machine that has much to do
+            if each["over"] in ("udp", "multicast"):  # which may lose some on a busy machine
                 self.assertLess(each["lost"], 1)
             else:
                 self.assertEqual(each["lost"], 0)

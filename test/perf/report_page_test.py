@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""The page that `scripts/evaluate` makes, from JSON that was recorded: whether it is whole, and stands by itself.
+"""The page that `scripts/evaluate` writes, from recorded JSON: whether it is complete and self-contained.
 
     report_page_test.py ROOT
 
@@ -24,7 +24,7 @@ sys.path[:0] = [str(ROOT / "perf")]
 from report.figures import figures_of, text_of  # noqa: E402
 
 FIGURE_FORM = {
-    "title": "Of the common form", "command": "perf/evaluate/latency.py", "date": "2026-01-02T03:04:05+00:00",
+    "title": "Of the common form", "command": "perf/evaluation/latency.py", "date": "2026-01-02T03:04:05+00:00",
     "machine": {"system": "Linux", "processor": "a <processor> & more", "cores": 2}, "skipped": [],
     "figures": [
         {"name": "one_way", "what": "one way & back <tagged>", "value": 12.5, "low": 11.25, "high": 13.75, "unit": "ms",
@@ -37,7 +37,7 @@ FIGURE_FORM = {
                "odd": {"neither": "nor"}},
     "pictures": [{"name": "own", "title": "Drawn by itself", "svg": '<svg xmlns="http://www.w3.org/2000/svg"/>'},
                  {"name": "broken", "title": "Not well-formed", "svg": "<svg><g></svg>"}]}
-ROWS = {"title": "Rows", "command": "perf/evaluate/rows.py", "machine": "a machine", "date": "2026-01-02",
+ROWS = {"title": "Rows", "command": "perf/evaluation/rows.py", "machine": "a machine", "date": "2026-01-02",
         "skipped": [{"name": "other", "reason": "it is not installed"}],
         "rows": [{"who": "by hand", "p50_us": {"median": 20.5, "low": 19.0, "high": 22.0}, "ratio": 1.0},
                  {"who": "a broker", "p50_us": None, "ratio": 2.25, "because": ["of", "this"]}]}
@@ -79,7 +79,7 @@ def evaluate(*arguments, path=None):
 
 
 class Folder:
-    """Of samples, and what else a test puts into it."""
+    """A folder with samples, and what else a test adds."""
 
     def __init__(self, test, **more):
         holder = tempfile.TemporaryDirectory(prefix="cles-report-")
@@ -165,7 +165,7 @@ class Page(unittest.TestCase):
         self.assertIn("there is no strike_latency.json among what was measured", words(root))
         self.assertIn("it is not installed", words(root))
         self.assertIn("a broker", words(root))
-        self.assertIn("latency.json holds no JSON object", words(root))
+        self.assertIn("latency.json does not contain a JSON object", words(root))
         self.made("--strict", code=1)
 
     def test_without_gnuplot_the_pictures_are_missing_and_nothing_else(self):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""How `scripts/evaluate` runs its sections: those that work, fail, hang, say nothing, or are not there.
+"""How `scripts/evaluate` runs its sections: those that work, fail, hang, print nothing, or are missing.
 
     report_running_test.py ROOT
 
@@ -59,7 +59,7 @@ def is_alive(process):
 
 
 class Tree:
-    """The program, its modules, and measuring scripts of a test's own."""
+    """The program, its modules, and the sections of a test."""
 
     def __init__(self, test, **scripts):
         holder = tempfile.TemporaryDirectory(prefix="cles-evaluate-")
@@ -67,18 +67,18 @@ class Tree:
         self.root = Path(holder.name)
         self.build = self.root / "build" / "other"
         (self.build / "apps").mkdir(parents=True)
-        (self.root / "perf" / "evaluate").mkdir(parents=True)
+        (self.root / "perf" / "evaluation").mkdir(parents=True)
         (self.root / "scripts").mkdir()
         shutil.copy(ROOT / "scripts" / "evaluate", self.root / "scripts" / "evaluate")
         shutil.copytree(ROOT / "perf" / "report", self.root / "perf" / "report", ignore=shutil.ignore_patterns("__pycache__"))
-        shutil.copy(ROOT / "perf" / "evaluate" / "provenance.py", self.root / "perf" / "evaluate")
+        shutil.copy(ROOT / "perf" / "evaluation" / "provenance.py", self.root / "perf" / "evaluation")
         for name, text in scripts.items():
             path = self.script(name)
             path.write_text(text, encoding="utf-8")
             path.chmod(0o755)
 
     def script(self, name):
-        return self.root / "perf" / "evaluate" / f"{name}.py"
+        return self.root / "perf" / "evaluation" / f"{name}.py"
 
     def command(self, *arguments, build=True):
         chosen = ["--build", str(self.build)] if build else []
@@ -106,8 +106,8 @@ class Sections(unittest.TestCase):
         self.assertIn("half done", done.stderr)
         self.assertIn("dsgd: ran", done.stderr)
         page = tree.report("index.html").read_text(encoding="utf-8")
-        self.assertIn("perf/evaluate/bench.py ended with 7: the road is closed", page)
-        self.assertIn("there is no perf/evaluate/platoon.py", page)
+        self.assertIn("perf/evaluation/bench.py ended with 7: the road is closed", page)
+        self.assertIn("there is no perf/evaluation/platoon.py", page)
         self.assertIn("words --quick -o build/report/raw/later.json", page)
 
     def test_what_is_not_there_is_a_failure_only_if_asked(self):
@@ -159,7 +159,7 @@ class One(unittest.TestCase):
         return running.run(script, self.output, False, "apps", limit_s, running.Progress())
 
     def test_what_writes_nothing_or_no_json_has_failed(self):
-        for text, says in ((SILENT, "it said nothing"), (BROKEN, "wrote no JSON")):
+        for text, says in ((SILENT, "no output"), (BROKEN, "wrote no JSON")):
             found = self.outcome(text)
             self.assertEqual(found.state, running.FAILED)
             self.assertIn(says, found.reason)

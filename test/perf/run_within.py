@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Runs a program that starts others, for no longer than it may take."""
+"""Runs a program that starts others, with a time limit."""
 
 import subprocess
 
-GRACE_S = 60  # to end what it has started in
+GRACE_S = 60  # for ending what it has started
 
 
 def run_within(limit_s, words, **options):
-    """What subprocess.run gives, as text. What takes longer is told to end, as it alone knows what it has started."""
+    """What subprocess.run returns, as text. After the limit the program gets SIGTERM, so that it can end what it started."""
     with subprocess.Popen(words, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                           **options) as process:
         try:

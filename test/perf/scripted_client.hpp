@@ -15,8 +15,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-/// A client that shares no code with the service whose allocations and system calls are counted: a blocking socket,
-/// which gives up after some seconds in which nothing comes.
+/// A client that shares no code with the service whose allocations and system calls are counted: a blocking socket
+/// with a timeout of some seconds.
 class scripted_client {
   public:
     /// `url` is that of an endpoint, "tcp://127.0.0.1:PORT" or "udp://127.0.0.1:PORT".
@@ -57,7 +57,7 @@ class scripted_client {
         return line;
     }
 
-    /// Whether the next line is there, or comes within so many milliseconds.
+    /// Whether the next line arrives within this number of milliseconds.
     bool has_line(int patience) {
         while (received_.find('\n') == std::string::npos) {
             pollfd readable{.fd = socket_, .events = POLLIN, .revents = 0};

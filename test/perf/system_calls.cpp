@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // In steady state, a PULL costs the service at most four system calls: wait, receive, send, and a receive that finds
-// nothing. The service is a child that this process traces; this process plays its client too, and sends the next
-// request only when the service is about to wait, so that no call is spared by luck.
+// nothing. The service is a child that this process traces; this process is also its client, and sends the next
+// request only when the service is about to wait, so that the number of calls does not depend on timing.
 #include <cles/service.hpp>
 
 #include "scripted_client.hpp"
@@ -79,7 +79,7 @@ const char* name_of(unsigned long long call) {
     }
 }
 
-/// Whether the service is about to wait for as long as it takes.
+/// Whether the service is about to wait without a limit.
 bool is_wait(const __ptrace_syscall_info& info) {
     const auto call = info.entry.nr;
     bool waits = call == SYS_epoll_pwait;
@@ -123,14 +123,14 @@ class traced_service {
 
     [[nodiscard]] const std::string& url() const { return url_; }
 
-    /// False where this system lets nobody trace.
+    /// False if this system does not permit tracing.
     bool attach() {
         int status = 0;
         ::waitpid(id_, &status, 0);
         return WIFSTOPPED(status) && ::ptrace(PTRACE_SETOPTIONS, id_, nullptr, PTRACE_O_TRACESYSGOOD) == 0;
     }
 
-    /// Lets it run up to the entry of its next system call. False where the kernel cannot tell which one that is.
+    /// Runs it up to the entry of its next system call. False if the kernel cannot report which one it is.
     bool next_call(__ptrace_syscall_info& info) {
         for (;;) {
             resume();
@@ -167,13 +167,13 @@ int run() {
         std::puts("skipped: this system does not let a process trace its child");
         return skipped;
     }
-    // The listening socket takes the connection before the service runs on.
+    // The listening socket accepts the connection before the service continues.
     scripted_client client{service.url()};
 
     std::map<unsigned long long, int> calls;
     int pulls = 0;
     bool asked = false;
-    bool sent = false; // something, since the last request: its reply is on the way here
+    bool sent = false; // since the last request: its reply is on the way
     for (__ptrace_syscall_info info{}; pulls < warm_up + counted;) {
         if (!service.next_call(info)) {
             std::puts("skipped: this kernel does not tell which system call a traced process makes");
@@ -195,7 +195,7 @@ int run() {
             }
             ++pulls;
         }
-        // It has not entered the kernel yet: this comes while it waits, or just before.
+        // It has not entered the kernel yet: the request arrives while it waits, or just before.
         client.send("PULL car1:localization id=" + std::to_string(pulls + 1) + " deadline=5000\n");
         asked = true;
         sent = false;
@@ -208,7 +208,7 @@ int run() {
     }
     const double each = static_cast<double>(total) / counted;
     std::printf("system calls for each PULL: %.3f, allowed are %d\n", each, allowed_per_pull);
-    // What happens once in a while, such as a timer that is set anew, may add a hundredth.
+    // Occasional calls, such as setting a timer again, may add a hundredth.
     return each <= allowed_per_pull + 0.01 ? 0 : 1;
 }
 

@@ -29,7 +29,7 @@ struct road {
             tell("v1", v1);
             v2.step(now);
             for (auto* other : {&v0, &v1}) {
-                const auto next = advance(other->where(), other->u, 0.3, period);
+                const auto next = advance(other->position(), other->u, 0.3, period);
                 other->x = next.x;
                 other->v = next.v;
                 other->a = next.a;
@@ -38,7 +38,7 @@ struct road {
     }
     void tell(const std::string& name, const platoon::state& what) {
         if (!silent.contains(name)) {
-            v2.take(name, what, now);
+            v2.receive(name, what, now);
         }
     }
 };
@@ -50,9 +50,9 @@ BOOST_AUTO_TEST_SUITE(driver)
 
 BOOST_AUTO_TEST_CASE(it_learns_the_leader_from_the_one_ahead) {
     platoon::driver v2{{.name = "v2", .ahead = "v1"}, 0};
-    BOOST_TEST((v2.wanted() == std::set<std::string>{"v1"}));
-    v2.take("v1", {.ahead = "v0", .lead = "v0", .behind = 15, .x = 15}, 0);
-    BOOST_TEST((v2.wanted() == std::set<std::string>{"v0", "v1"}));
+    BOOST_TEST((v2.needed() == std::set<std::string>{"v1"}));
+    v2.receive("v1", {.ahead = "v0", .lead = "v0", .behind = 15, .x = 15}, 0);
+    BOOST_TEST((v2.needed() == std::set<std::string>{"v0", "v1"}));
     BOOST_TEST(v2.report().behind == 30);
     BOOST_TEST(v2.report().lead == "v0");
 }
@@ -73,7 +73,7 @@ BOOST_AUTO_TEST_CASE(in_its_place_it_does_nothing) {
     all.drive(3);
     BOOST_TEST((all.v2.mode() == role::follow));
     BOOST_TEST(std::abs(all.v2.command()) < 1e-6);
-    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.where().x - 15) < 1e-6);
+    BOOST_TEST(std::abs(all.v1.x - period * 25 - all.v2.position().x - 15) < 1e-6);
 }
 
 BOOST_AUTO_TEST_CASE(it_falls_back_when_three_updates_of_the_one_ahead_are_missed) {
@@ -89,7 +89,7 @@ BOOST_AUTO_TEST_CASE(it_falls_back_when_three_updates_of_the_one_ahead_are_misse
     BOOST_TEST(all.v2.command() == -4);
     BOOST_TEST(all.v2.report().lead == "v2"); // those behind are to stop with it
     all.drive(12);
-    BOOST_TEST(all.v2.where().v == 0);
+    BOOST_TEST(all.v2.position().v == 0);
     BOOST_TEST((all.v2.report().mode == role::fallback));
 }
 
@@ -102,7 +102,7 @@ BOOST_AUTO_TEST_CASE(an_update_that_comes_after_all_has_cost_next_to_nothing) {
     all.silent.clear();
     all.drive(period);
     BOOST_TEST((all.v2.mode() == role::follow));
-    BOOST_TEST(std::abs(all.v2.where().v - 25) < 0.01);
+    BOOST_TEST(std::abs(all.v2.position().v - 25) < 0.01);
 }
 
 BOOST_AUTO_TEST_CASE(without_the_leader_it_follows_the_one_ahead) {
@@ -115,7 +115,7 @@ BOOST_AUTO_TEST_CASE(without_the_leader_it_follows_the_one_ahead) {
     all.drive(2);
     BOOST_TEST((all.v2.mode() == role::degraded));
     BOOST_TEST(std::abs(all.v2.command()) < 0.01);
-    BOOST_TEST(std::abs(all.v2.where().v - 25) < 0.01);
+    BOOST_TEST(std::abs(all.v2.position().v - 25) < 0.01);
 }
 
 BOOST_AUTO_TEST_CASE(behind_one_that_falls_back_it_does_not_heed_the_leader) {
@@ -130,11 +130,11 @@ BOOST_AUTO_TEST_CASE(behind_one_that_falls_back_it_does_not_heed_the_leader) {
     all.v1.behind = 0;
     all.drive(0.5);
     BOOST_TEST((all.v2.mode() == role::follow));
-    BOOST_TEST((all.v2.wanted() == std::set<std::string>{"v1"}));
+    BOOST_TEST((all.v2.needed() == std::set<std::string>{"v1"}));
     BOOST_TEST(all.v2.report().lead == "v1");
     all.drive(10);
-    BOOST_TEST(all.v2.where().v < 0.1);
-    BOOST_TEST(all.v1.x - all.v2.where().x > 14);
+    BOOST_TEST(all.v2.position().v < 0.1);
+    BOOST_TEST(all.v1.x - all.v2.position().x > 14);
 }
 
 BOOST_AUTO_TEST_CASE(when_the_one_ahead_leaves_it_follows_the_next_and_closes_up_slowly) {
@@ -142,29 +142,29 @@ BOOST_AUTO_TEST_CASE(when_the_one_ahead_leaves_it_follows_the_next_and_closes_up
     all.drive(1);
     all.v1.mode = role::leave;
     all.drive(2 * period);
-    BOOST_TEST((all.v2.wanted() == std::set<std::string>{"v0"}));
+    BOOST_TEST((all.v2.needed() == std::set<std::string>{"v0"}));
     all.silent = {"v1"};
     double fastest = 0;
     for (int i = 0; i < 1000; ++i) {
         all.drive(period);
-        fastest = std::max(fastest, all.v2.where().v);
+        fastest = std::max(fastest, all.v2.position().v);
     }
     BOOST_TEST((all.v2.mode() == role::follow));
     BOOST_TEST(fastest < 27.5);
-    BOOST_TEST(std::abs(all.v0.x - period * 25 - all.v2.where().x - 15) < 0.05);
+    BOOST_TEST(std::abs(all.v0.x - period * 25 - all.v2.position().x - 15) < 0.05);
 }
 
 BOOST_AUTO_TEST_CASE(when_the_leader_leaves_the_next_one_leads) {
     platoon::driver v1{{.name = "v1", .ahead = "v0", .start = {.x = -15, .v = 25, .a = 0}}, 0};
-    v1.take("v0", {.mode = role::lead, .lead = "v0", .t = 0, .v = 25}, 0);
+    v1.receive("v0", {.mode = role::lead, .lead = "v0", .t = 0, .v = 25}, 0);
     v1.step(0.01);
-    v1.take("v0", {.mode = role::leave, .lead = "v0", .t = 0.04, .x = 1, .v = 25}, 0.04);
+    v1.receive("v0", {.mode = role::leave, .lead = "v0", .t = 0.04, .x = 1, .v = 25}, 0.04);
     v1.step(0.05);
     BOOST_TEST((v1.mode() == role::lead));
-    BOOST_TEST(v1.wanted().empty());
+    BOOST_TEST(v1.needed().empty());
     BOOST_TEST(v1.report().lead == "v1");
     v1.step(20);
-    BOOST_TEST(std::abs(v1.where().v - 25) < 0.1);
+    BOOST_TEST(std::abs(v1.position().v - 25) < 0.1);
 }
 
 BOOST_AUTO_TEST_CASE(where_nobody_is_ahead_after_all_it_brakes) {
@@ -181,7 +181,7 @@ BOOST_AUTO_TEST_CASE(where_nobody_is_ahead_after_all_it_brakes) {
     }
     BOOST_TEST((v1.mode() == role::fallback));
     BOOST_TEST(why == "v0 ahead was never heard");
-    BOOST_TEST(v1.where().v == 0);
+    BOOST_TEST(v1.position().v == 0);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -19,24 +19,24 @@ BOOST_AUTO_TEST_CASE(between_two_updates_it_knows_where_a_vehicle_was, *boost::u
     platoon::logbook book{0.3};
     const auto x = [](double t) { return 3 + 20 * t - 2 * t * t + t * t * t; };
     const auto v = [](double t) { return 20 - 4 * t + 3 * t * t; };
-    book.take("v1", told(1, x(1), v(1)));
-    book.take("v1", told(1.1, x(1.1), v(1.1)));
-    BOOST_TEST(book.where("v1", 1.03)->x == x(1.03));
-    BOOST_TEST(book.where("v1", 1.03)->v == v(1.03));
-    BOOST_TEST(!book.where("v1", 0.9));
-    BOOST_TEST(!book.where("v2", 1));
+    book.add("v1", told(1, x(1), v(1)));
+    book.add("v1", told(1.1, x(1.1), v(1.1)));
+    BOOST_TEST(book.position("v1", 1.03)->x == x(1.03));
+    BOOST_TEST(book.position("v1", 1.03)->v == v(1.03));
+    BOOST_TEST(!book.position("v1", 0.9));
+    BOOST_TEST(!book.position("v2", 1));
 }
 
 BOOST_AUTO_TEST_CASE(one_that_was_killed_brakes_and_one_that_left_is_not_there) {
     platoon::logbook book{0.3};
-    book.take("v1", told(1, 0, 20));
-    book.take("v2", told(1, -15, 20));
-    BOOST_TEST(std::abs(book.where("v1", 3)->v - 20) < 1e-9);
-    book.gone("v1", false);
-    book.gone("v2", true);
-    BOOST_TEST(std::abs(book.where("v1", 3)->v - 14.9) < 0.02);
-    BOOST_TEST(!book.where("v2", 3));
-    BOOST_TEST(book.where("v2", 1).has_value() == false);
+    book.add("v1", told(1, 0, 20));
+    book.add("v2", told(1, -15, 20));
+    BOOST_TEST(std::abs(book.position("v1", 3)->v - 20) < 1e-9);
+    book.record_end("v1", false);
+    book.record_end("v2", true);
+    BOOST_TEST(std::abs(book.position("v1", 3)->v - 14.9) < 0.02);
+    BOOST_TEST(!book.position("v2", 3));
+    BOOST_TEST(book.position("v2", 1).has_value() == false);
     BOOST_TEST(book.has_left("v2"));
     BOOST_TEST(!book.has_left("v1"));
 }

@@ -186,7 +186,7 @@ class Drive(unittest.TestCase):
         group = free_group()
         code, out, err = run("vehicle", "--name", "v9", "--multicast", group)
         self.assertEqual((code, out), (3, ""))
-        self.assertEqual(err, f"cles-platoon: nobody leads: no vehicle is heard in the group {group[3:]}\n")
+        self.assertEqual(err, f"cles-platoon: there is no platoon: no vehicle was found in the group {group[3:]}\n")
 
     def test_the_one_ahead_is_not_there(self):
         code, out, err = run("vehicle", "--name", "v1", "--ahead", "v0", "--multicast", free_group(), "--seconds", 2)
@@ -202,7 +202,7 @@ class Drive(unittest.TestCase):
         self.assertRegex(err, r"^cles-platoon: .*239\.255\.25\.37.*[Aa]ddress already in use")
 
     def test_there_is_no_multicast(self):
-        for where, said in (("nowhere0", "nowhere0"), ("off", "multicast, and it is off"), ("lo,1.2.3.4", "1.2.3.4")):
+        for where, said in (("nowhere0", "nowhere0"), ("off", "by multicast, which is off"), ("lo,1.2.3.4", "1.2.3.4")):
             code, out, err = run("run", "--multicast", where)
             self.assertNotIn(code, (0, 1), where)
             self.assertEqual(out, "")
@@ -219,8 +219,8 @@ class Drive(unittest.TestCase):
                 return tries[-1][0] == 6
 
             wait_until(is_heard, "it is heard")
-            self.assertEqual(tries[-1][2], "cles-platoon: another platoon drives in this group (v0 is heard): choose a port of your "
-                                  "own with --multicast\n")
+            self.assertEqual(tries[-1][2], "cles-platoon: another platoon uses this group (received v0): choose another port "
+                                  "with --multicast\n")
         finally:
             other.terminate()
             other.communicate(timeout=PATIENCE)

@@ -37,7 +37,7 @@ BOOST_AUTO_TEST_CASE(claims_nothing_of_a_drive_that_nobody_saw) {
     const platoon::assessment judge{2, 15, 5};
     BOOST_TEST(!judge.result().collision);
     const auto text = summary_of(record_of(judge));
-    BOOST_TEST(text.find("gap       not seen") != text.npos, text);
+    BOOST_TEST(text.find("gap       unknown") != text.npos, text);
     BOOST_TEST(text.find("spacing") == text.npos, text);
     BOOST_TEST(cles::to_json(judge.result()).find(R"("least_gap":null)") != std::string::npos);
 }

@@ -21,7 +21,7 @@ double worst_ratio(platoon::scenario what, unsigned seeds) {
 
 platoon::scenario with(double hz, double loss) {
     platoon::scenario what{.vehicles = 20, .loss = loss};
-    what.like.hz = hz;
+    what.setup.hz = hz;
     return what;
 }
 
@@ -39,7 +39,7 @@ BOOST_AUTO_TEST_CASE(errors_do_not_grow_along_the_platoon) {
 
 BOOST_AUTO_TEST_CASE(without_the_leader_they_grow) {
     auto what = with(25, 0.1);
-    what.like.uses_leader = false;
+    what.setup.uses_leader = false;
     for (what.seed = 1; what.seed <= 5; ++what.seed) {
         BOOST_TEST(simulate(what).string_ratio > 1.02);
     }
@@ -78,12 +78,12 @@ BOOST_AUTO_TEST_CASE(whoever_vanishes_nobody_with_a_driver_collides) {
                     modes[vehicle] = mode;
                 };
                 std::vector<platoon::motion> last;
-                double least = what.like.spacing;
+                double least = what.setup.spacing;
                 simulate(what, [&](double, const auto& where) {
                     last = where;
                     for (std::size_t i = 1; i < where.size(); ++i) {
                         if (static_cast<std::ptrdiff_t>(i) != who) {
-                            least = std::min(least, where[i - 1].x - where[i].x - what.like.limits.length);
+                            least = std::min(least, where[i - 1].x - where[i].x - what.setup.limits.length);
                         }
                     }
                 });

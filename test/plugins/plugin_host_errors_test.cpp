@@ -2,7 +2,7 @@
 // Libraries that cannot be used: each is told by one clear line, and harms nobody.
 #include <cles/service.hpp>
 
-#include "plugin_host.hpp"
+#include "plugins/plugin_host.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/test/data/monomorphic.hpp>
@@ -34,23 +34,23 @@ std::ostream& operator<<(std::ostream& out, const fault& f) { return out << f.li
 // What is said, without the path before it.
 constexpr std::array faults{
     fault{"bad_tasks", "PULL 'nothing' has no handler"},
-    fault{"crashes_in_check", "its check of its settings ends the process by signal 6"},
+    fault{"crashes_in_check", "its settings check ends the process by signal 6"},
     fault{"crashes_in_entry", "its entry point ends the process by signal 11"},
-    fault{"describes_nothing", "its entry describes nothing"},
-    fault{"exits_when_loaded", "what it runs when it is loaded ends the process"},
-    fault{"lacks_start", "its description lacks what version 1.1 of the plugin ABI has"},
+    fault{"describes_nothing", "its entry returns no description"},
+    fault{"exits_when_loaded", "its initialization ends the process"},
+    fault{"lacks_start", "its description lacks members of version 1.1 of the plugin ABI"},
     fault{"newer_minor", "it needs version 1.8 of the plugin ABI, this host has 1.1"},
-    fault{"no_entry", "it is no plugin: it has no function 'cles_plugin_v1'"},
+    fault{"no_entry", "it is not a plugin: it has no function 'cles_plugin_v1'"},
     fault{"other_version", "it was made for version 2 of the plugin ABI, this host has version 1"},
     fault{"refuses", "the device is on fire"},
     fault{"refuses_setting", "60 at most"},
-    fault{"refuses_silently", "it refuses to start and does not say why"},
-    fault{"talks_and_crashes", "its check of its settings ends the process by signal 6: "},
+    fault{"refuses_silently", "it refuses to start without giving a reason"},
+    fault{"talks_and_crashes", "its settings check ends the process by signal 6: "},
     fault{"talks_and_crashes", "looked at sensor 4999 assertion failed: no sensor is left"},
     fault{"throws_in_entry", "its entry threw: not today"},
     fault{"throws_in_start", "its start threw: no such device"},
     fault{"throws_when_loaded", "thrown by a global object"},
-    fault{"too_short", "its description is too short to be one"},
+    fault{"too_short", "its description is too short"},
     fault{"undefined_symbol", "cles_test_nobody_has_this"},
     fault{"wrong_major", "it needs version 2.1 of the plugin ABI, this host has 1.1"},
 };
@@ -99,7 +99,7 @@ BOOST_DATA_TEST_CASE(each_fault_is_told_in_one_line_that_begins_with_the_path, b
 BOOST_AUTO_TEST_CASE(a_library_that_never_ends_loading_is_given_up) {
     plugin_host hasty{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
     BOOST_CHECK_EXCEPTION(hasty.load("hangs_when_loaded.so", "{}", node), plugin_error, [](const plugin_error& e) {
-        return std::string{e.what()} == "hangs_when_loaded.so: what it runs when it is loaded does not end";
+        return std::string{e.what()} == "hangs_when_loaded.so: its initialization does not end";
     });
 }
 
@@ -118,7 +118,7 @@ BOOST_AUTO_TEST_CASE(a_trial_ends_with_its_process_and_not_with_its_output) {
     plugin_host hastier{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
     BOOST_CHECK_EXCEPTION(
         hastier.load("closes_output_and_hangs.so", "{}", node), plugin_error, [](const plugin_error& e) {
-            return std::string{e.what()} == "closes_output_and_hangs.so: its check of its settings does not end";
+            return std::string{e.what()} == "closes_output_and_hangs.so: its settings check does not end";
         });
 }
 
@@ -163,12 +163,12 @@ BOOST_AUTO_TEST_CASE(a_file_that_is_not_there_is_told_with_the_folders) {
     BOOST_TEST(load("nowhere.so") ==
                std::string{"nowhere.so: there is no such file in /nowhere/at/all, "} + MADE_PLUGINS);
     BOOST_TEST(load("./nowhere.so") == "./nowhere.so: there is no such file");
-    BOOST_TEST(load("") == "'': this is no path");
+    BOOST_TEST(load("") == "'': the path is empty");
 }
 
 BOOST_AUTO_TEST_CASE(the_same_library_is_not_loaded_twice_by_whatever_path) {
     BOOST_TEST(load("sound.so") == "");
-    BOOST_TEST(load(sound_path()) == sound_path() + ": it is loaded already");
+    BOOST_TEST(load(sound_path()) == sound_path() + ": it is already loaded");
     BOOST_TEST(ask("PULL self:number") == R"({"value":42})");
 }
 
@@ -178,7 +178,7 @@ BOOST_AUTO_TEST_CASE(a_task_that_another_plugin_has_is_told_with_its_name_and_no
     std::filesystem::copy_file(sound_path(), copy, std::filesystem::copy_options::overwrite_existing);
     BOOST_TEST(load("sound.so") == "");
     BOOST_TEST(load(copy.string(), R"({"number":7})") ==
-               copy.string() + ": PULL 'number' is offered by the plugin 'sound' (sound.so) already");
+               copy.string() + ": PULL 'number' is already provided by the plugin 'sound' (sound.so)");
     BOOST_TEST(ask("PULL self:number") == R"({"value":42})");
     std::filesystem::remove(copy);
 }

@@ -2,7 +2,7 @@
 // What plugins may do, and what they must not and do all the same, by a service that calls them in line.
 #include <cles/service.hpp>
 
-#include "plugin_host.hpp"
+#include "plugins/plugin_host.hpp"
 #include "support/answer.hpp"
 #include "support/run_until.hpp"
 
@@ -205,7 +205,7 @@ BOOST_FIXTURE_TEST_CASE(a_job_is_answered_once_however_often_its_plugin_tries, r
     BOOST_TEST(ask("DELEGATE self:twice") == R"({"value":1})");
     BOOST_TEST(ask("DELEGATE self:twice_elsewhere") == R"({"value":1})");
     BOOST_TEST(host->figures().answered_twice == 4U);
-    BOOST_TEST(was_said("answered a job that was answered before, or never was"));
+    BOOST_TEST(was_said("answered a job that does not exist or has been answered"));
     BOOST_TEST(host->figures().jobs == 0U);
 }
 
@@ -255,7 +255,7 @@ BOOST_FIXTURE_TEST_CASE(a_request_reaches_it_as_it_came, rough) {
 
 BOOST_FIXTURE_TEST_CASE(tasks_are_added_while_it_starts_alone, rough) {
     BOOST_TEST(ask("DELEGATE self:too_late") == R"({"value":true})");
-    BOOST_TEST(was_said("rough: goes without a task: PULL 'idle' has no handler"));
+    BOOST_TEST(was_said("rough: continues without a task: PULL 'idle' has no handler"));
 }
 
 BOOST_FIXTURE_TEST_CASE(a_bind_is_what_its_handler_makes_of_it, rough) {

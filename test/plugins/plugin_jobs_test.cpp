@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "plugin_jobs.hpp"
+#include "plugins/plugin_jobs.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -82,13 +82,13 @@ BOOST_AUTO_TEST_CASE(handles_are_never_0_and_not_used_again) {
 BOOST_AUTO_TEST_CASE(while_it_starts_its_own_thread_answers_at_once) {
     BOOST_TEST(jobs.finish(open(), done));
     BOOST_TEST(record->told == (std::vector<std::string>{"done 1"}), boost::test_tools::per_element());
-    BOOST_TEST(jobs.take_here(open()).has_value());
+    BOOST_TEST(jobs.take_if_direct(open()).has_value());
 }
 
 BOOST_AUTO_TEST_CASE(from_elsewhere_or_later_the_answer_is_posted) {
     const auto first = open();
     elsewhere([&] {
-        BOOST_TEST(!jobs.take_here(first).has_value());
+        BOOST_TEST(!jobs.take_if_direct(first).has_value());
         BOOST_TEST(jobs.finish(first, done));
     });
     const auto second = open();
@@ -106,7 +106,7 @@ BOOST_AUTO_TEST_CASE(what_comes_twice_is_counted_and_dropped) {
     BOOST_TEST(!jobs.finish(0, done));
     BOOST_TEST(!jobs.finish(~std::uint64_t{0}, done));
     BOOST_TEST(!jobs.use(job, done));
-    BOOST_TEST(jobs.unknown() == 3U);
+    BOOST_TEST(jobs.unknown_answers() == 3U);
     BOOST_TEST(record->told.size() == 1U);
     BOOST_TEST(jobs.stopped(job));
 }
@@ -183,7 +183,7 @@ BOOST_AUTO_TEST_CASE(a_job_on_a_pool_is_answered_where_it_answers_and_stops_when
 
 BOOST_AUTO_TEST_CASE(there_are_so_many_jobs_and_no_more) {
     std::vector<std::uint64_t> all;
-    for (std::size_t i = 0; i < jobs.most; ++i) {
+    for (std::size_t i = 0; i < jobs.max_open; ++i) {
         all.push_back(open());
     }
     BOOST_TEST(all.back() != 0U);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "plugin_error.hpp"
-#include "plugin_search.hpp"
+#include "plugins/plugin_search.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -53,18 +52,18 @@ BOOST_AUTO_TEST_CASE(what_is_not_there_is_told_with_the_folders) {
         }
     };
     BOOST_TEST(said("b.so", {"/a", "/b"}) == "b.so: there is no such file in /a, /b");
-    BOOST_TEST(said("b.so", {}) == "b.so: there is no folder where plugins are looked for");
+    BOOST_TEST(said("b.so", {}) == "b.so: there are no folders to search for plugins");
     BOOST_TEST(said("./b.so", {"/a"}) == "./b.so: there is no such file");
 }
 
 BOOST_AUTO_TEST_CASE(plugins_that_came_along_lie_beside_the_program_or_in_lib) {
-    using cles::runtime::plugin_folders_of;
-    const auto folders = plugin_folders_of("/usr/local/bin/clesd", "../lib/cles");
+    using cles::runtime::default_plugin_folders;
+    const auto folders = default_plugin_folders("/usr/local/bin/clesd", "../lib/cles");
     BOOST_TEST(folders.at(0) == "/usr/local/lib/cles");
     BOOST_TEST(folders.at(1) == "/usr/local/plugins");
-    BOOST_TEST(plugin_folders_of("/usr/bin/clesd", "../lib/x86_64-linux-gnu/cles").at(0) ==
+    BOOST_TEST(default_plugin_folders("/usr/bin/clesd", "../lib/x86_64-linux-gnu/cles").at(0) ==
                "/usr/lib/x86_64-linux-gnu/cles");
-    BOOST_TEST(plugin_folders_of("/opt/clesd", "/opt/plugins").at(0) == "/opt/plugins");
+    BOOST_TEST(default_plugin_folders("/opt/clesd", "/opt/plugins").at(0) == "/opt/plugins");
     BOOST_TEST(fs::path{cles::runtime::installed_plugins}.filename() == "cles");
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Plugins on a pool of workers, as the daemon runs them.
-#include "plugin_host.hpp"
-#include "runtime/pooled_node.hpp"
+#include "plugins/plugin_host.hpp"
+#include "runtime/jobs/pooled_node.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -109,6 +109,12 @@ BOOST_AUTO_TEST_CASE(a_job_may_refuse_by_the_bare_entry_point_from_any_thread_an
     BOOST_TEST(peer().ask("DELEGATE self:full") ==
                R"({"error":"busy","message":"car1: the dock is full","retry_ms":250})");
     wait_for([&] { return host.figures().answered_twice == 1; }); // the second try may still be on its way
+}
+
+BOOST_AUTO_TEST_CASE(an_answer_that_is_not_json_is_not_passed_on) {
+    load("rough.so");
+    BOOST_TEST(peer().ask("DELEGATE self:no_json") ==
+               R"({"error":"failed","message":"car1: the plugin's answer is not JSON"})");
 }
 
 BOOST_AUTO_TEST_CASE(a_job_that_waits_for_others_is_told_once_that_the_node_stops) {

@@ -2,7 +2,7 @@
 // probe PLUGIN CONFIG COMMAND...: loads a plugin as clesd does, and prints what its tasks answer.
 #include <cles/service.hpp>
 
-#include "plugin_host.hpp"
+#include "plugins/plugin_host.hpp"
 
 #include <boost/asio/io_context.hpp>
 

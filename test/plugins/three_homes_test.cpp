@@ -3,7 +3,7 @@
 #include <cles/service.hpp>
 
 #include "../../apps/examples/three_homes/odometer.hpp"
-#include "plugin_host.hpp"
+#include "plugins/plugin_host.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/io_context.hpp>

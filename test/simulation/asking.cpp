@@ -230,8 +230,7 @@ void asking::ask(const order& o) {
         progress = [this, op = o.op](double fraction, std::string_view json) { on_progress(op, fraction, json); };
     }
     n->run([&] {
-        a.id = n->ask(o.to, o.by,
-                      {.verb = task.verb, .noun = noun, .body = body, .deadline = n->now() + milliseconds{o.deadline}},
+        a.id = n->ask(o.to, o.by, {.verb = task.verb, .noun = noun, .body = body, .deadline = milliseconds{o.deadline}},
                       detail::pending_ptr{new answer{*this, o.op}}, std::move(progress));
     });
 }
@@ -246,9 +245,11 @@ void asking::cancel(std::uint32_t op) {
     if (!a.ended && n != nullptr && n->run_number() == a.run && !n->frozen()) {
         a.withdrawn = true;
         n->run([&] { n->cancel(a.id); });
-        if (!a.ended) {
-            complain(rule::ends_in_time, a, "was withdrawn and has not ended");
-        }
+        n->later(std::chrono::microseconds{1}, [this, op] { // it ends by the completion queue
+            if (!asked_.at(op).ended) {
+                complain(rule::ends_in_time, asked_.at(op), "was withdrawn and has not ended");
+            }
+        });
     }
 }
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/cluster.hpp"
 
-#include "core/ignored_reply.hpp"
+#include <cles/routing.hpp>
+
+#include "protocol/message.hpp"
 
 #include <array>
 #include <utility>
@@ -18,36 +20,8 @@ constexpr std::array<unsigned, 3> workers{1, 2, 3};
 constexpr int vital_requests = 20;
 
 std::string name_of(unsigned host) { return "car" + std::to_string(host); }
-unsigned host_of(std::string_view name) { return static_cast<unsigned>(name.back() - '0'); }
 
 } // namespace
-
-/// The router's ways to the others.
-class cluster::ways final : public core::onward {
-  public:
-    explicit ways(node_run& hub) : hub_(hub) {}
-
-    std::uint64_t send(const request& r, cles::detail::pending_ptr reply,
-                       core::outbound::progress_function progress) override {
-        const auto noun = std::string{r.node}.append(":").append(r.path);
-        const auto put = [&](cles::detail::pending_ptr to, core::outbound::progress_function tells) {
-            return hub_.ask(
-                host_of(r.node), carrier::stream,
-                {.verb = r.verb, .noun = noun, .body = r.body, .deadline = r.deadline, .adverbs = r.adverbs},
-                std::move(to), std::move(tells));
-        };
-        if (hub_.fault() == planted::way_repeats) {
-            put(cles::detail::pending_ptr{new core::ignored_reply}, {});
-        }
-        return put(std::move(reply), std::move(progress));
-    }
-    void withdraw(std::uint64_t ticket) override { hub_.cancel(ticket); }
-    std::uint64_t bind(std::string_view, std::string_view, std::string_view, core::feed_events&) override { return 0; }
-    void unbind(std::uint64_t) override {}
-
-  private:
-    node_run& hub_;
-};
 
 class cluster::answer final : public cles::detail::pending {
   public:
@@ -79,7 +53,6 @@ cluster::cluster(std::uint64_t seed, planted fault)
 }
 
 cluster::~cluster() {
-    routing_->stop();
     time_.clear();
     for (auto& [host, n] : nodes_) {
         if (n) {
@@ -105,7 +78,9 @@ void cluster::live(seconds trouble) {
     }
     pass(seconds{20});
     judge_requests();
-    silent_ = true;
+    for (const auto& [host, n] : nodes_) {
+        n->local().neighbours().leave();
+    }
     pass(seconds{200});
     judge_rest();
 }
@@ -113,29 +88,20 @@ void cluster::live(seconds trouble) {
 // -- nodes ---------------------------------------------------------------------------------------------------------
 
 void cluster::start(unsigned host) {
-    core::node_setup setup{.name = name_of(host), .epoch = static_cast<std::uint32_t>(chance_.next())};
-    const auto n = std::make_shared<node_run>(net_, host, ++runs_, std::move(setup));
+    const bool is_worker = host != hub_host && host != client_host;
+    const auto n =
+        std::make_shared<node_run>(net_, host, ++runs_, name_of(host),
+                                   node_run::options{.seed = chance_.next(),
+                                                     .multicast = host != client_host,
+                                                     .load = is_worker ? [this, host] { return pools_[host]->load(); }
+                                                                       : std::function<node_load()>{},
+                                                     .routing = host == hub_host ? cles::routing() : nullptr});
     nodes_[host] = n;
-    if (host == hub_host) {
-        start_routing();
-    } else if (host != client_host) {
+    if (is_worker) {
         pools_[host] = std::make_shared<work_pool>(*n);
         offer(*n, pools_[host]);
-        announce(host, runs_, 1);
     }
-    n->start(false);
-}
-
-void cluster::start_routing() {
-    auto& hub = *nodes_[hub_host];
-    ways_.push_back(std::make_unique<ways>(hub));
-    // What is ready to begin does so in a turn of the hub.
-    const auto wake = [this, weak = std::weak_ptr{nodes_[hub_host]}] {
-        if (const auto n = weak.lock()) {
-            n->later({}, [this, n = n.get()] { routing_->begin_ready(n->now()); });
-        }
-    };
-    routing_ = std::make_shared<core::routing>(hub.node(), *ways_.back(), hub.run_number() * 7U, wake);
+    n->start();
 }
 
 void cluster::offer(node_run& n, const std::shared_ptr<work_pool>& pool) {
@@ -159,35 +125,13 @@ void cluster::offer(node_run& n, const std::shared_ptr<work_pool>& pool) {
     add(verb::pull, "look", false);
 }
 
-// What the multicast group does elsewhere.
-void cluster::announce(unsigned host, unsigned run, std::uint64_t seq) {
-    const auto n = nodes_[host];
-    constexpr std::uint64_t enough = 20;
-    const bool ends = fault_ == planted::announcements_end && host == workers[0] && seq > enough;
-    if (!n || n->run_number() != run || silent_ || ends) {
-        return;
-    }
-    n->later(seconds{1}, [this, host, run, seq] { announce(host, run, seq + 1); });
-    if (const auto hub = nodes_[hub_host]; hub && net_.reaches(host, hub_host)) {
-        core::group_source from;
-        from.address = 0x7f000001;
-        from.port = static_cast<std::uint16_t>(1000 + host);
-        const core::announcement said{.node = n->name(),
-                                      .endpoints = {"tcp://127.0.0.1:1"},
-                                      .load = pools_[host]->load(),
-                                      .interval = seconds{1},
-                                      .tasks = "same"};
-        hub->run([to = hub.get(), said, run, seq, from] { to->node()->others.hear(said, run, seq, from, to->now()); });
-    }
-}
-
 // -- trouble -------------------------------------------------------------------------------------------------------
 
 void cluster::end_run(node_run& n) {
-    n.crash();
     if (const auto pool = pools_.find(n.host()); pool != pools_.end()) {
         pool->second->crash();
     }
+    n.crash();
 }
 
 void cluster::crash(unsigned host) {
@@ -196,9 +140,6 @@ void cluster::crash(unsigned host) {
         return;
     }
     end_run(*gone);
-    if (host == hub_host) {
-        routing_->stop();
-    }
     time_.at(time_.now() + milliseconds{chance_.between(10, 3000)}, [this, host] {
         if (!nodes_[host]) {
             start(host);
@@ -268,8 +209,9 @@ void cluster::ask(bool vital) {
         std::string{kinds[kind].second} + "/" + std::to_string(op) + "/" + std::to_string(vital ? 10U : long_work);
     auto& client = *nodes_[client_host];
     client.run([&] {
-        client.ask(hub_host, carrier::stream, {.verb = kinds[kind].first, .noun = noun, .deadline = a.deadline},
-                   cles::detail::pending_ptr{new answer(*this, op)}, {});
+        client.ask(hub_host, carrier::stream,
+                   {.verb = kinds[kind].first, .noun = noun, .deadline = milliseconds{limit}},
+                   cles::detail::pending_ptr{new answer(*this, op)});
     });
 }
 
@@ -326,7 +268,7 @@ void cluster::judge_neighbours() {
     const auto& others = nodes_[hub_host]->node()->others;
     for (const auto host : workers) {
         const auto known = others.look(name_of(host));
-        if (!known || known->suspect || known->epoch != nodes_[host]->run_number()) {
+        if (!known || known->suspect || protocol::epoch_text(known->epoch) != nodes_[host]->node()->epoch) {
             watcher_.broken(rule::others_known, "the router does not know " + name_of(host) + " as it is");
         }
     }

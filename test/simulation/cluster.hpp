@@ -3,7 +3,6 @@
 
 #include <cles/error.hpp>
 
-#include "core/routing.hpp"
 #include "simulation/network.hpp"
 #include "simulation/node_run.hpp"
 #include "simulation/work_pool.hpp"
@@ -38,7 +37,6 @@ class cluster {
     [[nodiscard]] std::size_t refused() const noexcept { return refused_; }
 
   private:
-    class ways;
     class answer;
     struct asked {
         bool may_repeat = false;
@@ -51,9 +49,7 @@ class cluster {
     };
 
     void start(unsigned host);
-    void start_routing();
     void offer(node_run& n, const std::shared_ptr<work_pool>& pool);
-    void announce(unsigned host, unsigned run, std::uint64_t seq);
     void end_run(node_run& n);
     void crash(unsigned host);
     void go_wrong();
@@ -74,13 +70,10 @@ class cluster {
     network net_;
     std::map<unsigned, std::shared_ptr<node_run>> nodes_;
     std::map<unsigned, std::shared_ptr<work_pool>> pools_;
-    std::vector<std::unique_ptr<ways>> ways_; // of all runs of the router
-    std::shared_ptr<core::routing> routing_;
     std::map<std::uint32_t, asked> asked_;
     std::vector<std::shared_ptr<core::call>> kept_; // by a planted fault
     std::uint32_t last_op_ = 0;
     unsigned runs_ = 0;
-    bool silent_ = false;
     std::size_t succeeded_ = 0;
     std::size_t failed_ = 0;
     std::size_t refused_ = 0;

@@ -33,8 +33,25 @@ void datagram_port::hand_over(const endpoint& from, const std::string& datagram)
         found = std::make_shared<datagram_link>(shared_from_this(), from, strangers_);
         links_[from] = found;
         on_link_(found);
+        if (net_.fault() == planted::source_kept) {
+            keep(from);
+        }
     }
     found->deliver(datagram);
+}
+
+// An empty line comes again and again.
+void datagram_port::keep(const endpoint& source) {
+    constexpr std::chrono::seconds often{20};
+    if (const auto home = home_.lock()) {
+        home->later(often, [weak = weak_from_this(), source] {
+            const auto self = weak.lock();
+            if (const auto link = self ? self->links_[source].lock() : nullptr) {
+                link->deliver("\n");
+                self->keep(source);
+            }
+        });
+    }
 }
 
 datagram_link::datagram_link(std::shared_ptr<datagram_port> port, const endpoint& peer, bool stranger)
@@ -54,6 +71,7 @@ void datagram_link::deliver(std::string_view datagram) {
         return;
     }
     received_ += datagram.size();
+    port_->net_.watcher().saw(to_string(port_->local_), "<--", datagram);
     const auto owner = owner_; // which may close the link
     const auto keep = shared_from_this();
     if (datagram.size() > protocol::datagram_bytes) {

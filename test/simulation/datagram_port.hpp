@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
 
 #include "simulation/network.hpp"
 #include "simulation/place.hpp"
@@ -33,6 +33,7 @@ class datagram_port final : public std::enable_shared_from_this<datagram_port> {
     friend datagram_link;
 
     void hand_over(const endpoint& from, const std::string& datagram);
+    void keep(const endpoint& source);
 
     network& net_;
     std::weak_ptr<place> home_;

@@ -4,7 +4,6 @@
 #include <cles/feed_event.hpp>
 
 #include "core/feed_mailbox.hpp"
-#include "simulation/feed_ties.hpp"
 #include "simulation/node_run.hpp"
 
 #include <chrono>
@@ -26,7 +25,7 @@ struct published_mark {
 class feed_reader : public std::enable_shared_from_this<feed_reader> {
   public:
     feed_reader(node_run& at, std::uint32_t label, std::chrono::milliseconds slow)
-        : node_(at), label_(label), slow_(slow) {}
+        : node_(at), local_(at.shared_local()), label_(label), slow_(slow) {}
     feed_reader(const feed_reader&) = delete;
     feed_reader& operator=(const feed_reader&) = delete;
     virtual ~feed_reader() = default;
@@ -41,6 +40,8 @@ class feed_reader : public std::enable_shared_from_this<feed_reader> {
   protected:
     /// From now on it fetches.
     void begin();
+    /// Kept, as a feed keeps its service.
+    [[nodiscard]] shell::local_node& local() noexcept { return *local_; }
     [[nodiscard]] bool has_begun() const noexcept { return begun_; }
     void complain(rule which, const std::string& what) { node_.watcher().broken(which, name() + " " + what); }
 
@@ -53,6 +54,7 @@ class feed_reader : public std::enable_shared_from_this<feed_reader> {
     void take(const detail::raw_event& event);
 
     node_run& node_;
+    std::shared_ptr<shell::local_node> local_;
     std::uint32_t label_;
     std::chrono::milliseconds slow_;
     bool begun_ = false;

@@ -28,23 +28,29 @@ class follower::first_answer final : public detail::pending {
     std::weak_ptr<follower> owner_;
 };
 
-follower::follower(node_run& at, std::uint32_t label, feed_terms terms, std::string target, std::string path,
-                   std::chrono::milliseconds slow)
-    : feed_reader(at, label, slow), terms_(std::move(terms)),
-      machine_(at.feeds(), at.node()->deadlines, at.node()->completions, at.bounds(), std::move(target),
+follower::follower(node_run& at, std::uint32_t label, unsigned to, shell::feed_terms terms, std::string target,
+                   std::string path, std::chrono::milliseconds slow)
+    : feed_reader(at, label, slow), to_(to), terms_(std::move(terms)),
+      machine_(at.local().feeds(), at.node()->deadlines, at.node()->completions, at.bounds(), std::move(target),
                std::move(path), terms_.every_ms != 0, label * 7919U) {}
 
 std::string follower::name() const { return at().name() + " feed " + std::to_string(label()) + " of " + terms_.noun; }
 
 void follower::start() {
     const auto self = std::static_pointer_cast<follower>(shared_from_this());
-    at().feeds().enter(machine_, self, terms_);
+    local().feeds().enter(machine_, self, terms_);
     machine_.start(detail::pending_ptr{new first_answer{self}});
 }
 
 void follower::close() {
     machine_.close(errc::cancelled);
-    at().feeds().leave(machine_);
+    leave();
+}
+
+void follower::leave() {
+    if (!std::exchange(left_, true)) {
+        local().feeds().leave(machine_);
+    }
 }
 
 void follower::on_event(const detail::raw_event& event) {

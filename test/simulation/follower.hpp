@@ -5,7 +5,6 @@
 
 #include "core/feed_machine.hpp"
 #include "simulation/feed_reader.hpp"
-#include "simulation/feed_ties.hpp"
 #include "simulation/node_run.hpp"
 
 #include <chrono>
@@ -18,13 +17,15 @@ namespace cles::simulation {
 /// A feed of a simulated program, that keeps account of what comes.
 class follower final : public feed_reader {
   public:
-    follower(node_run& at, std::uint32_t label, feed_terms terms, std::string target, std::string path,
-             std::chrono::milliseconds slow);
+    /// `to`: the host of the publisher, whose URL is in the terms.
+    follower(node_run& at, std::uint32_t label, unsigned to, shell::feed_terms terms, std::string target,
+             std::string path, std::chrono::milliseconds slow);
+    ~follower() override { leave(); }
 
     void start();
     void close();
 
-    [[nodiscard]] const feed_terms& terms() const noexcept { return terms_; }
+    [[nodiscard]] unsigned to() const noexcept { return to_; }
     [[nodiscard]] const std::string& path() const noexcept { return machine_.path(); }
     [[nodiscard]] bool is_thinned() const noexcept { return terms_.every_ms != 0; }
     /// It was bound and has not been closed: it is to receive what is published.
@@ -40,12 +41,15 @@ class follower final : public feed_reader {
     core::feed_mailbox& mail() override { return machine_.mail(); }
     void on_event(const detail::raw_event& event) override;
     void on_update(const detail::raw_event& event);
+    void leave();
 
-    feed_terms terms_;
+    unsigned to_;
+    shell::feed_terms terms_;
     core::feed_machine machine_;
     published_mark last_;
     std::uint64_t missed_ = 0; // told since then
     std::uint64_t seen_ = 0;
+    bool left_ = false;
 };
 
 } // namespace cles::simulation

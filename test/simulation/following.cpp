@@ -66,13 +66,13 @@ void following::follow(const action& a) {
     }
     const auto target = world::name_of(a["to"]);
     const auto path = path_of(a["noun"]);
-    const auto made = std::make_shared<follower>(*n, a["feed"],
-                                                 feed_terms{.noun = target + ":" + path,
-                                                            .to = a["to"],
-                                                            .by = a["by"] == 0 ? carrier::stream : carrier::datagram,
-                                                            .every_ms = a["every"],
-                                                            .keep = a["keep"]},
-                                                 target, path, milliseconds{a["slow"]});
+    const auto made = std::make_shared<follower>(
+        *n, a["feed"], a["to"],
+        shell::feed_terms{.noun = target + ":" + path,
+                          .at = url_of(a["to"], a["by"] == 0 ? carrier::stream : carrier::datagram),
+                          .every_ms = a["every"],
+                          .keep = a["keep"]},
+        target, path, milliseconds{a["slow"]});
     followers_.add(made);
     n->run([&] { made->start(); });
 }
@@ -95,7 +95,7 @@ void following::publish(unsigned host, unsigned noun, unsigned count, std::size_
     }
     n->run([&] {
         for (; count != 0; --count) {
-            n->turns().let([&] { n->node()->published.publish_body(path_of(noun), body(host, noun, size)); });
+            n->local().publish(path_of(noun), [&](json_writer& w) { w.raw(body(host, noun, size)); });
             ++published_[host][noun];
         }
     });
@@ -108,10 +108,8 @@ void following::offer(unsigned host, unsigned count, std::size_t size) {
     }
     n->run([&] {
         for (; count != 0; --count) {
-            detail::pending_ptr operation{new offered_update{offers_}};
-            const auto text = body(host, when_there_is_room, size);
-            n->turns().let(
-                [&] { n->node()->published.publish_when_room(path_of(when_there_is_room), text, operation); });
+            n->local().publish_when_room(path_of(when_there_is_room), body(host, when_there_is_room, size),
+                                         detail::pending_ptr{new offered_update{offers_}});
             ++published_[host][when_there_is_room];
         }
     });
@@ -129,8 +127,9 @@ void following::probe() {
         offer(host, 2, 10);
         auto* n = world_.node(host);
         n->run([n] {
-            n->node()->published.publish_body("notice", "{}");
-            n->node()->published.publish_body("survey", "{}");
+            for (const auto* noun : {"notice", "survey"}) {
+                n->local().publish(noun, [](json_writer& w) { w.raw("{}"); });
+            }
         });
     }
 }
@@ -144,7 +143,7 @@ void following::judge_probe() {
             world_.watcher().broken(rule::feeds_receive, f->name() + " receives nothing though all is well");
             continue;
         }
-        const auto to = f->terms().to;
+        const auto to = f->to();
         for (unsigned noun = 0; noun < own_nouns; ++noun) {
             if (f->path() == path_of(noun) &&
                 (f->last().run != world_.runs(to) || f->last().number != published_[to][noun])) {

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/group_follower.hpp"
 
-#include "simulation/group_seat.hpp"
-
 #include <algorithm>
 #include <utility>
 
@@ -17,13 +15,21 @@ std::string group_follower::name() const {
 }
 
 void group_follower::start() {
-    at().seat()->feeds().add(feed_, at().now());
+    local().group()->intake().feeds().add(feed_, local().now());
+    local().settle();
     begin();
 }
 
 void group_follower::close() {
-    at().seat()->feeds().remove(feed_);
+    leave();
     static_cast<void>(feed_.mail().close());
+}
+
+void group_follower::leave() {
+    if (!std::exchange(left_, true)) {
+        local().group()->intake().feeds().remove(feed_);
+        local().settle();
+    }
 }
 
 published_mark group_follower::last_of(std::string_view publisher) const {

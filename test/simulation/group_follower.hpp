@@ -21,6 +21,7 @@ class group_follower final : public feed_reader {
     /// `target`: a node's name, or "all".
     group_follower(node_run& at, std::uint32_t label, std::string target, std::string path,
                    std::chrono::milliseconds slow);
+    ~group_follower() override { leave(); }
 
     void start();
     void close();
@@ -40,12 +41,14 @@ class group_follower final : public feed_reader {
 
     core::feed_mailbox& mail() override { return feed_.mail(); }
     void on_event(const detail::raw_event& event) override;
+    void leave();
     void on_gap(const detail::raw_event& event);
     void on_update(const detail::raw_event& event);
 
     core::group_feed feed_;
     std::map<std::string, source, std::less<>> sources_;
     std::uint64_t shed_ = 0; // told as missed, but not of whom
+    bool left_ = false;
 };
 
 } // namespace cles::simulation

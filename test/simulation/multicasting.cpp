@@ -3,7 +3,7 @@
 
 #include "protocol/message.hpp"
 #include "simulation/following.hpp"
-#include "simulation/group_seat.hpp"
+#include "simulation/group_port.hpp"
 #include "simulation/world.hpp"
 
 #include <algorithm>
@@ -26,7 +26,8 @@ void multicasting::on_start(node_run& n) {
         return;
     }
     n.node()->tasks.add(verb::bind, beacon, {});
-    n.node()->published.publish_body(beacon, "{\"n\":1,\"run\":" + std::to_string(world_.runs(n.host())) + "}");
+    n.local().publish(
+        beacon, [&](json_writer& w) { w.raw("{\"n\":1,\"run\":" + std::to_string(world_.runs(n.host())) + "}"); });
 }
 
 void multicasting::on_crash(node_run& n) {
@@ -69,7 +70,7 @@ void multicasting::on_group_heard(node_run& at, const core::group_source& from, 
     }
     protocol::request_line bind;
     protocol::malformed_request ignored;
-    if (from == at.seat()->source() || !protocol::parse_request(datagram, bind, ignored) || bind.verb != verb::bind ||
+    if (from == at.group()->source() || !protocol::parse_request(datagram, bind, ignored) || bind.verb != verb::bind ||
         bind.noun.task == "cles" || (bind.noun.target != "all" && bind.noun.target != at.name())) {
         return;
     }

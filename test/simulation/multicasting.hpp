@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/group_source.hpp"
+#include "port/group_source.hpp"
 #include "simulation/follower_list.hpp"
 #include "simulation/group_follower.hpp"
 #include "simulation/part.hpp"

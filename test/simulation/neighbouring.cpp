@@ -27,10 +27,7 @@ std::string run_text(std::string_view node, std::uint32_t epoch) {
     return std::string{node} + " (" + protocol::epoch_text(epoch) + ")";
 }
 
-std::string door_of(unsigned host) {
-    const auto where = to_string(endpoint{host, stream_door});
-    return "tcp://" + where;
-}
+std::string door_of(unsigned host) { return url_of(host, carrier::stream); }
 
 } // namespace
 
@@ -55,7 +52,8 @@ void neighbouring::perform(const action& a) {
     }
 }
 
-void neighbouring::on_start(node_run&) {
+void neighbouring::on_start(node_run& n) {
+    record_begin(n);
     if (world_.has_group() && !std::exchange(looking_, true)) {
         look_at_all();
     }
@@ -69,6 +67,7 @@ void neighbouring::begin_namesake(unsigned of) {
     auto& n = namesakes_[of];
     if (!n) {
         n = world_.begin_stranger(world::name_of(of), world_.hosts() + of, ++namesake_runs_);
+        record_begin(*n);
     }
 }
 
@@ -79,9 +78,9 @@ void neighbouring::end_namesake(unsigned of, bool silently) {
     }
     auto& n = *found.mapped();
     if (!silently) {
-        n.run([&n] { n.seat()->leave(); });
+        n.stop();
     }
-    world_.end_stranger(n);
+    world_.end_run(n);
 }
 
 // -- what is heard -------------------------------------------------------------------------------------------------
@@ -117,6 +116,35 @@ void neighbouring::on_group_heard(node_run& at, const core::group_source&, std::
 // Silence counts from the last word, or from when whoever listens was back.
 time_point neighbouring::last_chance(const node_run& n, const heard_run& r) { return std::max(r.at, n.back_since()); }
 
+// Whether that run has been there for long enough, and within reach, to answer whoever asked it whether it is.
+bool neighbouring::could_answer(node_run& at, std::string_view node, std::uint32_t epoch) {
+    constexpr seconds enough{2};
+    const auto listens = [&](node_run& n) {
+        return !n.frozen() && n.thawed_at() + enough < n.now() && !n.was_frozen_until_now();
+    };
+    const auto is_it = [&](node_run* n) {
+        return n != nullptr && n->name() == node && n->node()->epoch == protocol::epoch_text(epoch);
+    };
+    node_run* asked = nullptr;
+    for (unsigned host = 0; host < world_.hosts(); ++host) {
+        asked = is_it(world_.node(host)) ? world_.node(host) : asked;
+    }
+    for (const auto& [host, n] : namesakes_) {
+        asked = is_it(n.get()) ? n.get() : asked;
+    }
+    return asked != nullptr && listens(at) && listens(*asked) &&
+           world_.net().undisturbed_since(world_.time().now() - enough);
+}
+
+void neighbouring::record_begin(node_run& n) { began_[*protocol::parse_epoch(n.node()->epoch)] = n.now(); }
+
+// Of two runs of one name the earlier one keeps it, and whoever heard the later one first finds that out by asking
+// both.
+bool neighbouring::has_precedence(std::uint32_t epoch, std::uint32_t over) const {
+    const auto later = began_.at(epoch) - began_.at(over);
+    return later <= seconds{0} || (later <= presence::together && epoch < over);
+}
+
 // -- what is made of it --------------------------------------------------------------------------------------------
 
 void neighbouring::on_neighbour(node_run& at, std::string_view node, presence::change what) {
@@ -142,7 +170,8 @@ void neighbouring::on_neighbour(node_run& at, std::string_view node, presence::c
         }
         break;
     case presence::change::moved:
-        if (known && owner != mine.owners.end() && known->epoch != owner->second && !mine.silent.contains(node)) {
+        if (known && owner != mine.owners.end() && known->epoch != owner->second && !mine.silent.contains(node) &&
+            !has_precedence(known->epoch, owner->second) && could_answer(at, node, owner->second)) {
             complain_if_heard(audible_until(until_silent), "another");
         }
         break;
@@ -274,14 +303,14 @@ void neighbouring::wind_down() {
     looking_ = false;
     for (unsigned host = 0; host < world_.hosts(); ++host) {
         auto* n = world_.node(host);
-        if (n->seat() == nullptr) {
+        if (n->group() == nullptr) {
             continue;
         }
         n->run([&] {
             if (host % 2 == 0) {
-                n->seat()->leave();
+                n->local().neighbours().leave();
             } else {
-                n->seat()->fall_silent();
+                n->fall_silent();
             }
         });
     }

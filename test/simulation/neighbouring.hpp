@@ -57,11 +57,15 @@ class neighbouring final : public part {
     void look_at(node_run& n, const core::presence::known& other);
     void expect_all_known(const char* when);
     [[nodiscard]] static time_point last_chance(const node_run& n, const heard_run& r);
+    [[nodiscard]] bool could_answer(node_run& at, std::string_view node, std::uint32_t epoch);
+    void record_begin(node_run& n);
+    [[nodiscard]] bool has_precedence(std::uint32_t epoch, std::uint32_t over) const;
     void complain(rule which, node_run& at, const std::string& what);
 
     world& world_;
     std::map<const node_run*, account> accounts_;
     std::map<unsigned, std::shared_ptr<node_run>> namesakes_; // by host
+    std::map<std::uint32_t, time_point> began_;               // of each run, by epoch
     unsigned namesake_runs_ = 0;
     bool looking_ = false;
 };

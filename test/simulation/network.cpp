@@ -3,6 +3,7 @@
 
 #include <cles/error.hpp>
 
+#include "port/group_source.hpp"
 #include "protocol/datagram.hpp"
 #include "simulation/datagram_port.hpp"
 #include "simulation/group_port.hpp"
@@ -19,7 +20,18 @@ constexpr unsigned group_lane = 1U << 16U; // so that what the group carries cha
 } // namespace
 
 std::string to_string(const endpoint& where) {
-    return "10.0.0." + std::to_string(where.host + 1) + ":" + std::to_string(where.port);
+    return to_text(
+        core::group_source{.address = address_of(where.host), .port = static_cast<std::uint16_t>(where.port)});
+}
+
+std::string url_of(unsigned host, carrier by) {
+    return by == carrier::stream ? "tcp://" + to_string(endpoint{host, stream_door})
+                                 : "udp://" + to_string(endpoint{host, datagram_door});
+}
+
+endpoint endpoint_of(const url& where) {
+    const auto read = core::parse_group_source(where.host + ":" + std::to_string(where.port)).value();
+    return {read.address - address_of(0), read.port};
 }
 
 // -- the weather ---------------------------------------------------------------------------------------------------
@@ -32,10 +44,13 @@ void network::part(unsigned a, unsigned b, time_point until) {
 void network::mute(unsigned from, unsigned to, time_point until) {
     auto& held = parted_[{from, to}];
     held = std::max(held, until);
+    disturbed_ = std::max(disturbed_, until);
 }
 
 void network::calm() {
     weather_ = {};
+    stormy_ = false;
+    disturbed_ = time_.now();
     if (fault_ != planted::partition_stays) {
         parted_.clear();
     } else if (!parted_.empty()) {
@@ -126,6 +141,7 @@ void network::join(const std::shared_ptr<place>& from, endpoint to, const limits
 }
 
 void network::cut(unsigned host, unsigned which) {
+    disturbed_ = std::max(disturbed_, time_.now());
     std::vector<std::shared_ptr<stream_half>> its;
     for (const auto& [weak, hosts] : streams_) {
         if (const auto half = weak.lock(); half && (hosts.first == host || hosts.second == host)) {

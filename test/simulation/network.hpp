@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
+#include <cles/url.hpp>
 
 #include "simulation/agenda.hpp"
 #include "simulation/dice.hpp"
 #include "simulation/place.hpp"
 #include "simulation/planted.hpp"
+#include "simulation/tampering.hpp"
 #include "simulation/witness.hpp"
 
 #include <chrono>
@@ -35,8 +37,17 @@ struct endpoint {
 };
 std::string to_string(const endpoint& where);
 
+/// A host's IPv4 address.
+constexpr std::uint32_t address_of(unsigned host) noexcept { return 0x0A000001U + host; }
+
 inline constexpr unsigned stream_door = 1;   ///< where nodes listen
 inline constexpr unsigned datagram_door = 2; ///< likewise
+
+/// How a request travels.
+enum class carrier : std::uint8_t { stream, datagram };
+/// Where the node of a host listens.
+std::string url_of(unsigned host, carrier by);
+endpoint endpoint_of(const url& where);
 
 /// What the network does to what crosses it. Of a thousand datagrams so many.
 struct weather {
@@ -51,11 +62,14 @@ struct weather {
 class network {
   public:
     network(agenda& time, witness& watcher, std::uint64_t seed, planted fault)
-        : time_(time), watcher_(watcher), seed_(seed), fault_(fault) {}
+        : tampered(fault), time_(time), watcher_(watcher), seed_(seed), fault_(fault) {}
     network(const network&) = delete;
     network& operator=(const network&) = delete;
 
-    void set(const weather& now) noexcept { weather_ = now; }
+    void set(const weather& now) noexcept {
+        weather_ = now;
+        stormy_ = true;
+    }
     /// Two hosts do not reach each other: datagrams are lost, streams wait.
     void part(unsigned a, unsigned b, time_point until);
     /// Nothing that one sends reaches the other one, which is heard well.
@@ -63,6 +77,8 @@ class network {
     /// Nothing is in the way any more.
     void calm();
     [[nodiscard]] bool reaches(unsigned from, unsigned to) const;
+    /// Whether everybody has reached everybody in good time since then.
+    [[nodiscard]] bool undisturbed_since(time_point when) const noexcept { return !stormy_ && disturbed_ <= when; }
     /// When bytes of a stream that leave now are there, if nothing went before them.
     time_point arrival(unsigned from, unsigned to);
     /// Each direction has a chance of its own, so that less of what happens is changed by what else happens.
@@ -76,6 +92,8 @@ class network {
     using on_link = std::function<void(link_ptr)>;
     using on_dialled = std::function<void(boost::system::error_code, std::shared_ptr<stream_half>)>;
     void listen(endpoint where, const std::shared_ptr<place>& at, const limits& bounds, on_link arrived);
+    /// Nobody listens there any more.
+    void shut(endpoint where) { doors_.erase(where); }
     /// `done` is called at the place that dials, later.
     void dial(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, on_dialled done);
     /// Resets one of the streams of a host, if it has one.
@@ -92,6 +110,7 @@ class network {
     /// What has crossed, for those who want to know how much was simulated.
     [[nodiscard]] std::uint64_t datagrams() const noexcept { return datagrams_; }
     std::uint64_t stream_bytes = 0;
+    tampering tampered; ///< what a planted fault does to streams
 
   private:
     struct door {
@@ -113,7 +132,9 @@ class network {
     std::map<std::pair<unsigned, unsigned>, dice> chances_;
     planted fault_;
     weather weather_;
+    bool stormy_ = false;
     std::map<std::pair<unsigned, unsigned>, time_point> parted_; // from and to
+    time_point disturbed_{};                                     // until when, the last time
     std::map<endpoint, door> doors_;
     std::map<endpoint, std::weak_ptr<datagram_port>> ports_;
     std::vector<std::weak_ptr<group_port>> group_;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/group_source.hpp"
 #include "core/presence.hpp"
+#include "port/group_source.hpp"
 #include "simulation/plan.hpp"
 
 #include <string_view>

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/clock.hpp"
 #include "simulation/agenda.hpp"
 
 #include <deque>
@@ -13,17 +12,17 @@ namespace cles::simulation {
 
 /// Where something runs: one run of a node, or a client. When it is gone, nothing of it happens any more; while it is
 /// frozen, as a stopped process is, all that comes waits. It has a clock of its own, which may be ahead.
-class place : public core::clock, public std::enable_shared_from_this<place> {
+class place : public std::enable_shared_from_this<place> {
   public:
     place(agenda& time, unsigned host, std::string name) : time_(time), host_(host), name_(std::move(name)) {}
     place(const place&) = delete;
     place& operator=(const place&) = delete;
-    ~place() override = default;
+    virtual ~place() = default;
 
     [[nodiscard]] unsigned host() const noexcept { return host_; }
     [[nodiscard]] const std::string& name() const noexcept { return name_; }
     [[nodiscard]] agenda& time() const noexcept { return time_; }
-    [[nodiscard]] time_point now() const final { return time_.now() + ahead_; }
+    [[nodiscard]] time_point now() const { return time_.now() + ahead_; }
 
     /// Does something here: now, or when it goes on.
     void run(agenda::action what) {
@@ -31,7 +30,6 @@ class place : public core::clock, public std::enable_shared_from_this<place> {
             waiting_.push_back(std::move(what));
         } else {
             what();
-            after();
         }
     }
     /// By its own clock.
@@ -84,8 +82,6 @@ class place : public core::clock, public std::enable_shared_from_this<place> {
     static constexpr std::chrono::milliseconds long_absence{1'500};
 
   private:
-    /// Something has happened here.
-    virtual void after() {}
     virtual void after_jump() {}
 
     agenda& time_;

@@ -3,8 +3,6 @@
 
 #include <cles/error.hpp>
 
-#include "simulation/tampering.hpp"
-
 #include <algorithm>
 #include <cstring>
 
@@ -144,7 +142,10 @@ bool stream_half::hand_over_batch() {
     while (more && !paused_ && state_ == state::open) {
         std::string_view line;
         switch (input_.next(line)) {
-        case protocol::line_buffer::status::line: owner->on_line(line); break;
+        case protocol::line_buffer::status::line:
+            net_.watcher().saw(name_, "<--", line);
+            owner->on_line(line);
+            break;
         case protocol::line_buffer::status::overlong:
             overlong_ = true;
             more = false;
@@ -183,7 +184,7 @@ void stream_half::pause(bool stop) {
 
 // -- writing -------------------------------------------------------------------------------------------------------
 
-void stream_half::tamper() { tamper_with(output_, net_.fault(), net_.chance_between(host_, peer_host_)); }
+void stream_half::tamper() { net_.tampered.apply(output_, home_, net_.chance_between(host_, peer_host_)); }
 
 void stream_half::flush() {
     if (state_ == state::closed || state_ == state::discarding || shut_ || output_.empty() || !sending_.empty()) {

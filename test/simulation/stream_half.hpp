@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
 
 #include "protocol/line.hpp"
 #include "simulation/network.hpp"
@@ -31,8 +31,10 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     std::string& output() override { return output_; }
     void flush() override;
     [[nodiscard]] std::size_t unsent() const noexcept override {
-        return output_.size() + sending_.size() - sending_at_;
+        return net_.fault() == planted::never_full ? 0 : held();
     }
+    /// What it holds for its peer, whatever a planted fault says of it.
+    [[nodiscard]] std::size_t held() const noexcept { return output_.size() + sending_.size() - sending_at_; }
     [[nodiscard]] std::uint64_t sent() const noexcept override { return sent_; }
     [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
     void pause(bool stop) override;

@@ -107,7 +107,9 @@ void talker::end_talk() {
 // -- hearing -------------------------------------------------------------------------------------------------------
 
 void talker::on_line(std::string_view line) {
-    net_.watcher().saw(name(), "<--", line);
+    if (line.empty()) { // the node looks whether this is still there
+        return;
+    }
     if (!protocol::is_reply(line)) {
         on_update(line);
         return;

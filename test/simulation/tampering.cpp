@@ -45,6 +45,26 @@ void swap_replies(std::vector<std::string>& lines) {
     }
 }
 
+// A router's request for a node that it has chosen; the answer to the copy is nobody's.
+void repeat_choice(std::vector<std::string>& lines) {
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+        const auto at = lines[i].find(" id=");
+        if (lines[i].starts_with("DELEGATE car") && at != std::string::npos) {
+            lines.insert(lines.begin() + static_cast<std::ptrdiff_t>(i), lines[i]);
+            lines[i].insert(at + std::string_view{" id="}.size(), "9000000");
+            return;
+        }
+    }
+}
+
+void swallow_rebinds(std::vector<std::string>& lines, std::set<std::string, std::less<>>& bound) {
+    constexpr std::string_view verb{"BIND "};
+    std::erase_if(lines, [&](const std::string& line) {
+        return line.starts_with(verb) && line.find(" lease=0") == std::string::npos &&
+               !bound.insert(line.substr(verb.size(), line.find(' ', verb.size()) - verb.size())).second;
+    });
+}
+
 void exchange_ids(std::vector<std::string>& lines) {
     std::string* before = nullptr;
     for (auto& line : lines) {
@@ -64,19 +84,20 @@ void exchange_ids(std::vector<std::string>& lines) {
 
 } // namespace
 
-void tamper_with(std::string& lines, planted fault, dice& chance) {
-    const bool concerned =
-        fault == planted::stream_repeats || fault == planted::replies_swapped || fault == planted::ids_exchanged;
-    if (!concerned || chance.chance(500)) {
+void tampering::apply(std::string& lines, const std::weak_ptr<place>& sender, dice& chance) {
+    const bool always = fault_ == planted::rebind_forgotten || fault_ == planted::way_repeats;
+    const bool sometimes =
+        fault_ == planted::stream_repeats || fault_ == planted::replies_swapped || fault_ == planted::ids_exchanged;
+    if (!always && (!sometimes || chance.chance(500))) {
         return;
     }
     auto each = split(lines);
-    if (fault == planted::stream_repeats) {
-        repeat_push(each);
-    } else if (fault == planted::replies_swapped) {
-        swap_replies(each);
-    } else {
-        exchange_ids(each);
+    switch (fault_) {
+    case planted::rebind_forgotten: swallow_rebinds(each, bound_[sender]); break;
+    case planted::way_repeats: repeat_choice(each); break;
+    case planted::stream_repeats: repeat_push(each); break;
+    case planted::replies_swapped: swap_replies(each); break;
+    default: exchange_ids(each);
     }
     lines.clear();
     for (const auto& line : each) {

@@ -3,7 +3,7 @@
 
 #include <cles/error.hpp>
 
-#include "retry_delay.hpp"
+#include "jobs/service_time.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -120,7 +120,7 @@ void work_pool::stop(std::uint64_t number) {
 
 void work_pool::watch() {
     if (host_.fault() != planted::stuck_unnoticed) {
-        watch_.check(host_.now(), [&](const runtime::worker_watch::finding& found) {
+        watch_.check(host_.now(), [&](const runtime::worker_watchdog::stuck_worker& found) {
             for (const auto& [number, j] : jobs_) {
                 j->known_stuck |= j.get() == found.job;
             }

@@ -4,10 +4,10 @@
 #include <cles/peer.hpp>
 
 #include "core/call.hpp"
-#include "job_queue.hpp"
-#include "service_time.hpp"
+#include "jobs/job_queue.hpp"
+#include "jobs/service_time.hpp"
+#include "jobs/worker_watchdog.hpp"
 #include "simulation/node_run.hpp"
-#include "worker_watch.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -20,7 +20,7 @@
 namespace cles::simulation {
 
 /// The workers of a daemon, in virtual time. Who is admitted, whose turn it is and who is stuck is decided by the
-/// machines of runtime/src; this does for them what its worker_pool and pool_state do. They are to be kept alike.
+/// machines of runtime/src; this does for them what its worker_pool and job_dispatcher do. They are to be kept alike.
 class work_pool final : public std::enable_shared_from_this<work_pool> {
   public:
     static constexpr std::size_t workers = 2;
@@ -64,7 +64,7 @@ class work_pool final : public std::enable_shared_from_this<work_pool> {
 
     node_run& host_;
     runtime::job_queue queue_;
-    runtime::worker_watch watch_{workers, replacements, grace};
+    runtime::worker_watchdog watch_{workers, replacements, grace};
     runtime::service_time service_time_;
     std::map<std::uint64_t, std::unique_ptr<job>> jobs_; // by number
     std::uint64_t last_number_ = 0;

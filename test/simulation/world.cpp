@@ -69,51 +69,44 @@ world::~world() {
     time_.clear();
     for (auto& n : nodes_) {
         if (n) {
-            for (const auto& p : parts_) {
-                p->on_crash(*n);
-            }
-            n->crash();
+            end_run(*n);
             n.reset();
         }
     }
 }
 
-core::node_setup world::setup_of(const std::string& name) {
-    core::node_setup setup{.name = name};
-    setup.epoch = static_cast<std::uint32_t>(chance_.next());
-    setup.first_datagram_id = (chance_.next() & 0xFFFFFFFFU) << 20U;
-    if (plan_.small_limits) {
-        setup.bounds = small_limits();
-    }
-    return setup;
+std::shared_ptr<node_run> world::make(const std::string& name, unsigned host, unsigned run) {
+    return std::make_shared<node_run>(net_, host, run, name,
+                                      node_run::options{.seed = chance_.next(),
+                                                        .bounds = plan_.small_limits ? small_limits() : limits{},
+                                                        .strangers = plan_.strangers,
+                                                        .multicast = plan_.group,
+                                                        .judge = this});
 }
 
 void world::start(unsigned host) {
     const auto run = ++runs_[host];
-    nodes_[host] = std::make_shared<node_run>(net_, host, run, setup_of(name_of(host)));
+    nodes_[host] = make(name_of(host), host, run);
     auto& n = *nodes_[host];
     watcher_.saw(n.name(), "starts", n.node()->epoch);
+    n.start();
     for (const auto& p : parts_) {
         p->on_start(n);
-    }
-    n.start(plan_.strangers);
-    if (plan_.group) {
-        n.join_group(*this);
     }
 }
 
 std::shared_ptr<node_run> world::begin_stranger(const std::string& name, unsigned host, unsigned run) {
-    auto n = std::make_shared<node_run>(net_, host, run, setup_of(name));
+    auto n = make(name, host, run);
     watcher_.saw(name, "has a namesake", n->node()->epoch);
-    n->join_group(*this);
+    n->start();
     return n;
 }
 
-void world::end_stranger(node_run& n) {
+void world::end_run(node_run& n) {
+    n.crash();
     for (const auto& p : parts_) {
         p->on_crash(n);
     }
-    n.crash();
 }
 
 void world::crash(unsigned host, milliseconds down) {
@@ -121,10 +114,7 @@ void world::crash(unsigned host, milliseconds down) {
         return;
     }
     const auto gone = nodes_[host];
-    for (const auto& p : parts_) {
-        p->on_crash(*gone);
-    }
-    gone->crash();
+    end_run(*gone);
     collect(*gone);
     nodes_[host].reset();
     time_.at(time_.now() + down, [this, host] {
@@ -139,10 +129,7 @@ void world::depart(unsigned host, milliseconds down) {
     if (n == nullptr || n->frozen()) {
         return;
     }
-    if (n->seat() != nullptr) {
-        watcher_.saw(n->name(), "leaves");
-        n->run([n] { n->seat()->leave(); });
-    }
+    n->stop();
     crash(host, down);
 }
 

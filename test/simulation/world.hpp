@@ -55,9 +55,10 @@ class world final : private group_watch {
     void crash(unsigned host, std::chrono::milliseconds down);
     /// Ends the node there in order.
     void depart(unsigned host, std::chrono::milliseconds down);
-    /// Begins a node that is none of the hosts', and takes part in the group alone.
+    /// Begins a node that is none of the hosts'.
     std::shared_ptr<node_run> begin_stranger(const std::string& name, unsigned host, unsigned run);
-    void end_stranger(node_run& n);
+    /// Ends a node as a crash does.
+    void end_run(node_run& n);
     [[nodiscard]] bool has_group() const noexcept { return plan_.group; }
 
   private:
@@ -65,7 +66,7 @@ class world final : private group_watch {
     void end_trouble();
     void pass(std::chrono::milliseconds time) { time_.run_until(time_.now() + time); }
     void collect(node_run& n);
-    [[nodiscard]] core::node_setup setup_of(const std::string& name);
+    [[nodiscard]] std::shared_ptr<node_run> make(const std::string& name, unsigned host, unsigned run);
     void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override;
     void on_group_sent(node_run& by, std::string_view line) override;
     void on_neighbour(node_run& at, std::string_view node, core::presence::change what) override;

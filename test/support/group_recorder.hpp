@@ -2,7 +2,7 @@
 #pragma once
 
 #include "core/group_output.hpp"
-#include "core/group_source.hpp"
+#include "port/group_source.hpp"
 
 #include <string>
 #include <string_view>

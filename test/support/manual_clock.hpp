@@ -3,7 +3,7 @@
 
 #include <cles/limits.hpp>
 
-#include "core/clock.hpp"
+#include "port/clock.hpp"
 
 #include <chrono>
 

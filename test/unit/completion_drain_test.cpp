@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "shell/completion_drain.hpp"
+#include "asio/asio_environment.hpp"
+#include "core/completion_drain.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -14,7 +15,7 @@
 namespace completion_drain_test {
 namespace {
 
-using cles::shell::completion_drain;
+using cles::core::completion_drain;
 
 struct fixture {
     void put(std::function<void()> function) {
@@ -26,7 +27,8 @@ struct fixture {
 
     std::string called;
     boost::asio::io_context io;
-    std::shared_ptr<completion_drain> drain = std::make_shared<completion_drain>(io.get_executor());
+    std::shared_ptr<completion_drain> drain =
+        std::make_shared<completion_drain>(std::make_shared<cles::asio_port::asio_environment>(io.get_executor()));
 };
 
 } // namespace
@@ -48,7 +50,7 @@ BOOST_AUTO_TEST_CASE(completions_are_called_later_and_in_order) {
 }
 
 BOOST_AUTO_TEST_CASE(other_functions_of_the_executor_have_their_turn_after_eight) {
-    static_assert(cles::shell::completion_drain::most_at_once == 8);
+    static_assert(cles::core::completion_drain::most_at_once == 8);
     std::function<void()> again = [&] {
         called += '.';
         if (called.size() < 20) {
@@ -97,10 +99,11 @@ BOOST_AUTO_TEST_CASE(they_are_called_though_their_queue_is_gone) {
 
 BOOST_AUTO_TEST_CASE(they_go_with_their_context_also_where_they_own_the_queue) {
     const auto owned = std::make_shared<int>();
-    std::weak_ptr<cles::shell::completion_drain> queue;
+    std::weak_ptr<cles::core::completion_drain> queue;
     {
         boost::asio::io_context other;
-        const auto own = std::make_shared<cles::shell::completion_drain>(other.get_executor());
+        const auto own = std::make_shared<cles::core::completion_drain>(
+            std::make_shared<cles::asio_port::asio_environment>(other.get_executor()));
         queue = own;
         own->put(cles::core::completion{cles::core::completion::callback{[own, owned] {}}});
         BOOST_TEST(owned.use_count() == 2);

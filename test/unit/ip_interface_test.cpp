@@ -10,15 +10,11 @@
 namespace ip_interface {
 namespace {
 
-using cles::transport::automatic;
-using interface = cles::transport::ip_interface;
+using cles::core::automatic;
+using interface = cles::core::network_interface;
 
 interface card(std::string name, int index) {
-    return {.name = std::move(name),
-            .index = index,
-            .address = boost::asio::ip::make_address_v4("10.0.0.7"),
-            .running = true,
-            .multicast = true};
+    return {.name = std::move(name), .index = index, .address = 0x0a000007, .running = true, .multicast = true};
 }
 
 std::vector<std::string> names_of(const std::vector<interface>& all) {

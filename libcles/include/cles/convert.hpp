@@ -7,7 +7,6 @@
 #include <cles/standard.hpp>
 
 #include <boost/describe/enumerators.hpp>
-#include <boost/describe/members.hpp>
 
 #include <concepts>
 #include <cstddef>
@@ -44,7 +43,10 @@ namespace cles {
 namespace detail {
 
 template <class T>
-concept described_struct = std::is_class_v<T> && boost::describe::has_describe_members<T>::value;
+concept described_struct = std::is_class_v<T> && requires(T** type) {
+    boost_public_member_descriptor_fn(type);
+    boost_base_descriptor_fn(type);
+};
 
 template <class T>
 concept described_enum = std::is_enum_v<T> && boost::describe::has_describe_enumerators<T>::value;

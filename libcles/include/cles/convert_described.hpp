@@ -3,14 +3,15 @@
 
 #include <cles/convert.hpp>
 
-#include <boost/describe.hpp>
-#include <boost/mp11/algorithm.hpp>
-#include <boost/mp11/list.hpp>
+#include <boost/describe/class.hpp>
+#include <boost/describe/enum.hpp>
+#include <boost/describe/enumerators.hpp>
+#include <boost/describe/modifiers.hpp>
 
 #include <array>
 #include <cstddef>
 #include <optional>
-#include <string>
+#include <span>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -35,20 +36,81 @@ namespace cles {
 
 namespace detail {
 
+// --- The fields of a described struct ---
+//
+// `boost::describe::describe_members<T, mod_public | mod_inherited>` gives them too. It needs all of Boost.Mp11, which
+// every user of this header would compile, so that they are gathered here from the functions which the macros define.
+
+template <class... D>
+struct descriptors {};
+
 template <class T>
-using members_of = boost::describe::describe_members<T, boost::describe::mod_public | boost::describe::mod_inherited>;
+using bases_of = decltype(boost_base_descriptor_fn(static_cast<T**>(nullptr)));
+template <class T>
+using public_members_of = decltype(boost_public_member_descriptor_fn(static_cast<T**>(nullptr)));
+template <class T>
+using protected_members_of = decltype(boost_protected_member_descriptor_fn(static_cast<T**>(nullptr)));
+template <class T>
+using private_members_of = decltype(boost_private_member_descriptor_fn(static_cast<T**>(nullptr)));
+
+template <class D>
+inline constexpr bool is_field = (D::modifiers & (boost::describe::mod_static | boost::describe::mod_function)) == 0;
+
+template <template <class...> class List, class... D>
+constexpr bool any_is_named(List<D...>, [[maybe_unused]] std::string_view name) noexcept {
+    return ((name == D::name) || ...);
+}
+/// Whether a class describes a member of this name, which hides those of its bases.
+template <class T>
+constexpr bool has_member_named(std::string_view name) noexcept {
+    return any_is_named(public_members_of<T>{}, name) || any_is_named(protected_members_of<T>{}, name) ||
+           any_is_named(private_members_of<T>{}, name);
+}
+
+// Found: what has been found already. Hiding: the classes below, whose members hide those above them.
+template <class Found, class Members, class... Hiding>
+struct add_fields {
+    using type = Found;
+};
+template <class... F, template <class...> class List, class D, class... More, class... Hiding>
+struct add_fields<descriptors<F...>, List<D, More...>, Hiding...>
+    : add_fields<std::conditional_t<is_field<D> && !(std::is_same_v<F, D> || ...) &&
+                                        !(has_member_named<Hiding>(D::name) || ...),
+                                    descriptors<F..., D>, descriptors<F...>>,
+                 List<More...>, Hiding...> {};
+
+template <class Found, class Bases, class... Hiding>
+struct add_bases {
+    using type = Found;
+};
+template <class Found, class T, class... Hiding>
+struct add_class
+    : add_fields<typename add_bases<Found, bases_of<T>, T, Hiding...>::type, public_members_of<T>, Hiding...> {};
+template <class Found, template <class...> class List, class Base, class... More, class... Hiding>
+struct add_bases<Found, List<Base, More...>, Hiding...>
+    : add_bases<
+          typename std::conditional_t<(Base::modifiers & boost::describe::mod_public) != 0,
+                                      add_class<Found, typename Base::type, Hiding...>, add_bases<Found, void>>::type,
+          List<More...>, Hiding...> {};
+
+/// Descriptors of the public data members of a struct and of its public described bases, in their order.
+template <class T>
+using fields_of = typename add_class<descriptors<>, T>::type;
+
+// --- How they are read ---
 
 template <class T>
 inline constexpr bool is_optional = false;
 template <class T>
 inline constexpr bool is_optional<std::optional<T>> = true;
 
-template <class T>
-struct member {
+struct field {
     std::string_view name;
-    bool (*read)(json_reader&, T&);
+    bool (*read)(json_reader& r, void* object);
     bool required;
 };
+
+bool read_fields(json_reader& r, void* object, std::span<const field> fields);
 
 template <class M, class C>
 C class_of(M C::*);
@@ -84,39 +146,36 @@ constexpr bool has_default(std::string_view member) noexcept {
 }
 
 template <class T, class D>
-constexpr member<T> member_for() {
-    using field = std::remove_cvref_t<decltype(std::declval<T&>().*D::pointer)>;
+constexpr field field_for() {
+    using value = std::remove_cvref_t<decltype(std::declval<T&>().*D::pointer)>;
     using owner = decltype(class_of(D::pointer));
-    return {D::name, [](json_reader& r, T& object) { return read_json(r, object.*D::pointer); },
-            !is_optional<field> && !has_default<owner>(D::name) && !has_default<T>(D::name)};
+    return {D::name, [](json_reader& r, void* object) { return read_json(r, static_cast<T*>(object)->*D::pointer); },
+            !is_optional<value> && !has_default<owner>(D::name) && !has_default<T>(D::name)};
 }
 
 template <class T, class... D>
-constexpr std::array<member<T>, sizeof...(D)> table_of(boost::mp11::mp_list<D...>) {
-    return {member_for<T, D>()...};
+constexpr std::array<field, sizeof...(D)> table_of(descriptors<D...>) {
+    return {field_for<T, D>()...};
 }
 
-template <class D>
-inline constexpr prepared_key_text<std::string_view{D::name}.size()> key_of{D::name};
+template <class T>
+inline constexpr auto field_table = table_of<T>(fields_of<T>{});
 
-template <class Table>
-constexpr std::size_t find_member(const Table& table, std::string_view name) noexcept {
-    std::size_t i = 0;
-    while (i < table.size() && table[i].name != name) {
-        ++i;
+constexpr bool is_among(std::span<const field> fields, std::string_view name) noexcept {
+    for (const auto& f : fields) {
+        if (f.name == name) {
+            return true;
+        }
     }
-    return i;
+    return false;
 }
 
 template <class T>
-inline constexpr auto member_table = table_of<T>(boost::mp11::mp_rename<members_of<T>, boost::mp11::mp_list>{});
-
-template <class T>
-constexpr bool defaults_are_members() noexcept {
+constexpr bool defaults_are_fields() noexcept {
     if constexpr (has_defaults<T>) {
         auto list = cles_members_with_defaults(static_cast<const T*>(nullptr));
         for (auto name = next_name(list); !name.empty(); name = next_name(list)) {
-            if (find_member(member_table<T>, name) == member_table<T>.size()) {
+            if (!is_among(field_table<T>, name)) {
                 return false;
             }
         }
@@ -124,33 +183,70 @@ constexpr bool defaults_are_members() noexcept {
     return true;
 }
 
+// --- How they are written ---
+
+template <class D>
+inline constexpr prepared_key_text<std::string_view{D::name}.size()> key_of{D::name};
+
+template <class D, class T>
+void write_field(json_writer& w, const T& object) {
+    const auto& value = object.*D::pointer;
+    if constexpr (is_optional<std::remove_cvref_t<decltype(value)>>) {
+        if (value) {
+            w.plain_key(key_of<D>);
+            write_json(w, *value);
+        }
+    } else {
+        w.plain_key(key_of<D>);
+        write_json(w, value);
+    }
+}
+
+template <class T, class... D>
+void write_fields(json_writer& w, const T& object, descriptors<D...>) {
+    (write_field<D>(w, object), ...);
+}
+
+// --- Enums ---
+
+template <class E>
+struct enumerator_table {
+    template <template <class...> class List, class... D>
+    constexpr explicit enumerator_table(List<D...>) : names{D::name...}, values{D::value...} {}
+
+    static constexpr std::size_t count = []<template <class...> class List, class... D>(List<D...>) {
+        return sizeof...(D);
+    }(boost::describe::describe_enumerators<E>{});
+    std::array<std::string_view, count> names;
+    std::array<E, count> values;
+};
+template <class E>
+inline constexpr enumerator_table<E> enumerators{boost::describe::describe_enumerators<E>{}};
+
+/// The place of the name that comes; fails where it is none of these.
+bool read_choice(json_reader& r, std::span<const std::string_view> names, std::size_t& index);
+
 } // namespace detail
 
 template <detail::described_enum T>
 struct converter<T> {
     static void write(json_writer& w, T value) {
-        const char* name = boost::describe::enum_to_string(value, nullptr);
-        if (name != nullptr) {
-            w.value(std::string_view{name});
-        } else {
-            write_json(w, static_cast<std::underlying_type_t<T>>(value));
+        constexpr auto& known = detail::enumerators<T>;
+        for (auto i = known.count; i-- > 0;) {
+            if (known.values[i] == value) {
+                w.value(known.names[i]);
+                return;
+            }
         }
+        write_json(w, static_cast<std::underlying_type_t<T>>(value));
     }
     static bool read(json_reader& r, T& value) {
-        std::string_view name;
-        if (!r.read(name)) {
+        std::size_t index = 0;
+        if (!detail::read_choice(r, detail::enumerators<T>.names, index)) {
             return false;
         }
-        std::string choices;
-        bool found = false;
-        boost::mp11::mp_for_each<boost::describe::describe_enumerators<T>>([&](auto d) {
-            if (name == d.name) {
-                value = d.value;
-                found = true;
-            }
-            choices.append(choices.empty() ? "" : ", ").append(d.name);
-        });
-        return found || r.fail("expected one of " + choices);
+        value = detail::enumerators<T>.values[index];
+        return true;
     }
 };
 
@@ -158,62 +254,13 @@ template <detail::described_struct T>
 struct converter<T> {
     static void write(json_writer& w, const T& object) {
         w.begin_object();
-        boost::mp11::mp_for_each<detail::members_of<T>>([&](auto d) {
-            const auto& field = object.*d.pointer;
-            if constexpr (detail::is_optional<std::remove_cvref_t<decltype(field)>>) {
-                if (field) {
-                    w.plain_key(detail::key_of<decltype(d)>);
-                    write_json(w, *field);
-                }
-            } else {
-                w.plain_key(detail::key_of<decltype(d)>);
-                write_json(w, field);
-            }
-        });
+        detail::write_fields(w, object, detail::fields_of<T>{});
         w.end_object();
     }
-
     static bool read(json_reader& r, T& object) {
-        static_assert(detail::defaults_are_members<T>(),
+        static_assert(detail::defaults_are_fields<T>(),
                       "CLES_DEFAULTS names a member that BOOST_DESCRIBE_STRUCT does not");
-        constexpr auto& table = detail::member_table<T>;
-        std::array<bool, table.size()> seen{};
-        std::size_t next = 0; // members mostly come in their order
-        std::string_view key;
-        if (!r.begin_object()) {
-            return false;
-        }
-        for (;;) {
-            if (next < table.size() && r.next_key_is(table[next].name)) {
-                // as expected
-            } else if (!r.next_key(key)) {
-                break;
-            } else {
-                next = detail::find_member(table, key);
-            }
-            if (next == table.size()) {
-                if (!r.skip()) {
-                    return false;
-                }
-                continue;
-            }
-            if (!table[next].read(r, object)) {
-                r.inside_member(table[next].name);
-                return false;
-            }
-            seen[next++] = true;
-        }
-        if (!r.ok()) {
-            return false;
-        }
-        for (std::size_t i = 0; i < table.size(); ++i) {
-            if (!seen[i] && table[i].required) {
-                r.fail("is missing");
-                r.inside_member(table[i].name);
-                return false;
-            }
-        }
-        return true;
+        return detail::read_fields(r, &object, detail::field_table<T>);
     }
 };
 

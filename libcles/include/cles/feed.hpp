@@ -53,6 +53,20 @@ class feed_control {
     [[nodiscard]] virtual const boost::asio::any_io_executor& executor() const = 0;
 };
 
+/// What a cancellation slot holds of an `async_next`.
+struct next_withdrawal {
+    std::weak_ptr<feed_control> feed;
+    const pending_event* operation;
+    boost::asio::any_io_executor executor; ///< the service's, where the slot is emitted on another
+
+    void operator()() const;
+};
+
+/// `control->next`, on the service's executor.
+void dispatch_next(std::shared_ptr<feed_control> control, event_ptr operation);
+/// `control->close`, on the service's executor.
+void dispatch_close(std::shared_ptr<feed_control> control, const boost::asio::any_io_executor& service);
+
 /// False where the body is not JSON. What a type reads of it is checked by reading it.
 template <class T>
 bool read_body(const raw_event& event, T& value, boost::system::error_code& code, std::string& why) {
@@ -135,18 +149,30 @@ class feed;
 
 namespace detail {
 
+/// An `async_bind`, of a feed of any type.
+class binding : public pending {
+  public:
+    /// What the feed is made of; before it starts.
+    void make_of(std::shared_ptr<feed_control> control) { control_ = std::move(control); }
+
+  protected:
+    ~binding() = default;
+    std::shared_ptr<feed_control> take_control() noexcept { return std::move(control_); }
+
+  private:
+    std::shared_ptr<feed_control> control_;
+};
+using binding_ptr = std::unique_ptr<binding, discarding>;
+
 /// Completes `async_bind` with the feed.
 template <class T, bool Throws, class Handler>
-class bind_operation final : public pending {
+class bind_operation final : public binding {
   public:
     bind_operation(Handler handler, const boost::asio::any_io_executor& service, std::string* diagnostics)
         : complete_(std::move(handler), service), diagnostics_(diagnostics) {}
 
-    /// What the feed is made of; before it starts.
-    void make_of(std::shared_ptr<feed_control> control) { control_ = std::move(control); }
-
     verdict offer(std::string_view) override {
-        feed<T> bound{std::move(control_), complete_.elsewhere()};
+        feed<T> bound{take_control(), complete_.elsewhere()};
         end_operation(this, complete_, {}, {}, std::move(bound));
         return verdict::completed;
     }
@@ -164,7 +190,6 @@ class bind_operation final : public pending {
 
   private:
     completion<Throws, Handler> complete_;
-    std::shared_ptr<feed_control> control_;
     std::string* diagnostics_;
 };
 
@@ -221,18 +246,14 @@ class feed {
                 const auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = detail::make_operation<operation_type>(std::move(handler), control->executor());
                 const bool hop = elsewhere || operation->elsewhere();
-                detail::connect_slot(slot, hop, control->executor(), [weak = std::weak_ptr{control}, operation] {
-                    if (const auto alive = weak.lock()) {
-                        alive->cancel(operation);
-                    }
-                });
-                if (!hop) {
+                detail::connect_slot(
+                    slot, detail::next_withdrawal{control, operation,
+                                                  hop ? control->executor() : boost::asio::any_io_executor{}});
+                if (hop) {
+                    detail::dispatch_next(control, detail::event_ptr{operation});
+                } else {
                     control->next(detail::event_ptr{operation});
-                    return;
                 }
-                boost::asio::dispatch(control->executor(), [control, waiting = detail::event_ptr{operation}]() mutable {
-                    control->next(std::move(waiting));
-                });
             },
             token);
     }
@@ -241,7 +262,7 @@ class feed {
     void close() {
         if (auto control = std::exchange(control_, nullptr)) {
             if (elsewhere_) {
-                boost::asio::dispatch(executor_, [control = std::move(control)] { control->close(); });
+                detail::dispatch_close(std::move(control), executor_);
             } else {
                 control->close();
             }

@@ -5,18 +5,36 @@
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
 
-#include <boost/asio/any_io_executor.hpp>
-#include <boost/asio/awaitable.hpp>
-#include <boost/callable_traits/args.hpp>
-#include <boost/callable_traits/return_type.hpp>
-
 #include <cstddef>
 #include <tuple>
 #include <type_traits>
 
 /// What a handler takes and gives, and one readable line where it cannot be one. Not for applications.
 
+// Coroutine handlers are recognised here; `<cles/coroutine_handler.hpp>` runs them.
+namespace boost::asio {
+template <typename T, typename Executor>
+class awaitable;
+} // namespace boost::asio
+
 namespace cles::detail {
+
+/// The arguments and the result of a function, or of an object with one call operator.
+template <class F>
+struct call_signature : call_signature<decltype(&F::operator())> {};
+template <class R, class... A, bool NoThrow>
+struct call_signature<R (*)(A...) noexcept(NoThrow)> {
+    using arguments = std::tuple<A...>;
+    using result = R;
+};
+template <class C, class R, class... A, bool NoThrow>
+struct call_signature<R (C::*)(A...) noexcept(NoThrow)> : call_signature<R (*)(A...)> {};
+template <class C, class R, class... A, bool NoThrow>
+struct call_signature<R (C::*)(A...) const noexcept(NoThrow)> : call_signature<R (*)(A...)> {};
+template <class C, class R, class... A, bool NoThrow>
+struct call_signature<R (C::*)(A...)& noexcept(NoThrow)> : call_signature<R (*)(A...)> {};
+template <class C, class R, class... A, bool NoThrow>
+struct call_signature<R (C::*)(A...) const& noexcept(NoThrow)> : call_signature<R (*)(A...)> {};
 
 template <class T>
 struct awaited {
@@ -34,8 +52,8 @@ struct awaited<boost::asio::awaitable<T, E>> {
 /// How a handler wants its arguments: (), (request), (body), (request, body), (request, responder).
 template <class F>
 struct handler_shape {
-    using arguments = boost::callable_traits::args_t<F, std::tuple>;
-    using result = boost::callable_traits::return_type_t<F>;
+    using arguments = typename call_signature<F>::arguments;
+    using result = typename call_signature<F>::result;
     static constexpr std::size_t arity = std::tuple_size_v<arguments>;
 
     template <std::size_t I>

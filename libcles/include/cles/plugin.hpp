@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/handler_shape.hpp>
 #include <cles/plugin_abi.h>
 #include <cles/plugin_config.hpp>
 #include <cles/plugin_registrar.hpp>
 #include <cles/registrar.hpp>
 #include <cles/setting_error.hpp>
-
-#include <boost/callable_traits/args.hpp>
 
 #include <cstddef>
 #include <exception>
@@ -80,7 +79,7 @@ class plugin_entry {
     // Hands what the settings say to `use`.
     template <class F>
     static void with_settings(cles_text config, F&& use) {
-        using arguments = boost::callable_traits::args_t<decltype(Register), std::tuple>;
+        using arguments = typename call_signature<decltype(Register)>::arguments;
         if constexpr (std::tuple_size_v<arguments> == 1) {
             expect_no_config(view_of(config));
             use();

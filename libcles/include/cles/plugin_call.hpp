@@ -82,9 +82,6 @@ class plugin_call final : public call_control {
         host_.delegate(&host_, job_, abi_text(command), &crossing);
     }
 
-    [[nodiscard]] boost::asio::any_io_executor executor() const override {
-        throw error(errc::failed, "a plugin has no executor");
-    }
     [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
 
   private:

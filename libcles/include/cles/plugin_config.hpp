@@ -4,9 +4,6 @@
 #include <cles/convert.hpp>
 #include <cles/setting_error.hpp>
 
-#include <boost/describe/members.hpp>
-#include <boost/mp11/algorithm.hpp>
-
 #include <string>
 #include <string_view>
 
@@ -22,10 +19,7 @@ std::string unknown_setting(std::string_view json) {
     std::string unknown;
     if (reader.begin_object()) {
         while (reader.next_key(key)) {
-            bool known = false;
-            boost::mp11::mp_for_each<boost::describe::describe_members<C, boost::describe::mod_any_access>>(
-                [&](auto member) { known = known || key == member.name; });
-            if (!known) {
+            if (!is_among(field_table<C>, key)) {
                 return std::string{key};
             }
             reader.skip();

@@ -8,11 +8,6 @@
 #include <cles/standard.hpp>
 #include <cles/task_info.hpp>
 
-#include <boost/asio/awaitable.hpp>
-#include <boost/asio/bind_cancellation_slot.hpp>
-#include <boost/asio/cancellation_signal.hpp>
-#include <boost/asio/co_spawn.hpp>
-
 #include <functional>
 #include <memory>
 #include <string>
@@ -56,41 +51,9 @@ decltype(auto) invoke_handler(F& f, const request& r) {
     }
 }
 
-// The coroutine that runs a coroutine handler. It owns the handler's function object and the request, since the
-// handler's own frame may refer to both.
+/// Runs handlers that are coroutines; defined in `<cles/coroutine_handler.hpp>`, which `<cles/service.hpp>` includes.
 template <class F>
-boost::asio::awaitable<void> run_handler(std::shared_ptr<F> f, request r, responder answer) {
-    using result = typename awaited<typename handler_shape<F>::result>::type;
-    try {
-        if constexpr (std::is_void_v<result>) {
-            co_await invoke_handler(*f, r);
-            answer.done();
-        } else {
-            const auto value = co_await invoke_handler(*f, r);
-            answer.done(value);
-        }
-    } catch (...) {
-        answer.fail(std::current_exception());
-    }
-}
-
-// The same for one that answers through its responder. What it throws is the answer where there is none yet.
-template <class F>
-boost::asio::awaitable<void> run_answering_handler(std::shared_ptr<F> f, request r, responder answer) {
-    try {
-        co_await (*f)(r, answer);
-    } catch (...) {
-        answer.fail(std::current_exception());
-    }
-}
-
-inline void spawn_handler(const responder& answer, boost::asio::awaitable<void> work) {
-    auto signal = std::make_shared<boost::asio::cancellation_signal>();
-    answer.on_stop([signal] { signal->emit(boost::asio::cancellation_type::terminal); });
-    // The completion keeps the signal, which must outlive the coroutine.
-    boost::asio::co_spawn(answer.get_executor(), std::move(work),
-                          boost::asio::bind_cancellation_slot(signal->slot(), [signal](std::exception_ptr) {}));
-}
+struct coroutine_handler;
 
 /// A function object as `std::function` wants it, which copies.
 template <class F>
@@ -108,14 +71,12 @@ template <class F>
 void set_handler(registration& to, F f) {
     using shape = handler_shape<F>;
     if constexpr (shape::is_coroutine) {
-        to.coroutine = true;
-        to.async = [f = std::make_shared<F>(std::move(f))](const request& r, responder answer) {
-            if constexpr (shape::takes_responder) {
-                spawn_handler(answer, run_answering_handler(f, r, answer));
-            } else {
-                spawn_handler(answer, run_handler(f, r, answer));
-            }
-        };
+        constexpr bool included = requires { sizeof(coroutine_handler<F>); };
+        static_assert(included, "a handler that is a coroutine needs #include <cles/coroutine_handler.hpp>");
+        if constexpr (included) {
+            to.coroutine = true;
+            to.async = coroutine_handler<F>{std::make_shared<F>(std::move(f))};
+        }
     } else if constexpr (shape::takes_responder) {
         to.async = copyable(std::move(f));
     } else if constexpr (std::is_void_v<typename shape::result>) {
@@ -136,9 +97,10 @@ void set_handler(registration& to, F f) {
 /// A handler takes `()`, `(request)`, `(body)`, `(request, body)` or `(request, responder)`, the body being any type
 /// that `<cles/convert.hpp>` reads, and gives nothing, a value that it writes, or `asio::awaitable` of either. It may
 /// hold what can only be moved. A plain function runs in line, between two lines of the link, and should be quick; a
-/// coroutine may wait. One that takes a responder answers through it and may be a coroutine too, an `awaitable<void>`.
-/// A body that does not fit is answered with `bad_request` before the handler runs. What a handler throws becomes the
-/// answer: `cles::error` with its code, anything else `failed`.
+/// coroutine may wait (include `<cles/coroutine_handler.hpp>`, which comes with `<cles/service.hpp>`). One that takes a
+/// responder answers through it and may be a coroutine too, an `awaitable<void>`. A body that does not fit is answered
+/// with `bad_request` before the handler runs. What a handler throws becomes the answer: `cles::error` with its code,
+/// anything else `failed`.
 ///
 /// In a plugin, handlers, those of BIND too, run on threads of a pool, several at once, unless the task is `inline_ok`;
 /// coroutines, which need the executor of an application, are refused there.

@@ -18,6 +18,13 @@
 
 namespace cles::detail {
 
+/// What a result is that could not be read. \param reader stopped where it does not fit
+pending::verdict judge_unread(const json_reader& reader, std::string_view json, boost::system::error_code& code,
+                              std::string& why, std::string_view what);
+/// The same where a conversion of the user's own threw.
+void judge_thrown(const std::exception& thrown, boost::system::error_code& code, std::string& why,
+                  std::string_view what);
+
 /// A text result read as a T. `json_text` is handed over as it came.
 template <class T>
 pending::verdict read_result(std::string_view json, T& value, boost::system::error_code& code, std::string& why,
@@ -27,17 +34,11 @@ pending::verdict read_result(std::string_view json, T& value, boost::system::err
         if (read_json(reader, value) && reader.at_end()) {
             return pending::verdict::completed;
         }
-    } catch (const std::exception& thrown) { // by a conversion of the user's own
-        code = errc::conversion;
-        why = std::string{what} + " cannot be read: " + thrown.what();
+    } catch (const std::exception& thrown) {
+        judge_thrown(thrown, code, why, what);
         return pending::verdict::completed;
     }
-    if (!is_valid_answer(json)) {
-        return pending::verdict::malformed;
-    }
-    code = errc::conversion;
-    why = std::string{what} + " does not fit: " + reader.error();
-    return pending::verdict::completed;
+    return judge_unread(reader, json, code, why, what);
 }
 
 template <class T, bool Throws, class Handler>

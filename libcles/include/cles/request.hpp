@@ -9,7 +9,6 @@
 #include <cles/limits.hpp>
 #include <cles/verb.hpp>
 
-#include <charconv>
 #include <cstddef>
 #include <memory>
 #include <span>
@@ -34,6 +33,10 @@ struct request_data {
 
 /// A copy that owns all it refers to.
 std::shared_ptr<const request_data> own(const request_data& data);
+
+/// False where the text is not a number, or not one that fits. Defined for all numbers that `std::from_chars` reads.
+template <class T>
+bool read_number(std::string_view text, T& number) noexcept;
 
 } // namespace detail
 
@@ -75,10 +78,9 @@ class request {
     [[nodiscard]] T parameter(std::size_t index) const {
         const auto text = parameter_text(index);
         if constexpr (std::is_arithmetic_v<T>) {
+            static_assert(!std::is_same_v<T, bool>, "a parameter is text or a number");
             T number{};
-            const auto end = text.data() + text.size();
-            const auto [ptr, code] = std::from_chars(text.data(), end, number);
-            if (code != std::errc{} || ptr != end) {
+            if (!detail::read_number(text, number)) {
                 throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is no number that fits");
             }
             return number;

@@ -6,7 +6,7 @@
 #include <cles/error.hpp>
 #include <cles/log.hpp>
 
-#include <boost/asio/any_io_executor.hpp>
+#include <boost/system/error_code.hpp>
 
 #include <chrono>
 #include <exception>
@@ -14,6 +14,10 @@
 #include <memory>
 #include <string>
 #include <string_view>
+
+namespace boost::asio {
+class any_io_executor;
+} // namespace boost::asio
 
 namespace cles {
 
@@ -36,7 +40,8 @@ class call_control {
     [[nodiscard]] virtual bool stopped() const noexcept = 0;
     virtual void delegate(std::string_view command, const call_options& options, answer_callback answered) = 0;
     virtual void log(log_level level, std::string_view text) = 0;
-    [[nodiscard]] virtual boost::asio::any_io_executor executor() const = 0;
+    /// \throws cles::error with `failed` where there is none, as in a plugin
+    [[nodiscard]] virtual boost::asio::any_io_executor executor() const;
     /// Whether any thread may use it.
     [[nodiscard]] virtual bool is_thread_safe() const noexcept { return false; }
 };
@@ -109,7 +114,7 @@ class responder {
 
     /// The service's executor. There is none in a plugin.
     /// \throws cles::error with `failed` in a plugin
-    [[nodiscard]] boost::asio::any_io_executor get_executor() const { return call_->executor(); }
+    [[nodiscard]] boost::asio::any_io_executor get_executor() const;
 
     /// Whether it may be used, and let go of, on any thread: that of a job on a pool of workers, or in a plugin.
     [[nodiscard]] bool is_thread_safe() const noexcept { return call_->is_thread_safe(); }

@@ -3,6 +3,7 @@
 
 #include <cles/call_options.hpp>
 #include <cles/cancellation.hpp>
+#include <cles/coroutine_handler.hpp>
 #include <cles/error.hpp>
 #include <cles/feed.hpp>
 #include <cles/gossip.hpp>
@@ -19,9 +20,11 @@
 #include <cles/standard.hpp>
 
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/associated_cancellation_slot.hpp>
 #include <boost/asio/async_result.hpp>
 #include <boost/asio/execution_context.hpp>
 
+#include <chrono>
 #include <concepts>
 #include <cstdint>
 #include <functional>
@@ -33,10 +36,10 @@
 #include <utility>
 #include <vector>
 
-#if !defined(BOOST_ASIO_SEPARATE_COMPILATION) || !defined(BOOST_ASIO_NO_DEPRECATED)
+#if !defined(BOOST_ASIO_NO_DEPRECATED)
 #error                                                                                                                 \
-    "CLES is compiled with BOOST_ASIO_SEPARATE_COMPILATION and BOOST_ASIO_NO_DEPRECATED, and so must be its users: \
-the target cles::cles of CMake and the flags of pkg-config's cles set them"
+    "CLES is compiled with BOOST_ASIO_NO_DEPRECATED, and so must be its users: the target cles::cles of CMake and the \
+flags of pkg-config's cles define it"
 #endif
 
 namespace cles {
@@ -95,6 +98,32 @@ struct outgoing {
     cles::verb verb = verb::pull;
     std::string_view noun;
     std::string_view body;
+};
+
+// What a cancellation slot holds of an operation.
+
+struct withdrawal {
+    std::weak_ptr<engine> service;
+    std::uint64_t ticket;
+
+    void operator()() const;
+};
+
+/// Of one that begins on the service's executor, while its slot is emitted on another.
+struct remote_withdrawal {
+    std::weak_ptr<engine> service;
+    boost::asio::any_io_executor executor; ///< the service's, on which the other members are used
+    std::shared_ptr<std::uint64_t> ticket; ///< 0 before it has begun
+
+    void operator()() const;
+};
+
+/// Of an `async_bind`.
+struct bind_withdrawal {
+    std::shared_ptr<std::weak_ptr<feed_control>> feed; ///< empty before it has begun
+    boost::asio::any_io_executor executor;             ///< the service's, where the slot is emitted on another
+
+    void operator()() const;
 };
 
 } // namespace detail
@@ -169,9 +198,7 @@ class service : public registrar {
                 const auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
                 if (hops(*operation)) {
-                    begin_elsewhere(slot, operation, [at_most](detail::engine& inside, detail::pending_ptr waiting) {
-                        return close(inside, at_most, std::move(waiting));
-                    });
+                    close_elsewhere(hopping(slot), at_most, detail::pending_ptr{operation});
                 } else {
                     connect_cancellation(slot, close(*engine_, at_most, detail::pending_ptr{operation}));
                 }
@@ -216,10 +243,7 @@ class service : public registrar {
                 if (json.wrong) {
                     fail_later(detail::pending_ptr{operation}, json);
                 } else if (hops(*operation)) {
-                    begin_elsewhere(slot, operation,
-                                    [path, text = json.text](detail::engine& inside, detail::pending_ptr waiting) {
-                                        return publish_when_room(inside, path, text, std::move(waiting));
-                                    });
+                    publish_elsewhere(hopping(slot), path, json.text, detail::pending_ptr{operation});
                 } else {
                     connect_cancellation(slot,
                                          publish_when_room(*engine_, path, json.text, detail::pending_ptr{operation}));
@@ -353,11 +377,8 @@ class service : public registrar {
                 if (content.wrong) {
                     fail_later(detail::pending_ptr{operation}, content);
                 } else if (hops(*operation)) {
-                    begin_elsewhere(slot, operation,
-                                    [verb, target, text = content.text, chosen](detail::engine& inside,
-                                                                                detail::pending_ptr waiting) {
-                                        return send(inside, {verb, target.view(), text}, chosen, std::move(waiting));
-                                    });
+                    send_elsewhere(hopping(slot), {verb, target.view(), content.text}, chosen,
+                                   detail::pending_ptr{operation});
                 } else {
                     connect_cancellation(slot, send(*engine_, {verb, target.view(), content.text}, chosen,
                                                     detail::pending_ptr{operation}));
@@ -373,10 +394,7 @@ class service : public registrar {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
                 if (hops(*operation)) {
-                    begin_elsewhere(slot, operation,
-                                    [text, chosen](detail::engine& inside, detail::pending_ptr waiting) {
-                                        return send_command(inside, text, chosen, std::move(waiting));
-                                    });
+                    send_command_elsewhere(hopping(slot), text, chosen, detail::pending_ptr{operation});
                 } else {
                     connect_cancellation(slot, send_command(*engine_, text, chosen, detail::pending_ptr{operation}));
                 }
@@ -391,29 +409,19 @@ class service : public registrar {
         return operation.elsewhere() || (pooled_ && !on_strand());
     }
 
-    /// Begins it on the service's executor. `begin` returns its ticket, and is handed over with all that it needs.
-    template <class Slot, class Operation, class F>
-    void begin_elsewhere(Slot slot, Operation* operation, F begin) {
-        const auto ticket = std::make_shared<std::uint64_t>(0); // used on the service's executor
-        detail::connect_slot(slot, true, get_executor(), [weak = std::weak_ptr{engine_}, ticket] {
-            if (const auto alive = weak.lock(); alive && *ticket != 0) {
-                cancel(*alive, *ticket);
-            }
-        });
-        boost::asio::dispatch(get_executor(),
-                              [inside = engine_, ticket, waiting = detail::pending_ptr{operation},
-                               begin = std::move(begin)]() mutable { *ticket = begin(*inside, std::move(waiting)); });
-    }
-
     template <class Slot>
     void connect_cancellation(Slot slot, std::uint64_t ticket) {
         if (ticket != 0) {
-            detail::connect_slot(slot, [weak = std::weak_ptr{engine_}, ticket] {
-                if (const auto alive = weak.lock()) {
-                    cancel(*alive, ticket);
-                }
-            });
+            detail::connect_slot(slot, detail::withdrawal{engine_, ticket});
         }
+    }
+
+    /// The slot's connection to an operation that begins on the service's executor, and may end before this returns.
+    template <class Slot>
+    detail::remote_withdrawal hopping(Slot slot) {
+        detail::remote_withdrawal withdraw{engine_, get_executor(), std::make_shared<std::uint64_t>(0)};
+        detail::connect_slot(slot, withdraw);
+        return withdraw;
     }
 
     template <class T, class Token, class Handler>
@@ -422,34 +430,10 @@ class service : public registrar {
         const auto slot = boost::asio::get_associated_cancellation_slot(handler);
         auto* operation =
             detail::make_operation<operation_type>(std::move(handler), get_executor(), options.diagnostics_);
-        const auto made = std::make_shared<std::weak_ptr<detail::feed_control>>();
-        const bool hop = hops(*operation);
-        detail::connect_slot(slot, hop, get_executor(), [made] {
-            if (const auto alive = made->lock()) {
-                alive->cancel_start();
-            }
-        });
-        if (!hop) {
-            start_bind(*made, engine_, operation, noun, options);
-            return;
-        }
-        struct discarding { // until it has begun
-            void operator()(operation_type* unused) const noexcept { unused->discard(); }
-        };
-        boost::asio::dispatch(get_executor(),
-                              [inside = engine_, made, noun, options,
-                               waiting = std::unique_ptr<operation_type, discarding>{operation}]() mutable {
-                                  start_bind(*made, inside, waiting.release(), noun, options);
-                              });
-    }
-
-    template <class Operation>
-    static void start_bind(std::weak_ptr<detail::feed_control>& made, const std::shared_ptr<detail::engine>& inside,
-                           Operation* operation, const std::string& noun, const bind_options& options) {
-        const auto control = make_feed(inside, noun, options);
-        made = control;
-        operation->make_of(control);
-        control->start(detail::pending_ptr{operation});
+        const detail::bind_withdrawal withdraw{std::make_shared<std::weak_ptr<detail::feed_control>>(),
+                                               hops(*operation) ? get_executor() : boost::asio::any_io_executor{}};
+        detail::connect_slot(slot, withdraw);
+        start_bind(withdraw, detail::binding_ptr{operation}, noun, options);
     }
 
     void fail_later(detail::pending_ptr operation, const detail::outgoing_body& why);
@@ -462,7 +446,17 @@ class service : public registrar {
     static std::uint64_t publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
                                            detail::pending_ptr operation);
     static std::uint64_t close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation);
-    static void cancel(detail::engine& inside, std::uint64_t ticket);
+    // The same on the service's executor, where they set the ticket.
+    void send_elsewhere(const detail::remote_withdrawal& withdraw, const detail::outgoing& request,
+                        const call_options& options, detail::pending_ptr operation);
+    void send_command_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& command,
+                                const call_options& options, detail::pending_ptr operation);
+    void publish_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& noun, const std::string& json,
+                           detail::pending_ptr operation);
+    void close_elsewhere(const detail::remote_withdrawal& withdraw, std::chrono::milliseconds limit,
+                         detail::pending_ptr operation);
+    void start_bind(const detail::bind_withdrawal& withdraw, detail::binding_ptr operation, const std::string& noun,
+                    const bind_options& options);
     static std::shared_ptr<detail::feed_control> make_feed(const std::shared_ptr<detail::engine>& inside,
                                                            std::string_view noun, const bind_options& options);
     [[nodiscard]] bool on_strand() const noexcept;

@@ -6,7 +6,7 @@
 #include <cles/multicast.hpp>
 #include <cles/peer.hpp>
 
-#include "core/group_source.hpp"
+#include "port/group_source.hpp"
 #include "protocol/request_line.hpp"
 
 #include <chrono>

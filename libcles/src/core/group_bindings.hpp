@@ -3,10 +3,10 @@
 
 #include "core/deadlines.hpp"
 #include "core/group_output.hpp"
-#include "core/group_source.hpp"
 #include "core/jitter.hpp"
 #include "core/link_bindings.hpp"
 #include "core/node.hpp"
+#include "port/group_source.hpp"
 #include "protocol/message.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>

@@ -3,9 +3,9 @@
 
 #include "core/group_feeds.hpp"
 #include "core/group_output.hpp"
-#include "core/group_source.hpp"
 #include "core/node.hpp"
 #include "core/publisher_sources.hpp"
+#include "port/group_source.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>

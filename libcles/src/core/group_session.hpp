@@ -4,9 +4,9 @@
 #include "core/group_bindings.hpp"
 #include "core/group_intake.hpp"
 #include "core/group_output.hpp"
-#include "core/group_source.hpp"
 #include "core/group_welcomes.hpp"
 #include "core/node.hpp"
+#include "port/group_source.hpp"
 #include "protocol/message.hpp"
 
 #include <cstdint>

@@ -5,9 +5,9 @@
 #include <cles/limits.hpp>
 
 #include "core/bind_decision.hpp"
-#include "core/group_source.hpp"
 #include "core/held_request.hpp"
 #include "core/node.hpp"
+#include "port/group_source.hpp"
 
 #include <cstddef>
 #include <functional>

@@ -4,8 +4,8 @@
 #include <cles/limits.hpp>
 
 #include "core/announcement.hpp"
-#include "core/group_source.hpp"
 #include "core/teller.hpp"
+#include "port/group_source.hpp"
 
 #include <algorithm>
 #include <cstdint>

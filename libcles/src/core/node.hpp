@@ -6,7 +6,6 @@
 #include <cles/limits.hpp>
 #include <cles/log.hpp>
 
-#include "core/clock.hpp"
 #include "core/completion_queue.hpp"
 #include "core/counters.hpp"
 #include "core/deadlines.hpp"
@@ -17,6 +16,7 @@
 #include "core/publications.hpp"
 #include "core/reflection_limit.hpp"
 #include "core/registry.hpp"
+#include "port/clock.hpp"
 
 #include <cstdint>
 #include <functional>

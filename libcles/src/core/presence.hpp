@@ -6,13 +6,13 @@
 #include "core/announcement.hpp"
 #include "core/deadlines.hpp"
 #include "core/ended_runs.hpp"
-#include "core/group_source.hpp"
 #include "core/known_run.hpp"
 #include "core/name_check.hpp"
 #include "core/news_item.hpp"
 #include "core/peer_report.hpp"
 #include "core/run_index.hpp"
 #include "core/teller.hpp"
+#include "port/group_source.hpp"
 
 #include <chrono>
 #include <cstddef>

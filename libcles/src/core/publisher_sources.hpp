@@ -3,7 +3,7 @@
 
 #include <cles/limits.hpp>
 
-#include "core/group_source.hpp"
+#include "port/group_source.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
 

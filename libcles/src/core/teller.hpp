@@ -3,7 +3,7 @@
 
 #include <cles/identity.hpp>
 
-#include "core/group_source.hpp"
+#include "port/group_source.hpp"
 
 #include <string>
 #include <string_view>

@@ -3,9 +3,9 @@
 
 #include <cles/limits.hpp>
 
-#include "core/clock.hpp"
 #include "core/publications.hpp"
 #include "core/update_gathering.hpp"
+#include "port/clock.hpp"
 
 #include <cstdint>
 #include <memory>

@@ -4,7 +4,7 @@
 #include "protocol/grammar.hpp"
 #include "protocol/message.hpp"
 #include "protocol/parts.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <algorithm>
 #include <string>
@@ -28,7 +28,7 @@ std::string foreign_adverb(std::string_view command) {
 
 } // namespace
 
-std::uint64_t send_command(detail::engine& by, std::string_view command, const call_options& options,
+std::uint64_t send_command(local_node& by, std::string_view command, const call_options& options,
                            detail::pending_ptr operation, std::optional<std::chrono::milliseconds> left) {
     protocol::request_line parsed;
     protocol::malformed_request wrong;
@@ -58,7 +58,7 @@ std::uint64_t send_command(detail::engine& by, std::string_view command, const c
     }
     chosen.urgent(chosen.urgent_ || parsed.urgent);
     const auto noun = std::string{parsed.noun.target} + ":" + std::string{parsed.noun.path};
-    return by.send({parsed.verb, noun, parsed.body}, chosen, std::move(operation));
+    return by.send(parsed.verb, noun, parsed.body, chosen, std::move(operation));
 }
 
 } // namespace cles::shell

@@ -3,7 +3,7 @@
 
 #include "core/feed_machine.hpp"
 #include "core/later.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <chrono>
 #include <utility>
@@ -20,24 +20,24 @@ constexpr std::chrono::seconds idle_after{2};
 
 } // namespace
 
-connection::connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from)
-    : engine_(std::move(host)), link_(std::move(carrier)), from_(from),
-      memory_(std::make_shared<core::memory_account>(engine_->node().memory)),
-      session_(engine_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
+connection::connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number)
+    : host_(std::move(host)), link_(std::move(carrier)), from_(from), number_(number),
+      memory_(std::make_shared<core::memory_account>(host_->node().memory)),
+      session_(host_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
     if (link_->datagram() == 0) {
-        monitor_.emplace(static_cast<core::link_monitor::owner&>(*this), engine_->deadlines(), engine_->bounds(),
-                         engine_->now());
+        monitor_.emplace(static_cast<core::link_monitor::owner&>(*this), host_->deadlines(), host_->bounds(),
+                         host_->now());
         if (from_ == origin::accepted) {
             monitor_->expect_line();
         }
         return;
     }
     const bool came_in = from_ == origin::accepted || from_ == origin::refused;
-    const auto stranger = came_in ? engine_->stranger(link_->peer()) : std::string{};
+    const auto stranger = came_in ? host_->stranger(link_->peer()) : std::string{};
     const bool is_v6 = stranger.find(':') != std::string::npos;
-    datagrams_.emplace(engine_->node(), link_->datagram(), stranger, is_v6 ? udp_over_v6 : udp_over_v4);
+    datagrams_.emplace(host_->node(), link_->datagram(), stranger, is_v6 ? udp_over_v6 : udp_over_v4);
     if (from_ == origin::accepted) {
-        life_.emplace(static_cast<core::source_life::keeper&>(*this), engine_->deadlines(), engine_->now());
+        life_.emplace(static_cast<core::source_life::keeper&>(*this), host_->deadlines(), host_->now());
     }
 }
 
@@ -45,7 +45,7 @@ connection::~connection() = default;
 
 void connection::start() { link_->start(shared_from_this()); }
 
-time_point connection::now() { return now_ ? *now_ : *(now_ = engine_->now()); }
+time_point connection::now() { return now_ ? *now_ : *(now_ = host_->now()); }
 
 // -- from the link -------------------------------------------------------------------------------------------------
 
@@ -69,7 +69,7 @@ void connection::on_line(std::string_view line) {
     session_.on_line(line, now());
     // In a long batch the peer gets to work on the first replies while the rest is still being answered: with many
     // requests in flight, neither end then waits for the other.
-    if (++lines_ % lines_per_write == 0 || link_->output().size() > engine_->bounds().unread) {
+    if (++lines_ % lines_per_write == 0 || link_->output().size() > host_->bounds().unread) {
         flush();
     }
     throw_on();
@@ -77,12 +77,12 @@ void connection::on_line(std::string_view line) {
 
 // What a handler has thrown, past the link: which hands the other lines over later, and may not end this batch.
 void connection::throw_on() {
-    if (engine_->completions().has_thrown()) {
+    if (host_->completions().has_thrown()) {
         const auto keep = shared_from_this();
         now_.reset();
-        engine_->turns().flush_soon(*this);
-        engine_->settle();
-        engine_->completions().rethrow();
+        host_->turns().flush_soon(*this);
+        host_->settle();
+        host_->completions().rethrow();
     }
 }
 
@@ -100,7 +100,7 @@ void connection::on_batch() {
     flush();
     lines_ = 0;
     now_.reset();
-    engine_->settle();
+    host_->settle();
     if (from_ == origin::refused) {
         abandon("there are as many links as there may be");
     }
@@ -116,26 +116,26 @@ void connection::on_end() {
 }
 
 void connection::on_lost(boost::system::error_code why) {
-    engine_->connections().seen_off(*link_);
+    host_->connections().seen_off(*link_);
     end("the link was lost: " + why.message());
 }
 
 void connection::on_room() {
     const auto keep = shared_from_this();
-    session_.serving().drain(engine_->now());
+    session_.serving().drain(host_->now());
     flush();
-    engine_->settle();
+    host_->settle();
 }
 
 // -- from the session ----------------------------------------------------------------------------------------------
 
 void connection::wake() {
     if (!now_) { // else the batch ends with a flush
-        engine_->turns().flush_soon(*this);
+        host_->turns().flush_soon(*this);
     }
 }
 
-bool connection::is_behind() const { return link_->unsent() > engine_->bounds().unread; }
+bool connection::is_behind() const { return link_->unsent() > host_->bounds().unread; }
 
 void connection::pause(bool stop) {
     pause_for_queue_ = stop;
@@ -172,7 +172,7 @@ void connection::put_updates(std::string_view lines) {
     } else {
         link_->output().append(lines);
     }
-    engine_->turns().flush_soon(*this);
+    host_->turns().flush_soon(*this);
 }
 
 // -- output --------------------------------------------------------------------------------------------------------
@@ -188,12 +188,12 @@ void connection::flush() {
     send_output();
     follow_backlog();
     if (may_serve_more()) {
-        engine_->turns().flush_soon(*this);
+        host_->turns().flush_soon(*this);
     }
-    if (updates_wait_ && !engine_->stopped() && link_->unsent() < updates_wait_past) {
+    if (updates_wait_ && !host_->stopped() && link_->unsent() < updates_wait_past) {
         // The link took all at once, and so will not say that it has room.
         updates_wait_ = false;
-        session_.serving().drain(engine_->now());
+        session_.serving().drain(host_->now());
     }
 }
 
@@ -208,19 +208,19 @@ bool connection::write() {
 
 void connection::send_output() {
     if (datagrams_) {
-        datagrams_->limit(link_->output(), now_ ? *now_ : engine_->now());
+        datagrams_->limit(link_->output(), now_ ? *now_ : host_->now());
     }
     link_->flush();
 }
 
 bool connection::may_serve_more() {
-    return session_.serving().has_more() && !engine_->stopped() && link_->unsent() < engine_->bounds().unread;
+    return session_.serving().has_more() && !host_->stopped() && link_->unsent() < host_->bounds().unread;
 }
 
 void connection::serve_more() {
     if (may_serve_more()) {
         const auto keep = shared_from_this();
-        session_.serving().serve_more(engine_->now());
+        session_.serving().serve_more(host_->now());
     }
 }
 
@@ -228,7 +228,7 @@ void connection::serve_more() {
 void connection::follow_backlog() {
     const auto unsent = link_->unsent();
     held_output_.resize(unsent);
-    const auto& bounds = engine_->bounds();
+    const auto& bounds = host_->bounds();
     const bool too_much = unsent > (pause_for_backlog_ ? bounds.unread / 2 : bounds.unread);
     if (too_much != pause_for_backlog_) {
         pause_for_backlog_ = too_much;
@@ -236,7 +236,7 @@ void connection::follow_backlog() {
     }
     if (unsent != 0 && !stall_.armed()) {
         stall_.sent = link_->sent();
-        engine_->deadlines().arm(stall_, core::later(engine_->now(), bounds.stall));
+        host_->deadlines().arm(stall_, core::later(host_->now(), bounds.stall));
     }
     follow_buffers();
 }
@@ -245,7 +245,7 @@ void connection::follow_backlog() {
 void connection::follow_buffers() {
     if (!idle_.armed() && link_->buffered() > modest_buffers) {
         idle_.moved = link_->received() + link_->sent();
-        engine_->deadlines().arm(idle_, engine_->now() + idle_after);
+        host_->deadlines().arm(idle_, host_->now() + idle_after);
     }
 }
 
@@ -254,7 +254,7 @@ void connection::on_idle(time_point now) {
     if (std::exchange(idle_.moved, moved) == moved) {
         link_->shrink();
     } else {
-        engine_->deadlines().arm(idle_, now + idle_after);
+        host_->deadlines().arm(idle_, now + idle_after);
     }
 }
 
@@ -265,11 +265,11 @@ void connection::on_stall(time_point now) {
     }
     if (link_->sent() != stall_.sent) {
         stall_.sent = link_->sent();
-        engine_->deadlines().arm(stall_, core::later(now, engine_->bounds().stall));
+        host_->deadlines().arm(stall_, core::later(now, host_->bounds().stall));
         return;
     }
-    engine_->say_soon(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address,
-                      link_->peer().address);
+    host_->say_soon(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address,
+                    link_->peer().address);
     abandon("the peer took nothing for too long");
 }
 
@@ -278,8 +278,8 @@ void connection::on_quiet() { abandon("nothing came for a while"); }
 
 void connection::on_silence() {
     const auto keep = shared_from_this();
-    engine_->say_soon(log_level::debug, "closed a link that brought no line: " + link_->peer().address,
-                      link_->peer().address);
+    host_->say_soon(log_level::debug, "closed a link that brought no line: " + link_->peer().address,
+                    link_->peer().address);
     part("no line came in time");
 }
 
@@ -298,7 +298,7 @@ void connection::bind(core::feed_machine& feed, protocol::request_text request, 
                       detail::pending_ptr operation) {
     session_.bound().add(feed);
     feeds_.push_back(&feed);
-    session_.asking().send(request, deadline, engine_->now(), std::move(operation));
+    session_.asking().send(request, deadline, host_->now(), std::move(operation));
 }
 
 void connection::unbind(core::feed_machine& feed) {
@@ -308,7 +308,7 @@ void connection::unbind(core::feed_machine& feed) {
 
 void connection::lose_feeds(std::string_view why) {
     const std::string reason{why};
-    const auto at = engine_->now();
+    const auto at = host_->now();
     while (!feeds_.empty()) {
         auto* feed = feeds_.back();
         unbind(*feed);
@@ -320,7 +320,7 @@ void connection::lose_feeds(std::string_view why) {
 
 // A silent peer gets the answer that a refused one gets: its first request may be on its way.
 void connection::give_way() {
-    ++engine_->node().counts.links_evicted;
+    ++host_->node().counts.links_evicted;
     if (!monitor_->has_spoken()) {
         session_.say_busy();
     }
@@ -331,7 +331,7 @@ void connection::give_way() {
 void connection::part(std::string_view why) {
     if (!gone_) {
         const auto keep = shared_from_this();
-        engine_->connections().see_off(link_);
+        host_->connections().see_off(link_);
         end(why);
     }
 }
@@ -351,18 +351,18 @@ void connection::end(std::string_view why) {
     const auto keep = shared_from_this();
     gone_ = true;
     usable_ = false;
-    engine_->deadlines().disarm(stall_);
-    engine_->deadlines().disarm(idle_);
+    host_->deadlines().disarm(stall_);
+    host_->deadlines().disarm(idle_);
     life_.reset();
     if (monitor_) {
         monitor_->stop();
     }
     held_output_.resize(0);
-    engine_->forget(*this, link_->received(), link_->sent());
+    host_->forget(*this, link_->received(), link_->sent());
     lose_feeds(why);
     session_.on_lost(why);
     now_.reset();
-    engine_->settle();
+    host_->settle();
 }
 
 } // namespace cles::shell

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
 
 #include "core/datagram_output.hpp"
 #include "core/link_admission.hpp"
@@ -22,11 +22,9 @@ namespace cles::core {
 class feed_machine;
 } // namespace cles::core
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// A link with the session that lives on it.
 class connection final : public link_events,
@@ -41,12 +39,14 @@ class connection final : public link_events,
     /// `refused`: it came in past the limit, and is told so.
     enum class origin : std::uint8_t { accepted, local, dialled, refused };
 
-    connection(std::shared_ptr<detail::engine> host, link_ptr carrier, origin from);
+    /// `number`: none of the others of the service has it.
+    connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number);
     ~connection() override;
 
     void start();
     [[nodiscard]] core::session& session() noexcept { return session_; }
     [[nodiscard]] origin from() const noexcept { return from_; }
+    [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
     /// It came in as a source of datagrams.
     [[nodiscard]] bool is_source() const noexcept { return life_.has_value(); }
     /// Nothing would be lost with it.
@@ -131,9 +131,10 @@ class connection final : public link_events,
     void end(std::string_view why);
     void lose_feeds(std::string_view why);
 
-    std::shared_ptr<detail::engine> engine_;
+    std::shared_ptr<local_node> host_;
     link_ptr link_;
     origin from_;
+    std::uint64_t number_;
     std::shared_ptr<core::memory_account> memory_;
     core::memory_reservation held_output_{memory_};
     core::session session_;

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/connections.hpp"
 
+#include "core/ip_network.hpp"
 #include "core/request_checks.hpp"
 #include "core/teller.hpp"
 #include "protocol/message.hpp"
-#include "shell/engine.hpp"
-
-#include <boost/asio/ip/address_v6.hpp>
-#include <boost/asio/ip/network_v6.hpp>
+#include "shell/local_node.hpp"
 
 #include <algorithm>
 #include <string>
@@ -16,19 +14,13 @@
 namespace cles::shell {
 namespace {
 
-// Whose share a link counts for: a host's; an IPv6 network's, since a host may use all of its addresses; a local
-// user's.
+// Whose share a link counts for: a host's, or a local user's.
 std::string address_of(const identity& peer) {
     if (peer.uid) {
         return "user " + std::to_string(*peer.uid);
     }
     const auto host = core::host_of(peer);
-    boost::system::error_code not_v6;
-    const auto address = boost::asio::ip::make_address_v6(host, not_v6);
-    if (not_v6 || address.is_loopback() || address.is_link_local() || address.is_v4_mapped()) {
-        return host.empty() ? peer.transport : host;
-    }
-    return boost::asio::ip::make_network_v6(address, 64).canonical().to_string();
+    return host.empty() ? peer.transport : core::share_of_address(host);
 }
 
 // How many links are seen off at a time: each holds a descriptor for up to `limits::discard`.
@@ -39,7 +31,7 @@ std::size_t most_parting(const limits& bounds) { return std::max<std::size_t>(64
 /// The owner of a link that is refused: ignores what arrives, and waits until the link has closed.
 class connections::refused final : public link_events {
   public:
-    refused(std::weak_ptr<detail::engine> host, const link& which) noexcept : host_(std::move(host)), which_(which) {}
+    refused(std::weak_ptr<local_node> host, const link& which) noexcept : host_(std::move(host)), which_(which) {}
     void on_line(std::string_view) override {}
     void on_overlong(std::string_view) override {}
     void on_batch() override {}
@@ -52,11 +44,11 @@ class connections::refused final : public link_events {
     }
 
   private:
-    std::weak_ptr<detail::engine> host_;
+    std::weak_ptr<local_node> host_;
     const link& which_; // which owns this
 };
 
-void connections::start() { admission_.emplace(engine_.bounds()); }
+void connections::start() { admission_.emplace(host_.bounds()); }
 
 void connections::stop() {
     for (const auto& [key, parting] : std::exchange(parting_, {})) {
@@ -66,7 +58,7 @@ void connections::stop() {
 
 void connections::see_off(link_ptr parting) {
     parting->flush();
-    if (parting->unsent() != 0 || parting_.size() >= most_parting(engine_.bounds())) {
+    if (parting->unsent() != 0 || parting_.size() >= most_parting(host_.bounds())) {
         parting->close(); // there is no room to wait for a peer that does not read
         return;
     }
@@ -77,7 +69,7 @@ void connections::see_off(link_ptr parting) {
 void connections::seen_off(const link& parting) { parting_.erase(&parting); }
 
 void connections::on_accepted(link_ptr arrived, bool counted) {
-    if (engine_.stopped()) {
+    if (host_.stopped()) {
         arrived->close();
         return;
     }
@@ -86,15 +78,15 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
         return;
     }
     if (counted) {
-        ++engine_.node().counts.links_accepted;
+        ++host_.node().counts.links_accepted;
     }
     adopt(std::move(arrived), counted ? connection::origin::accepted : connection::origin::local);
 }
 
 bool connections::has_room(const link& arrived) {
-    const auto most = engine_.bounds().links;
+    const auto most = host_.bounds().links;
     if (arrived.datagram() == 0) {
-        return admission_->make_room(address_of(arrived.peer()), engine_.now());
+        return admission_->make_room(address_of(arrived.peer()), host_.now());
     }
     if (sources_ >= most) {
         drop_sources_at_rest();
@@ -112,23 +104,23 @@ void connections::drop_sources_at_rest() {
 }
 
 void connections::turn_away(link_ptr arrived) {
-    ++engine_.node().counts.links_refused;
+    ++host_.node().counts.links_refused;
     if (arrived->datagram() != 0) { // what is refused comes next, and says to whom
         adopt(std::move(arrived), connection::origin::refused);
         return;
     }
-    protocol::append_failure(arrived->output(), core::no_room_for_links(engine_.node()));
+    protocol::append_failure(arrived->output(), core::no_room_for_links(host_.node()));
     arrived->output().push_back('\n');
     // The link is read until it closes: unread input would turn that into a reset, which takes the line away.
-    arrived->start(std::make_shared<refused>(engine_.weak_from_this(), *arrived));
+    arrived->start(std::make_shared<refused>(host_.weak_from_this(), *arrived));
     see_off(std::move(arrived));
 }
 
 std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin from) {
     const bool counted = from == connection::origin::accepted;
     const auto address = counted ? address_of(made->peer()) : std::string{};
-    auto c = std::make_shared<connection>(engine_.shared_from_this(), std::move(made), from);
-    open_.emplace(c.get(), c);
+    auto c = std::make_shared<connection>(host_.shared_from_this(), std::move(made), from, ++last_number_);
+    open_.emplace(c->number(), c);
     if (counted) {
         if (c->datagram() != 0) {
             ++sources_;
@@ -136,11 +128,11 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
             admission_->enter(*c, address);
         }
     }
-    ++engine_.node().counts.links_open;
+    ++host_.node().counts.links_open;
     if (from == connection::origin::dialled && c->datagram() == 0) {
         c->session().may_be_refused();
     }
-    if (engine_.closing()) {
+    if (host_.closing()) {
         begin_nothing(*c);
     }
     c->start();
@@ -161,7 +153,7 @@ void connections::begin_nothing(connection& c) {
 }
 
 bool connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
-    if (open_.erase(&c) == 0) {
+    if (open_.erase(c.number()) == 0) {
         return false;
     }
     if (c.from() == connection::origin::accepted) {
@@ -171,7 +163,7 @@ bool connections::forget(connection& c, std::uint64_t received, std::uint64_t se
             admission_->leave(c);
         }
     }
-    auto& counts = engine_.node().counts;
+    auto& counts = host_.node().counts;
     --counts.links_open;
     ++counts.links_lost;
     counts.bytes_received += received;

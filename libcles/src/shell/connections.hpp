@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
 
 #include "core/link_admission.hpp"
 #include "shell/connection.hpp"
@@ -13,11 +13,9 @@
 #include <optional>
 #include <vector>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// All connections of a service: lets them in as far as there is room, owns them, and lets them go.
 ///
@@ -25,8 +23,8 @@ namespace cles::shell {
 /// cannot.
 class connections {
   public:
-    explicit connections(detail::engine& host) noexcept : engine_(host) {}
-    /// \pre the engine has its node
+    explicit connections(local_node& host) noexcept : host_(host) {}
+    /// \pre the local node has its state
     void start();
 
     /// A link that came in; those from other processes are counted against the limit.
@@ -53,8 +51,9 @@ class connections {
     static void begin_nothing(connection& c);
     void drop_sources_at_rest();
 
-    detail::engine& engine_;
-    std::map<connection*, std::shared_ptr<connection>> open_;
+    local_node& host_;
+    std::map<std::uint64_t, std::shared_ptr<connection>> open_; // by number, so that their order is always the same
+    std::uint64_t last_number_ = 0;
     std::map<const link*, link_ptr> parting_;
     std::optional<core::link_admission> admission_;
     std::size_t sources_ = 0;

@@ -2,22 +2,21 @@
 #include "shell/departure.hpp"
 
 #include "core/raised.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <algorithm>
 #include <utility>
 
 namespace cles::shell {
 
-departure::departure(detail::engine& host, std::uint64_t ticket, std::chrono::milliseconds limit,
-                     detail::pending_ptr done)
-    : engine_(host), ticket_(ticket), done_(std::move(done)) {
+departure::departure(local_node& host, std::uint64_t ticket, std::chrono::milliseconds limit, detail::pending_ptr done)
+    : host_(host), ticket_(ticket), done_(std::move(done)) {
     const auto longest = std::chrono::milliseconds{std::chrono::hours{24}};
-    engine_.deadlines().arm(*this, engine_.now() + std::clamp(limit, std::chrono::milliseconds{0}, longest));
+    host_.deadlines().arm(*this, host_.now() + std::clamp(limit, std::chrono::milliseconds{0}, longest));
 }
 
 bool departure::something_runs() const {
-    const auto all = engine_.connections().all();
+    const auto all = host_.connections().all();
     return std::any_of(all.begin(), all.end(), [](const auto& c) { return c->session().serving().in_flight() != 0; });
 }
 
@@ -35,10 +34,10 @@ void departure::look() {
 // read all that was said.
 void departure::end_links() {
     if (!std::exchange(ending_, true)) {
-        engine_.deadlines().arm(*this, engine_.now() + engine_.bounds().discard);
+        host_.deadlines().arm(*this, host_.now() + host_.bounds().discard);
     }
     bool open = false;
-    for (const auto& c : engine_.connections().all()) {
+    for (const auto& c : host_.connections().all()) {
         if (c->datagram() == 0) {
             c->session().say_that_it_leaves();
             open = true;
@@ -57,21 +56,21 @@ void departure::on_deadline(time_point) {
         return;
     }
     const core::raised during{looking_};
-    for (const auto& c : engine_.connections().all()) {
+    for (const auto& c : host_.connections().all()) {
         c->session().serving().cut_short();
     }
     end_links(); // whatever a peer that does not read still waits for
 }
 
 void departure::end() {
-    engine_.deadlines().disarm(*this);
+    host_.deadlines().disarm(*this);
     if (done_) { // else it has been given up meanwhile
-        engine_.node().completions.succeed(std::move(done_), "{}");
+        host_.node().completions.succeed(std::move(done_), "{}");
     }
 }
 
 detail::pending_ptr departure::give_up() {
-    engine_.deadlines().disarm(*this);
+    host_.deadlines().disarm(*this);
     return std::move(done_);
 }
 

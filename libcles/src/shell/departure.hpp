@@ -8,11 +8,9 @@
 #include <chrono>
 #include <cstdint>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// The end of a service in order, so that no request is lost (docs/protocol.md, "Leaving"): it begins nothing more,
 /// answers what it has begun, says on each link that it leaves, and waits until the links have ended.
@@ -20,7 +18,7 @@ class departure final : private core::deadline {
   public:
     /// What has not been answered after `limit` is cut short. `done` ends when the links have, soon after that at the
     /// latest, or fails in `give_up`.
-    departure(detail::engine& host, std::uint64_t ticket, std::chrono::milliseconds limit, detail::pending_ptr done);
+    departure(local_node& host, std::uint64_t ticket, std::chrono::milliseconds limit, detail::pending_ptr done);
     ~departure() = default;
 
     /// To be called whenever something has happened.
@@ -36,7 +34,7 @@ class departure final : private core::deadline {
     void end_links();
     void end();
 
-    detail::engine& engine_;
+    local_node& host_;
     std::uint64_t ticket_;
     detail::pending_ptr done_;
     bool looking_ = false;

@@ -6,11 +6,9 @@
 #include "core/ignored_reply.hpp"
 #include "core/later.hpp"
 #include "protocol/message.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 #include "shell/option_checks.hpp"
 #include "shell/route.hpp"
-
-#include <boost/asio/post.hpp>
 
 #include <algorithm>
 #include <cstdint>
@@ -56,7 +54,7 @@ enum class marking : std::uint8_t {
 class bind_reply final : public detail::pending {
   public:
     /// `asked`: when the BIND was sent by datagram; nothing for a stream.
-    bind_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle, core::feed_machine& feed,
+    bind_reply(std::weak_ptr<local_node> host, std::weak_ptr<void> handle, core::feed_machine& feed,
                std::optional<time_point> asked, marking marks)
         : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked), marks_(marks) {}
 
@@ -101,7 +99,7 @@ class bind_reply final : public detail::pending {
         return verdict::completed;
     }
 
-    void bound(const detail::engine& host, std::string_view last, const std::optional<update_mark>& mark) {
+    void bound(const local_node& host, std::string_view last, const std::optional<update_mark>& mark) {
         if (mark && marks_ == marking::up_to_it) {
             feed_.skip_to(*mark);
         }
@@ -111,8 +109,8 @@ class bind_reply final : public detail::pending {
         }
     }
 
-    std::weak_ptr<detail::engine> host_;
-    std::weak_ptr<detail::feed_control> handle_;
+    std::weak_ptr<local_node> host_;
+    std::weak_ptr<void> handle_;
     core::feed_machine& feed_;
     std::optional<time_point> asked_;
     marking marks_;
@@ -121,8 +119,8 @@ class bind_reply final : public detail::pending {
 /// The answer to a feed's BIND that renews its lease.
 class renewal_reply final : public detail::pending {
   public:
-    renewal_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle,
-                  core::feed_machine& feed, time_point asked)
+    renewal_reply(std::weak_ptr<local_node> host, std::weak_ptr<void> handle, core::feed_machine& feed,
+                  time_point asked)
         : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), asked_(asked) {}
 
     verdict offer(std::string_view json) override {
@@ -148,8 +146,8 @@ class renewal_reply final : public detail::pending {
     [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
-    std::weak_ptr<detail::engine> host_;
-    std::weak_ptr<detail::feed_control> handle_;
+    std::weak_ptr<local_node> host_;
+    std::weak_ptr<void> handle_;
     core::feed_machine& feed_;
     time_point asked_;
 };
@@ -159,8 +157,8 @@ class renewal_reply final : public detail::pending {
 /// What a node says of itself, before a feed is bound there that asks for more than every node can say.
 class feed_links::features_reply final : public detail::pending {
   public:
-    features_reply(std::weak_ptr<detail::engine> host, std::weak_ptr<detail::feed_control> handle,
-                   core::feed_machine& feed, std::weak_ptr<connection> on)
+    features_reply(std::weak_ptr<local_node> host, std::weak_ptr<void> handle, core::feed_machine& feed,
+                   std::weak_ptr<connection> on)
         : host_(std::move(host)), handle_(std::move(handle)), feed_(feed), on_(std::move(on)) {}
 
     verdict offer(std::string_view json) override {
@@ -198,26 +196,26 @@ class feed_links::features_reply final : public detail::pending {
         }
     }
 
-    std::weak_ptr<detail::engine> host_;
-    std::weak_ptr<detail::feed_control> handle_;
+    std::weak_ptr<local_node> host_;
+    std::weak_ptr<void> handle_;
     core::feed_machine& feed_;
     std::weak_ptr<connection> on_;
 };
 
-void feed_links::enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms) {
+void feed_links::enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms) {
     feed.share_by("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
                   terms.adverbs);
-    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0});
+    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0, {}, ++last_number_});
 }
 
 void feed_links::leave(core::feed_machine& feed) { feeds_.erase(&feed); }
 
 void feed_links::refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why) {
-    boost::asio::post(engine_.executor(),
-                      [host = engine_.shared_from_this(), handle = feeds_.at(&feed).handle.lock(), &feed, code, why] {
-                          feed.on_refused(code, why, host->now());
-                          host->settle();
-                      });
+    core::post(host_.environment(),
+               [host = host_.shared_from_this(), handle = feeds_.at(&feed).handle.lock(), &feed, code, why] {
+                   feed.on_refused(code, why, host->now());
+                   host->settle();
+               });
 }
 
 void feed_links::bind(core::feed_machine& feed) {
@@ -225,20 +223,20 @@ void feed_links::bind(core::feed_machine& feed) {
     if (found == feeds_.end()) {
         return;
     }
-    if (engine_.stopped()) {
+    if (host_.stopped()) {
         refuse_later(feed, errc::stopped, "the service has been stopped");
         return;
     }
     boost::system::error_code code;
     std::string why;
-    auto* r = engine_.routes().to(feed.target(), found->second.terms.at, false, code, why);
+    auto* r = host_.routes().to(feed.target(), found->second.terms.at, false, code, why);
     if (r == nullptr) {
         refuse_later(feed, code, why);
         return;
     }
     found->second.at = r->address();
     r->connect(feed,
-               [host = engine_.shared_from_this(), handle = found->second.handle.lock(), &feed](
+               [host = host_.shared_from_this(), handle = found->second.handle.lock(), &feed](
                    const std::shared_ptr<connection>& c, boost::system::error_code failed, std::string_view message) {
                    if (feed.closed()) {
                        return;
@@ -249,7 +247,7 @@ void feed_links::bind(core::feed_machine& feed) {
                        feed.on_refused(failed, message, host->now());
                    }
                });
-    engine_.settle();
+    host_.settle();
 }
 
 void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
@@ -266,7 +264,7 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
         marks = marking::none;
     }
     e.on = c;
-    const auto now = engine_.now();
+    const auto now = host_.now();
     const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
     auto request = bind_text(e, *c);
     const auto adverbs = e.terms.adverbs + (e.terms.adverbs.empty() ? "mark=yes" : " mark=yes");
@@ -276,29 +274,29 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     const auto whole = core::later(now, time_limit(e.terms.deadline, verb::bind));
     const auto due = std::exchange(e.due, {}).value_or(whole);
     c->bind(feed, request, due > now ? due : whole,
-            detail::pending_ptr{new bind_reply(engine_.weak_from_this(), e.handle, feed, asked, marks)});
+            detail::pending_ptr{new bind_reply(host_.weak_from_this(), e.handle, feed, asked, marks)});
 }
 
 void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
     auto& e = feeds_.at(&feed);
-    const auto now = engine_.now();
+    const auto now = host_.now();
     const auto whole = time_limit(e.terms.deadline, verb::bind);
     const auto limit = std::min(time_limit({}, verb::pull), whole);
     e.due = core::later(now, whole);
-    c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = engine_.draw_id()},
+    c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = host_.draw_id()},
                                core::later(now, limit), now,
-                               detail::pending_ptr{new features_reply(engine_.weak_from_this(), e.handle, feed, c)});
+                               detail::pending_ptr{new features_reply(host_.weak_from_this(), e.handle, feed, c)});
 }
 
 protocol::request_text feed_links::bind_text(entry& e, const connection& c) {
     protocol::request_text request{.verb = verb::bind,
                                    .noun = e.terms.noun,
-                                   .id = engine_.draw_id(),
+                                   .id = host_.draw_id(),
                                    .every_ms = e.terms.every_ms,
                                    .keep = e.terms.keep,
                                    .adverbs = e.terms.adverbs};
     if (c.datagram() != 0) {
-        request.lease_ms = static_cast<std::uint32_t>(engine_.bounds().lease.count());
+        request.lease_ms = static_cast<std::uint32_t>(host_.bounds().lease.count());
         e.asking = request.id;
     }
     return request;
@@ -310,12 +308,12 @@ void feed_links::renew(core::feed_machine& feed, time_point until) {
         return;
     }
     if (const auto c = found->second.on.lock()) { // else its loss has been told
-        const auto now = engine_.now();
+        const auto now = host_.now();
         const auto request = bind_text(found->second, *c);
         c->session().asking().send(
             request, until, now,
-            detail::pending_ptr{new renewal_reply(engine_.weak_from_this(), found->second.handle, feed, now)});
-        engine_.settle();
+            detail::pending_ptr{new renewal_reply(host_.weak_from_this(), found->second.handle, feed, now)});
+        host_.settle();
     }
 }
 
@@ -337,32 +335,33 @@ void feed_links::unbind(core::feed_machine& feed) {
     if (found == feeds_.end()) {
         return;
     }
-    engine_.routes().forget(feed);
+    host_.routes().forget(feed);
     const auto c = found->second.on.lock();
-    const auto now = engine_.now();
+    const auto now = host_.now();
     detach(feed);
     // Another feed may share the binding.
-    if (c && c->usable() && !engine_.stopped() && !c->session().bound().has(feed.target(), feed.path())) {
+    if (c && c->usable() && !host_.stopped() && !c->session().bound().has(feed.target(), feed.path())) {
         c->session().asking().send(
-            {.verb = verb::bind, .noun = found->second.terms.noun, .id = engine_.draw_id(), .lease_ms = 0},
+            {.verb = verb::bind, .noun = found->second.terms.noun, .id = host_.draw_id(), .lease_ms = 0},
             core::later(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new core::ignored_reply});
     }
 }
 
 void feed_links::on_new_run(std::string_view node, bool replaced) {
-    const std::string where{engine_.neighbours().find(node).value_or(std::string_view{})};
+    const std::string where{host_.neighbours().find(node).value_or(std::string_view{})};
     struct concern {
         core::feed_machine* feed;
-        std::weak_ptr<detail::feed_control> handle;
+        std::weak_ptr<void> handle;
         bool elsewhere;
     };
     std::vector<concern> concerned;
-    for (const auto& [feed, e] : feeds_) {
+    for (auto* feed : in_order()) {
+        const auto& e = feeds_.at(feed);
         if (feed->target() == node && e.terms.at.empty()) {
             concerned.push_back({feed, e.handle, e.at != where});
         }
     }
-    const auto now = engine_.now();
+    const auto now = host_.now();
     for (const auto& [feed, handle, elsewhere] : concerned) {
         const auto alive = handle.lock(); // what another was told may have closed this one
         if (!alive || !feeds_.contains(feed)) {
@@ -376,12 +375,23 @@ void feed_links::on_new_run(std::string_view node, bool replaced) {
     }
 }
 
+std::vector<core::feed_machine*> feed_links::in_order() const {
+    std::vector<core::feed_machine*> feeds;
+    feeds.reserve(feeds_.size());
+    for (const auto& [feed, e] : feeds_) {
+        feeds.push_back(feed);
+    }
+    std::sort(feeds.begin(), feeds.end(),
+              [this](auto* a, auto* b) { return feeds_.at(a).number < feeds_.at(b).number; });
+    return feeds;
+}
+
 void feed_links::stop() {
     const auto feeds = feeds_;
-    for (const auto& [feed, e] : feeds) {
-        if (const auto handle = e.handle.lock()) {
+    for (auto* feed : in_order()) {
+        if (const auto handle = feeds.at(feed).handle.lock()) {
             // Taken out of the feed, which they may own: else neither would go if the context goes without running.
-            feed->abandon().fail(engine_.completions(), errc::stopped);
+            feed->abandon().fail(host_.completions(), errc::stopped);
         }
     }
 }

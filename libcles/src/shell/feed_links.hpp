@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/feed.hpp>
-
 #include "core/feed_machine.hpp"
 #include "shell/connection.hpp"
 
@@ -12,12 +10,11 @@
 #include <memory>
 #include <optional>
 #include <string>
-
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
+#include <vector>
 
 namespace cles::shell {
+
+class local_node;
 
 /// What a feed is bound to.
 struct feed_terms {
@@ -33,9 +30,9 @@ struct feed_terms {
 /// The feeds of a service and the links that they are on: finds each a link, sends its BIND, and unbinds it.
 class feed_links final : public core::feed_host {
   public:
-    explicit feed_links(detail::engine& host) noexcept : engine_(host) {}
+    explicit feed_links(local_node& host) noexcept : host_(host) {}
 
-    void enter(core::feed_machine& feed, std::weak_ptr<detail::feed_control> handle, feed_terms terms);
+    void enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms);
     void leave(core::feed_machine& feed);
     void bind(core::feed_machine& feed) override;
     void unbind(core::feed_machine& feed) override;
@@ -49,12 +46,13 @@ class feed_links final : public core::feed_host {
 
   private:
     struct entry {
-        std::weak_ptr<detail::feed_control> handle;
+        std::weak_ptr<void> handle;
         feed_terms terms;
         std::weak_ptr<connection> on;
         std::string at{};                // the URL where it was asked for last
         std::uint64_t asking = 0;        // the id of its last BIND by datagram
         std::optional<time_point> due{}; // until when a BIND is to be answered that waits for the node's features
+        std::uint64_t number = 0;        // in the order in which they were entered
     };
 
     class features_reply;
@@ -64,8 +62,12 @@ class feed_links final : public core::feed_host {
     [[nodiscard]] protocol::request_text bind_text(entry& e, const connection& c);
     void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
 
-    detail::engine& engine_;
+    /// As they were entered, so that the order does not depend on addresses.
+    [[nodiscard]] std::vector<core::feed_machine*> in_order() const;
+
+    local_node& host_;
     std::map<core::feed_machine*, entry> feeds_;
+    std::uint64_t last_number_ = 0;
 };
 
 } // namespace cles::shell

@@ -9,9 +9,11 @@
 #include <string_view>
 #include <vector>
 
-namespace cles::detail {
+namespace cles::shell {
+class local_node;
+} // namespace cles::shell
 
-class engine;
+namespace cles::detail {
 
 /// A service's part in gossip, as the rest of the service sees it.
 class gossip_host {
@@ -34,7 +36,7 @@ class gossip_host {
 
 /// How it is made for a service, which answers what others ask by it from then on.
 struct gossip_part {
-    std::unique_ptr<gossip_host> (*make)(engine& host, std::uint32_t seed);
+    std::unique_ptr<gossip_host> (*make)(shell::local_node& host, std::uint32_t seed);
 };
 
 } // namespace cles::detail

@@ -3,10 +3,8 @@
 
 #include "core/ignored_reply.hpp"
 #include "protocol/message.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 #include "shell/route.hpp"
-
-#include <boost/asio/post.hpp>
 
 #include <memory>
 #include <utility>
@@ -20,7 +18,7 @@ class table_reply final : public detail::pending {
     enum class question : std::uint8_t { table, who };
 
     /// The machine lives as long as the host does.
-    table_reply(std::weak_ptr<detail::engine> host, core::gossip& asks, question what, std::uint64_t ticket)
+    table_reply(std::weak_ptr<local_node> host, core::gossip& asks, question what, std::uint64_t ticket)
         : host_(std::move(host)), asks_(asks), what_(what), ticket_(ticket) {}
 
     verdict offer(std::string_view json) override {
@@ -44,18 +42,18 @@ class table_reply final : public detail::pending {
     [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
-    [[nodiscard]] std::shared_ptr<detail::engine> running_host() const {
+    [[nodiscard]] std::shared_ptr<local_node> running_host() const {
         auto host = host_.lock();
         return host && !host->stopped() ? host : nullptr;
     }
 
-    std::weak_ptr<detail::engine> host_;
+    std::weak_ptr<local_node> host_;
     core::gossip& asks_;
     question what_;
     std::uint64_t ticket_;
 };
 
-void send(detail::engine& host, std::string_view url, cles::verb verb, std::string_view noun, std::string_view adverbs,
+void send(local_node& host, std::string_view url, cles::verb verb, std::string_view noun, std::string_view adverbs,
           std::string_view body, detail::pending_ptr operation) {
     boost::system::error_code code;
     std::string why;
@@ -77,31 +75,31 @@ void send(detail::engine& host, std::string_view url, cles::verb verb, std::stri
 
 } // namespace
 
-gossiper::gossiper(detail::engine& host, std::uint32_t seed)
-    : engine_(host), gossip_({host.node().name, host.node().epoch}, *this, host.node().others, host.node().counts,
-                             host.deadlines(), host.bounds().peers, seed) {
+gossiper::gossiper(local_node& host, std::uint32_t seed)
+    : host_(host), gossip_({host.node().name, host.node().epoch}, *this, host.node().others, host.node().counts,
+                           host.deadlines(), host.bounds().peers, seed) {
     host.node().talk = &gossip_;
 }
 
-gossiper::~gossiper() { engine_.node().talk = nullptr; }
+gossiper::~gossiper() { host_.node().talk = nullptr; }
 
 void gossiper::set_seeds(const std::vector<std::string>& seeds) {
     for (const auto& seed : seeds) {
         const auto where = parse_url(seed);
-        if (find_transport(where.scheme) == nullptr) {
+        if (!host_.environment().has_transport(where.scheme)) {
             throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + seed + "'");
         }
     }
-    gossip_.set_seeds(seeds, engine_.now());
+    gossip_.set_seeds(seeds, host_.now());
 }
 
-void gossiper::start() { gossip_.start(engine_.now()); }
+void gossiper::start() { gossip_.start(host_.now()); }
 
-void gossiper::leave() { gossip_.leave(engine_.now()); }
+void gossiper::leave() { gossip_.leave(host_.now()); }
 
 void gossiper::stop() {
-    gossip_.stop(engine_.now());
-    engine_.node().talk = nullptr;
+    gossip_.stop(host_.now());
+    host_.node().talk = nullptr;
 }
 
 void gossiper::on_gone(std::string_view node, std::string_view where, time_point now) {
@@ -113,22 +111,22 @@ void gossiper::ask(std::uint64_t ticket, std::string_view url, std::string_view 
     if (!describe.empty()) {
         adverbs.append(" describe=").append(describe);
     }
-    send(engine_, url, verb::pull, "self:cles/peers", adverbs, {},
-         detail::pending_ptr{new table_reply{engine_.weak_from_this(), gossip_, table_reply::question::table, ticket}});
+    send(host_, url, verb::pull, "self:cles/peers", adverbs, {},
+         detail::pending_ptr{new table_reply{host_.weak_from_this(), gossip_, table_reply::question::table, ticket}});
 }
 
 void gossiper::ask_who(std::uint64_t ticket, std::string_view url) {
-    send(engine_, url, verb::pull, "self:cles", {}, {},
-         detail::pending_ptr{new table_reply{engine_.weak_from_this(), gossip_, table_reply::question::who, ticket}});
+    send(host_, url, verb::pull, "self:cles", {}, {},
+         detail::pending_ptr{new table_reply{host_.weak_from_this(), gossip_, table_reply::question::who, ticket}});
 }
 
 void gossiper::tell(std::string_view url, std::string_view table) {
-    send(engine_, url, verb::push, "self:cles/peers", {}, table, detail::pending_ptr{new core::ignored_reply});
+    send(host_, url, verb::push, "self:cles/peers", {}, table, detail::pending_ptr{new core::ignored_reply});
 }
 
 // The link may be the one by which the last answer has just come.
 void gossiper::release(std::string_view url) {
-    boost::asio::post(engine_.executor(), [weak = engine_.weak_from_this(), url = std::string{url}] {
+    core::post(host_.environment(), [weak = host_.weak_from_this(), url = std::string{url}] {
         if (const auto host = weak.lock(); host && !host->stopped()) {
             host->routes().release(url);
         }

@@ -9,16 +9,14 @@
 #include <string_view>
 #include <vector>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// Carries out what gossip decides: asks other nodes for their tables by the routes of the service.
 class gossiper final : public detail::gossip_host, private core::gossip::caller {
   public:
-    gossiper(detail::engine& host, std::uint32_t seed);
+    gossiper(local_node& host, std::uint32_t seed);
     gossiper(const gossiper&) = delete;
     gossiper& operator=(const gossiper&) = delete;
     ~gossiper() override;
@@ -35,7 +33,7 @@ class gossiper final : public detail::gossip_host, private core::gossip::caller 
     void tell(std::string_view url, std::string_view table) override;
     void release(std::string_view url) override;
 
-    detail::engine& engine_;
+    local_node& host_;
     core::gossip gossip_;
 };
 

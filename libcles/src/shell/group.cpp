@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/group.hpp"
 
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
-#include <boost/asio/error.hpp>
+#include <boost/system/errc.hpp>
 
-#include <random>
+#include <cerrno>
 #include <utility>
 #include <vector>
 
@@ -18,14 +18,14 @@ std::string cannot(const multicast_options& where, const std::string& interface)
 
 error cannot_join(const multicast_options& where, const std::string& interface, const boost::system::error_code& why) {
     const auto reason = why == boost::system::errc::address_not_available ? "it has no IPv4 address"
-                        : why == boost::asio::error::network_down         ? "it is down"
+                        : why == boost::system::errc::network_down        ? "it is down"
                                                                           : why.message();
     return {why, cannot(where, interface) + reason};
 }
 
-std::vector<transport::ip_interface> interfaces_here(const multicast_options& where) {
+std::vector<core::network_interface> interfaces_here(core::environment& by, const multicast_options& where) {
     try {
-        return transport::interfaces_of_host();
+        return by.interfaces();
     } catch (const boost::system::system_error& e) {
         throw cannot_join(where, where.interface, e.code());
     }
@@ -33,8 +33,8 @@ std::vector<transport::ip_interface> interfaces_here(const multicast_options& wh
 
 } // namespace
 
-group::group(detail::engine& host, const multicast_options& where, bool insecure)
-    : engine_(host), intake_(host.node(), *this, std::random_device{}()) {
+group::group(local_node& host, const multicast_options& where, bool insecure)
+    : host_(host), intake_(host.node(), *this, host.environment().random()) {
     check(where);
     if (where.interface == "auto") {
         join_automatic(where, insecure);
@@ -43,18 +43,16 @@ group::group(detail::engine& host, const multicast_options& where, bool insecure
     }
 }
 
-void group::join(const transport::ip_interface& by, const multicast_options& where, bool insecure) {
+void group::join(const core::network_interface& by, const multicast_options& where, bool insecure) {
     if (!by.loopback && !insecure) {
         throw error(errc::insecure_listen, "multicast on '" + by.name +
                                                "' can be reached from other hosts, and nobody proves who they "
                                                "are; say 'insecure' if that is meant");
     }
-    const auto& place = places_.emplace_back(engine_, intake_, by, where);
+    const auto& place = places_.emplace_back(host_, intake_, by, where);
     interfaces_ += (interfaces_.empty() ? "" : ", ") + by.name;
-    const auto& to = place.port().group();
-    engine_.say(log_level::info, engine_.node().name + " takes part in " + to.address().to_string() + ":" +
-                                     std::to_string(to.port()) + " on " + by.name + ", sending from " +
-                                     to_text(place.source()));
+    host_.say(log_level::info, host_.node().name + " takes part in " + where.group + ":" + std::to_string(where.port) +
+                                   " on " + by.name + ", sending from " + to_text(place.source()));
 }
 
 // Where not all are required, one is enough.
@@ -62,7 +60,7 @@ void group::join_all(const multicast_options& where, bool insecure) {
     std::vector<error> failures;
     for (const auto& name : interfaces_of(where)) {
         try {
-            join(transport::find_interface(name), where, insecure);
+            join(host_.environment().find_interface(name), where, insecure);
         } catch (const error& refused) {
             failures.push_back(refused);
         } catch (const boost::system::system_error& e) {
@@ -76,15 +74,15 @@ void group::join_all(const multicast_options& where, bool insecure) {
         throw error{failures.front()};
     }
     for (const auto& e : failures) {
-        engine_.say(log_level::warning, e.message());
+        host_.say(log_level::warning, e.message());
     }
 }
 
 // What cannot be joined was not asked for by name.
 void group::join_automatic(const multicast_options& where, bool insecure) {
     std::string left_out;
-    boost::system::error_code failure = boost::asio::error::network_down;
-    for (const auto& by : transport::automatic(interfaces_here(where))) {
+    auto failure = boost::system::error_code{ENETDOWN, boost::system::system_category()};
+    for (const auto& by : core::automatic(interfaces_here(host_.environment(), where))) {
         if (places_.size() == multicast_options::most_interfaces) {
             left_out += (left_out.empty() ? "" : ", ") + by.name;
             continue;
@@ -96,17 +94,17 @@ void group::join_automatic(const multicast_options& where, bool insecure) {
                 throw;
             }
             failure = refused.code();
-            engine_.say(log_level::warning, refused.message());
+            host_.say(log_level::warning, refused.message());
         } catch (const boost::system::system_error& e) {
             failure = e.code();
-            engine_.say(log_level::warning, cannot_join(where, by.name, failure).message());
+            host_.say(log_level::warning, cannot_join(where, by.name, failure).message());
         }
     }
     if (places_.empty()) {
         throw error(failure, cannot(where, where.interface) + "no interface of this host can be used");
     }
     if (!left_out.empty()) {
-        engine_.say(log_level::warning, "multicast on 'auto' takes " + interfaces_ + ", and leaves out " + left_out);
+        host_.say(log_level::warning, "multicast on 'auto' takes " + interfaces_ + ", and leaves out " + left_out);
     }
 }
 
@@ -119,7 +117,7 @@ void group::start() {
 void group::stop() {
     for (auto* feed : intake_.feeds().remove_all()) {
         if (auto waiting = feed->mail().close()) {
-            engine_.completions().put(core::completion{
+            host_.completions().put(core::completion{
                 core::completion::event_failure{std::move(waiting), errc::stopped, "the service has been stopped"}});
         }
     }

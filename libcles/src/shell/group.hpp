@@ -5,24 +5,22 @@
 
 #include "core/group_intake.hpp"
 #include "core/group_output.hpp"
+#include "port/network_interface.hpp"
 #include "shell/group_place.hpp"
-#include "transport/ip_interface.hpp"
 
 #include <deque>
 #include <string>
 #include <string_view>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// A service's part in its multicast group: a place by each of its interfaces, and what it takes in by all of them.
 class group final : public core::group_sender {
   public:
     /// Joins. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's code
-    group(detail::engine& host, const multicast_options& where, bool insecure);
+    group(local_node& host, const multicast_options& where, bool insecure);
 
     /// Begins to listen; to be called once.
     void start();
@@ -36,11 +34,11 @@ class group final : public core::group_sender {
     [[nodiscard]] const std::string& interfaces() const noexcept { return interfaces_; }
 
   private:
-    void join(const transport::ip_interface& by, const multicast_options& where, bool insecure);
+    void join(const core::network_interface& by, const multicast_options& where, bool insecure);
     void join_all(const multicast_options& where, bool insecure);
     void join_automatic(const multicast_options& where, bool insecure);
 
-    detail::engine& engine_;
+    local_node& host_;
     core::group_intake intake_;
     std::deque<group_place> places_; // which do not move
     std::string interfaces_;

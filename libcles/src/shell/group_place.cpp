@@ -2,26 +2,15 @@
 #include "shell/group_place.hpp"
 
 #include "protocol/datagram.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <random>
 
 namespace cles::shell {
-namespace {
-
-core::group_source source_of(const boost::asio::ip::udp::endpoint& end) {
-    return {.address = end.address().to_v4().to_uint(), .port = end.port()};
-}
-
-} // namespace
-
-group_place::group_place(detail::engine& host, core::group_intake& intake, const transport::ip_interface& by,
+group_place::group_place(local_node& host, core::group_intake& intake, const core::network_interface& by,
                          const multicast_options& where)
-    : engine_(host), port_(std::make_shared<transport::group_port>(host.executor(), by, where)),
-      source_(source_of(port_->source())),
-      session_(host.shared_node(), intake, source_, *this, std::random_device{}()) {}
+    : host_(host), port_(host.environment().join(by, where)),
+      session_(host.shared_node(), intake, port_->source(), *this, host.environment().random()) {}
 
 group_place::~group_place() { port_->close(); }
 
@@ -34,7 +23,7 @@ void group_place::stop() {
 
 bool group_place::send(std::string_view line) {
     if (line.size() > protocol::datagram_bytes) {
-        ++engine_.node().counts.group_unsent;
+        ++host_.node().counts.group_unsent;
         return false;
     }
     return put(line);
@@ -44,7 +33,7 @@ void group_place::send_all(std::string_view lines) { put(lines); }
 
 // True where all of it has been sent, or waits for room.
 bool group_place::put(std::string_view lines) {
-    auto& counts = engine_.node().counts;
+    auto& counts = host_.node().counts;
     const auto taken = port_->send(lines);
     counts.group_sent += taken.lines;
     const auto left = lines.substr(taken.bytes);
@@ -52,18 +41,18 @@ bool group_place::put(std::string_view lines) {
     return left.empty();
 }
 
-void group_place::on_datagram(const transport::group_datagram& datagram) {
-    const auto keep = engine_.shared_from_this();
-    session_.on_message(source_of(datagram.from), datagram.said, engine_.now());
+void group_place::on_datagram(const core::group_datagram& datagram) {
+    const auto keep = host_.shared_from_this();
+    session_.on_message(datagram.from, datagram.request, host_.now());
     keep->completions().rethrow();
 }
 
-void group_place::on_batch() { engine_.settle(); }
+void group_place::on_batch() { host_.settle(); }
 
 void group_place::on_room() {
-    const auto keep = engine_.shared_from_this();
-    session_.bindings().drain(engine_.now());
-    engine_.settle();
+    const auto keep = host_.shared_from_this();
+    session_.bindings().drain(host_.now());
+    host_.settle();
 }
 
 } // namespace cles::shell

@@ -6,23 +6,22 @@
 #include "core/group_intake.hpp"
 #include "core/group_output.hpp"
 #include "core/group_session.hpp"
-#include "core/group_source.hpp"
-#include "transport/group_port.hpp"
+#include "port/group_port.hpp"
+#include "port/group_source.hpp"
+#include "port/network_interface.hpp"
 
 #include <memory>
 #include <string_view>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
 
+class local_node;
+
 /// A service's place in its multicast group by one interface.
-class group_place final : public core::group_output, private transport::group_events {
+class group_place final : public core::group_output, private core::group_listener {
   public:
     /// Joins. \throws boost::system::system_error
-    group_place(detail::engine& host, core::group_intake& intake, const transport::ip_interface& by,
+    group_place(local_node& host, core::group_intake& intake, const core::network_interface& by,
                 const multicast_options& where);
     ~group_place();
 
@@ -35,18 +34,16 @@ class group_place final : public core::group_output, private transport::group_ev
     void send_all(std::string_view lines) override;
     [[nodiscard]] bool has_room() const override { return port_->unsent() == 0; }
     /// Where what is sent here comes from.
-    [[nodiscard]] const core::group_source& source() const noexcept { return source_; }
-    [[nodiscard]] const transport::group_port& port() const noexcept { return *port_; }
+    [[nodiscard]] const core::group_source& source() const noexcept { return port_->source(); }
 
   private:
     bool put(std::string_view lines);
-    void on_datagram(const transport::group_datagram& datagram) override;
+    void on_datagram(const core::group_datagram& datagram) override;
     void on_batch() override;
     void on_room() override;
 
-    detail::engine& engine_;
-    std::shared_ptr<transport::group_port> port_;
-    core::group_source source_;
+    local_node& host_;
+    std::shared_ptr<core::group_port> port_;
     core::group_session session_;
 };
 

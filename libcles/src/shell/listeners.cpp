@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "shell/listeners.hpp"
 
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <cstdint>
 #include <utility>
@@ -9,7 +9,7 @@
 namespace cles::shell {
 
 void listeners::start(acceptor& made, bool counted) {
-    made.start([weak = engine_.weak_from_this(), counted](link_ptr arrived) {
+    made.start([weak = host_.weak_from_this(), counted](link_ptr arrived) {
         if (const auto host = weak.lock()) {
             host->connections().on_accepted(std::move(arrived), counted);
         } else {
@@ -20,18 +20,18 @@ void listeners::start(acceptor& made, bool counted) {
 
 std::string listeners::listen(std::string_view where, bool insecure) {
     const auto address = parse_url(where);
-    auto* carrier = find_transport(address.scheme);
-    if (carrier == nullptr) {
+    auto& environment = host_.environment();
+    if (!environment.has_transport(address.scheme)) {
         throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
     }
-    if (!insecure && carrier->is_exposed(address)) {
+    if (!insecure && environment.is_exposed(address)) {
         throw error(errc::insecure_listen, "'" + std::string{where} +
                                                "' can be reached from other hosts, and nobody proves who they are; "
                                                "say 'insecure' if that is meant");
     }
     std::unique_ptr<acceptor> made;
     try {
-        made = carrier->listen(engine_.executor(), address, engine_.bounds());
+        made = environment.listen(address, host_.bounds());
     } catch (const boost::system::system_error& e) {
         throw error(e.code(), "cannot listen on '" + std::string{where} + "': " + e.code().message());
     }
@@ -41,26 +41,22 @@ std::string listeners::listen(std::string_view where, bool insecure) {
     return local;
 }
 
-std::string listeners::self_door() const {
-    return "self/" + std::to_string(reinterpret_cast<std::uintptr_t>(&engine_));
-}
+std::string listeners::self_door() const { return "self/" + std::to_string(reinterpret_cast<std::uintptr_t>(&host_)); }
 
 std::string listeners::shared_door(std::string_view name) const {
-    const auto& context = boost::asio::query(engine_.executor(), boost::asio::execution::context);
-    return "context/" + std::to_string(reinterpret_cast<std::uintptr_t>(&context)) + "/" + std::string{name};
+    return host_.environment().local_scope() + "/" + std::string{name};
 }
 
 void listeners::open_local_doors() {
-    auto* carrier = find_transport("inproc");
-    for (const auto& door : {self_door(), shared_door(engine_.node().name)}) {
+    for (const auto& door : {self_door(), shared_door(host_.node().name)}) {
         try {
-            auto made = carrier->listen(engine_.executor(), {.scheme = "inproc", .host = door, .port = 0, .path = {}},
-                                        engine_.bounds());
+            auto made =
+                host_.environment().listen({.scheme = "inproc", .host = door, .port = 0, .path = {}}, host_.bounds());
             start(*made, false);
             doors_.push_back(std::move(made));
         } catch (const boost::system::system_error&) {
-            engine_.say(log_level::warning,
-                        "another '" + engine_.node().name + "' in this process is the one that others find here");
+            host_.say(log_level::warning,
+                      "another '" + host_.node().name + "' in this process is the one that others find here");
         }
     }
 }

@@ -1,23 +1,21 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
 
 #include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// Where a service's links come in.
 class listeners {
   public:
-    explicit listeners(detail::engine& host) noexcept : engine_(host) {}
+    explicit listeners(local_node& host) noexcept : host_(host) {}
 
     /// Listens at a URL and returns it as it turned out. \throws cles::error
     std::string listen(std::string_view where, bool insecure);
@@ -36,7 +34,7 @@ class listeners {
   private:
     void start(acceptor& made, bool counted);
 
-    detail::engine& engine_;
+    local_node& host_;
     std::vector<std::unique_ptr<acceptor>> open_;
     std::vector<std::unique_ptr<acceptor>> doors_; // for this process
 };

@@ -3,26 +3,24 @@
 
 #include <cles/error.hpp>
 
-#include "shell/engine.hpp"
 #include "shell/group.hpp"
+#include "shell/local_node.hpp"
 #include "shell/probe_reply.hpp"
 #include "shell/route.hpp"
-
-#include <boost/asio/post.hpp>
 
 #include <utility>
 
 namespace cles::shell {
 
-neighbours::neighbours(detail::engine& host, std::uint32_t seed)
-    : engine_(host), announcer_(*this, host.deadlines(), seed), round_(*this, host.deadlines()), seed_(seed * 7 + 3) {
+neighbours::neighbours(local_node& host, std::uint32_t seed)
+    : host_(host), announcer_(*this, host.deadlines(), seed), round_(*this, host.deadlines()), seed_(seed * 7 + 3) {
     host.node().others.watch(this);
     host.node().others.probe_by(this);
 }
 
 neighbours::~neighbours() {
-    engine_.node().others.watch(nullptr);
-    engine_.node().others.probe_by(nullptr);
+    host_.node().others.watch(nullptr);
+    host_.node().others.probe_by(nullptr);
 }
 
 void neighbours::join(group& through) {
@@ -33,9 +31,9 @@ void neighbours::join(group& through) {
 void neighbours::gossip(const gossip_options& how) {
     if (gossiper_) {
         gossiper_->set_seeds(how.seeds);
-        engine_.settle();
+        host_.settle();
     } else if (how.part != nullptr) {
-        auto made = how.part->make(engine_, seed_);
+        auto made = how.part->make(host_, seed_);
         made->set_seeds(how.seeds);
         gossiper_ = std::move(made);
         start();
@@ -51,7 +49,7 @@ void neighbours::start() {
     if (!begun_) {
         round_.expect();
     }
-    boost::asio::post(engine_.executor(), [weak = engine_.weak_from_this(), this] {
+    core::post(host_.environment(), [weak = host_.weak_from_this(), this] {
         if (const auto host = weak.lock(); host && !host->stopped()) {
             begin();
         }
@@ -59,7 +57,7 @@ void neighbours::start() {
 }
 
 void neighbours::begin() {
-    const auto now = engine_.now();
+    const auto now = host_.now();
     if (!std::exchange(begun_, true)) {
         if (group_ != nullptr) {
             group_->send("BIND all:cles\n");
@@ -73,7 +71,7 @@ void neighbours::begin() {
         announcer_.hurry(now); // those who are asked are told of this node
         gossiper_->start();
     }
-    engine_.settle();
+    host_.settle();
 }
 
 void neighbours::ask_for(std::string_view node) {
@@ -96,8 +94,8 @@ void neighbours::leave() {
 }
 
 void neighbours::stop() {
-    engine_.node().others.watch(nullptr);
-    engine_.node().others.probe_by(nullptr);
+    host_.node().others.watch(nullptr);
+    host_.node().others.probe_by(nullptr);
     leave();
     round_.stop();
     if (gossiper_) {
@@ -112,13 +110,13 @@ void neighbours::stop() {
 // -- what this node says -------------------------------------------------------------------------------------------
 
 void neighbours::announce(std::chrono::milliseconds interval) {
-    if (!engine_.node().endpoints.empty()) { // else nobody could ask it for anything
+    if (!host_.node().endpoints.empty()) { // else nobody could ask it for anything
         announce(interval, false);
     }
 }
 
 void neighbours::announce(std::chrono::milliseconds interval, bool leaving) {
-    auto& node = engine_.node();
+    auto& node = host_.node();
     std::string tasks;
     json_writer w{tasks};
     write_tasks(w, node);
@@ -131,7 +129,7 @@ void neighbours::announce(std::chrono::milliseconds interval, bool leaving) {
     ++seq_;
     if (gossiper_ && !leaving) {
         said.endpoints = endpoints_for_gossip();
-        node.others.speak(said, seq_, engine_.now());
+        node.others.speak(said, seq_, host_.now());
     }
     if (group_ != nullptr) {
         announce_to_group(said);
@@ -140,7 +138,7 @@ void neighbours::announce(std::chrono::milliseconds interval, bool leaving) {
 
 // By each interface with the endpoints that are of use there, and with the same number: it is one word.
 void neighbours::announce_to_group(core::announcement& said) {
-    auto& node = engine_.node();
+    auto& node = host_.node();
     if (const auto& own = group_->intake().own(); own.size() > 1) {
         said.sources = own;
     }
@@ -157,7 +155,7 @@ void neighbours::announce_to_group(core::announcement& said) {
 // Those who hear of them from others pass over what they cannot use.
 std::vector<std::string> neighbours::endpoints_for_gossip() const {
     std::vector<std::string> result;
-    for (const auto& endpoint : engine_.node().endpoints) {
+    for (const auto& endpoint : host_.node().endpoints) {
         if (!endpoint.starts_with("inproc:")) {
             result.push_back(endpoint);
         }
@@ -169,7 +167,7 @@ std::vector<std::string> neighbours::endpoints_for_gossip() const {
 // other hosts reach.
 std::vector<std::string> neighbours::endpoints_for_group(bool loopback) const {
     std::vector<std::string> result;
-    for (const auto& endpoint : engine_.node().endpoints) {
+    for (const auto& endpoint : host_.node().endpoints) {
         auto where = parse_url(endpoint);
         if (where.scheme == "inproc") {
             continue;
@@ -180,15 +178,14 @@ std::vector<std::string> neighbours::endpoints_for_group(bool loopback) const {
             }
             where.host = "::1";
         }
-        const auto* carrier = find_transport(where.scheme);
-        if (loopback || (carrier != nullptr && carrier->is_exposed(where))) {
+        if (loopback || host_.environment().is_exposed(where)) {
             result.push_back(to_string(where));
         }
     }
     return result;
 }
 
-std::size_t neighbours::others() const { return engine_.node().others.size(); }
+std::size_t neighbours::others() const { return host_.node().others.size(); }
 
 void neighbours::on_solicitation(bool by_name, time_point now) {
     if (by_name) {
@@ -201,18 +198,18 @@ void neighbours::on_solicitation(bool by_name, time_point now) {
 // -- what others say -----------------------------------------------------------------------------------------------
 
 void neighbours::on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) {
-    auto& counts = engine_.node().counts;
+    auto& counts = host_.node().counts;
     core::announcement said;
     std::string why;
     if (!read_announcement(update, said, why)) {
         ++counts.announcements_dropped;
-        engine_.say_soon(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
+        host_.say_soon(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
         return;
     }
     if (!group_->intake().is_of_this_host(from)) { // what is loopback there is another's here
         std::erase_if(said.sources, [](const core::group_source& each) { return each.is_loopback(); });
     }
-    switch (engine_.node().others.hear(said, *update.epoch, *update.seq, from, now)) {
+    switch (host_.node().others.hear(said, *update.epoch, *update.seq, from, now)) {
     case core::presence::verdict::taken: ++counts.announcements_received; break;
     case core::presence::verdict::again: ++counts.group_repeated; break;
     case core::presence::verdict::old: ++counts.announcements_dropped; break;
@@ -232,88 +229,88 @@ void neighbours::on_peer(std::string_view node, core::presence::change what, std
     const auto place =
         where.empty() ? std::string{", at no address that can be used from here"} : ", at " + std::string{where};
     switch (what) {
-    case core::presence::change::appeared: engine_.say_soon(log_level::info, name + " is there" + place); break;
-    case core::presence::change::moved: engine_.say_soon(log_level::info, name + " is elsewhere now" + place); break;
-    case core::presence::change::silent: engine_.say_soon(log_level::debug, name + " is not heard any more"); break;
-    case core::presence::change::returned: engine_.say_soon(log_level::debug, name + " is heard again"); break;
-    case core::presence::change::left: engine_.say_soon(log_level::info, name + " has left"); break;
+    case core::presence::change::appeared: host_.say_soon(log_level::info, name + " is there" + place); break;
+    case core::presence::change::moved: host_.say_soon(log_level::info, name + " is elsewhere now" + place); break;
+    case core::presence::change::silent: host_.say_soon(log_level::debug, name + " is not heard any more"); break;
+    case core::presence::change::returned: host_.say_soon(log_level::debug, name + " is heard again"); break;
+    case core::presence::change::left: host_.say_soon(log_level::info, name + " has left"); break;
     case core::presence::change::gone:
-        engine_.say_soon(log_level::info, name + " is gone");
+        host_.say_soon(log_level::info, name + " is gone");
         if (gossiper_) {
-            gossiper_->on_gone(node, where, engine_.now());
+            gossiper_->on_gone(node, where, host_.now());
         }
         break;
     case core::presence::change::clash:
-        engine_.say_soon(log_level::warning,
-                         name == engine_.node().name
-                             ? "another node calls itself '" + name + "' too, on " + std::string{where}
-                             : "there is a second '" + name + "', on " + std::string{where} + ", and it is not asked");
-        if (name != engine_.node().name) {
-            engine_.routes().on_whereabouts(name);
+        host_.say_soon(log_level::warning,
+                       name == host_.node().name
+                           ? "another node calls itself '" + name + "' too, on " + std::string{where}
+                           : "there is a second '" + name + "', on " + std::string{where} + ", and it is not asked");
+        if (name != host_.node().name) {
+            host_.routes().on_whereabouts(name);
         }
         return;
     case core::presence::change::taken: on_name_taken(std::string{where}); return;
     }
     follow_run(name);
-    engine_.routes().on_whereabouts(name);
+    host_.routes().on_whereabouts(name);
 }
 
 // Feeds of a run that is over are bound anew at the next one at once.
 void neighbours::follow_run(const std::string& name) {
-    const auto known = engine_.node().others.look(name);
+    const auto known = host_.node().others.look(name);
     if (!known) {
         return; // the next one may still come
     }
     const auto [at, is_new] = runs_.try_emplace(name, known->epoch);
     const bool another = std::exchange(at->second, known->epoch) != known->epoch;
-    if (runs_.size() > 2 * engine_.bounds().peers + 1) {
-        std::erase_if(runs_, [&](const auto& run) { return !engine_.node().others.find(run.first); });
+    if (runs_.size() > 2 * host_.bounds().peers + 1) {
+        std::erase_if(runs_, [&](const auto& run) { return !host_.node().others.find(run.first); });
     }
     if (is_new || another) {
-        engine_.feeds().on_new_run(name, another);
+        host_.feeds().on_new_run(name, another);
         if (group_ != nullptr) {
-            group_->intake().feeds().on_new_run(name, engine_.now());
+            group_->intake().feeds().on_new_run(name, host_.now());
         }
     }
 }
 
 void neighbours::on_name_taken(const std::string& where) {
-    engine_.say_soon(log_level::error, "the name '" + engine_.node().name + "' is taken: the node at " + where +
-                                           " was there first, and is asked by it");
-    engine_.on_name_taken(where);
+    host_.say_soon(log_level::error, "the name '" + host_.node().name + "' is taken: the node at " + where +
+                                         " was there first, and is asked by it");
+    host_.on_name_taken(where);
 }
 
 void neighbours::probe(std::uint64_t ticket, std::string_view url) {
-    auto reply = detail::pending_ptr{new probe_reply{engine_.weak_from_this(), ticket, std::string{url}}};
+    auto reply = detail::pending_ptr{new probe_reply{host_.weak_from_this(), ticket, std::string{url}}};
     boost::system::error_code code;
     std::string why;
-    auto* way = engine_.routes().to("self", url, false, code, why);
+    auto* way = host_.routes().to("self", url, false, code, why);
     if (way == nullptr) {
-        engine_.fail_later(std::move(reply), code, std::move(why));
+        host_.fail_later(std::move(reply), code, std::move(why));
         return;
     }
-    const auto now = engine_.now();
+    const auto now = host_.now();
     way->send({.verb = verb::pull,
                .noun = "self:cles",
-               .id = engine_.draw_id(),
+               .id = host_.draw_id(),
                .begun = now,
                .deadline = now + core::presence::probe_limit},
               std::move(reply), {});
-    engine_.settle();
+    host_.settle();
 }
 
-void neighbours::on_round_over() { engine_.on_round_over(); }
+void neighbours::on_round_over() { host_.on_round_over(); }
 
 std::optional<std::string_view> neighbours::find(std::string_view node) const noexcept {
-    return engine_.node().others.find(node);
+    return host_.node().others.find(node);
 }
 
 std::optional<std::string_view> neighbours::second_of(std::string_view node) const noexcept {
-    return engine_.node().others.second_of(node);
+    return host_.node().others.second_of(node);
 }
 
 bool neighbours::expects_more_of(std::string_view node) const noexcept {
-    const auto* const run = round_.over() ? nullptr : engine_.node().others.announced(node);
+    const auto* const run = round_.over() ? nullptr : host_.node().others.announced(node);
     return run != nullptr && run->endpoints.empty() && run->said.sources.size() > 1;
 }
 
@@ -321,7 +318,7 @@ std::string neighbours::why_unknown() const {
     if (group_ == nullptr) {
         return gossiper_ ? "no node that it asks knows of it; " : "";
     }
-    const bool others = engine_.node().counts.announcements_foreign != 0;
+    const bool others = host_.node().counts.announcements_foreign != 0;
     return "nobody of that name has announced itself on " + group_->interfaces() +
            (others ? ", where there are nodes of other pools too; " : "; ");
 }

@@ -20,11 +20,9 @@
 #include <string_view>
 #include <vector>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 class group;
 
@@ -36,7 +34,7 @@ class neighbours final : private core::group_presence,
                          private core::announcer::voice,
                          private core::first_round::listener {
   public:
-    neighbours(detail::engine& host, std::uint32_t seed);
+    neighbours(local_node& host, std::uint32_t seed);
     neighbours(const neighbours&) = delete;
     neighbours& operator=(const neighbours&) = delete;
     ~neighbours();
@@ -45,7 +43,7 @@ class neighbours final : private core::group_presence,
     void join(group& through);
     /// Takes part in gossip from now on, with these seeds. \throws cles::error where one of them is no URL
     void gossip(const gossip_options& how);
-    /// What is said follows when the executor runs.
+    /// What is said follows when the environment runs.
     void start();
     /// Says farewell, and goes on hearing of the others. Repeating it does nothing.
     void leave();
@@ -63,6 +61,8 @@ class neighbours final : private core::group_presence,
     /// Whether a node that is known, at no address that can be used, may be heard any moment by another of its
     /// interfaces.
     [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
+    /// What presence reports changes to; a test may put itself between.
+    [[nodiscard]] core::presence::watcher& presence_watcher() noexcept { return *this; }
     /// Why a name is not known, as the first part of a sentence; empty without a group.
     [[nodiscard]] std::string why_unknown() const;
 
@@ -82,7 +82,7 @@ class neighbours final : private core::group_presence,
     [[nodiscard]] std::vector<std::string> endpoints_for_group(bool loopback) const;
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
-    detail::engine& engine_;
+    local_node& host_;
     core::announcer announcer_;
     core::first_round round_;
     std::unique_ptr<detail::gossip_host> gossiper_; // null: it takes no part

@@ -3,9 +3,8 @@
 
 #include <cles/error.hpp>
 
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
-#include <boost/asio/post.hpp>
 #include <boost/system/errc.hpp>
 
 #include <utility>
@@ -51,7 +50,7 @@ void probe_reply::tell(core::probe_outcome found) const {
         return;
     }
     // The link by which it has come may be let go of, and others told, when that is through with it.
-    boost::asio::post(host->executor(), [weak = host_, ticket = ticket_, url = url_, found = std::move(found)] {
+    core::post(host->environment(), [weak = host_, ticket = ticket_, url = url_, found = std::move(found)] {
         if (const auto alive = weak.lock(); alive && !alive->stopped()) {
             alive->node().others.on_probed(ticket, found, alive->now());
             alive->routes().release(url);

@@ -10,16 +10,14 @@
 #include <string>
 #include <string_view>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// The answer of a run of a node that was asked whether it is there, or its silence.
 class probe_reply final : public detail::pending {
   public:
-    probe_reply(std::weak_ptr<detail::engine> host, std::uint64_t ticket, std::string url)
+    probe_reply(std::weak_ptr<local_node> host, std::uint64_t ticket, std::string url)
         : host_(std::move(host)), ticket_(ticket), url_(std::move(url)) {}
 
     verdict offer(std::string_view json) override;
@@ -31,7 +29,7 @@ class probe_reply final : public detail::pending {
   private:
     void tell(core::probe_outcome found) const;
 
-    std::weak_ptr<detail::engine> host_;
+    std::weak_ptr<local_node> host_;
     std::uint64_t ticket_;
     std::string url_;
 };

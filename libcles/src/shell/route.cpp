@@ -2,7 +2,7 @@
 #include "shell/route.hpp"
 
 #include "core/feed_machine.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -19,10 +19,10 @@ void put(connection& c, const route::request& r, detail::pending_ptr operation,
 
 } // namespace
 
-route::route(std::shared_ptr<detail::engine> host, url where)
-    : engine_(std::move(host)), where_(std::move(where)), address_(to_string(*where_)) {}
+route::route(std::shared_ptr<local_node> host, url where)
+    : host_(std::move(host)), where_(std::move(where)), address_(to_string(*where_)) {}
 
-route::route(std::shared_ptr<detail::engine> host, std::string_view node) : engine_(std::move(host)), address_(node) {}
+route::route(std::shared_ptr<local_node> host, std::string_view node) : host_(std::move(host)), address_(node) {}
 
 std::shared_ptr<connection> route::usable() const {
     for (const auto& c : links_) {
@@ -48,14 +48,14 @@ void route::send(const request& r, detail::pending_ptr operation, core::outbound
         return;
     }
     constexpr std::size_t around = 512; // the text, about
-    core::memory_reservation held{engine_->node().kept_requests};
+    core::memory_reservation held{host_->node().kept_requests};
     const auto bytes = r.noun.size() + r.adverbs.size() + r.body.size() + around;
     if (r.noun.find(":cles") != std::string_view::npos) { // what keeps a network together
         held.resize(bytes);
     } else if (!held.try_resize(bytes)) {
-        engine_->fail_later(std::move(operation), errc::busy,
-                            "too much waits for a link to " + address_ + " or others (limits.memory)",
-                            std::move(progress));
+        host_->fail_later(std::move(operation), errc::busy,
+                          "too much waits for a link to " + address_ + " or others (limits.memory)",
+                          std::move(progress));
         return;
     }
     auto w = std::make_unique<waiting>(*this);
@@ -69,7 +69,7 @@ void route::send(const request& r, detail::pending_ptr operation, core::outbound
     w->deadline = r.deadline;
     w->operation = std::move(operation);
     w->progress = std::move(progress);
-    engine_->deadlines().arm(*w, r.deadline);
+    host_->deadlines().arm(*w, r.deadline);
     requests_.push_back(std::move(w));
     dial();
 }
@@ -82,7 +82,7 @@ bool route::cancel(std::uint64_t id) {
     auto operation = std::move((*found)->operation);
     auto report = std::move((*found)->progress);
     requests_.erase(found);
-    engine_->completions().fail(std::move(operation), errc::cancelled, "the request was withdrawn", std::move(report));
+    host_->completions().fail(std::move(operation), errc::cancelled, "the request was withdrawn", std::move(report));
     return true;
 }
 
@@ -92,7 +92,7 @@ void route::waiting::on_deadline(time_point) {
     auto held = std::move(operation);
     auto report = std::move(progress);
     const auto message = "no link to " + owner.address_ + " came about in time";
-    auto& completions = owner.engine_->completions();
+    auto& completions = owner.host_->completions();
     owner.requests_.erase(found); // ends this
     completions.fail(std::move(held), errc::deadline, message, std::move(report));
 }
@@ -127,15 +127,14 @@ void route::dial() {
     if (give_up_ || !where_) {
         return;
     }
-    auto* carrier = find_transport(where_->scheme);
-    give_up_ = carrier->dial(engine_->executor(), *where_, engine_->bounds(),
-                             [weak = weak_from_this()](boost::system::error_code code, link_ptr made) {
-                                 if (const auto self = weak.lock()) {
-                                     self->on_dialled(code, std::move(made));
-                                 } else if (made) {
-                                     made->close();
-                                 }
-                             });
+    give_up_ = host_->environment().dial(*where_, host_->bounds(),
+                                         [weak = weak_from_this()](boost::system::error_code code, link_ptr made) {
+                                             if (const auto self = weak.lock()) {
+                                                 self->on_dialled(code, std::move(made));
+                                             } else if (made) {
+                                                 made->close();
+                                             }
+                                         });
 }
 
 void route::on_dialled(boost::system::error_code code, link_ptr made) {
@@ -144,18 +143,18 @@ void route::on_dialled(boost::system::error_code code, link_ptr made) {
     if (code) {
         fail(code, "cannot connect to " + address_ + ": " + code.message());
     } else {
-        const auto c = engine_->connections().adopt(std::move(made), connection::origin::dialled);
+        const auto c = host_->connections().adopt(std::move(made), connection::origin::dialled);
         links_.push_back(c);
         serve_waiting(c);
     }
-    engine_->settle();
+    host_->settle();
 }
 
 void route::serve_waiting(const std::shared_ptr<connection>& c) {
-    const auto now = engine_->now();
+    const auto now = host_->now();
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
-        engine_->deadlines().disarm(w);
+        host_->deadlines().disarm(w);
         w.memory.resize(0); // the link counts it now
         put(*c, w.asked(now), std::move(w.operation), std::move(w.progress));
     }
@@ -173,10 +172,10 @@ void route::serve_waiting(const std::shared_ptr<connection>& c) {
 }
 
 void route::hand_over(route& way) {
-    const auto now = engine_->now();
+    const auto now = host_->now();
     for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
         auto& w = *requests.front();
-        engine_->deadlines().disarm(w);
+        host_->deadlines().disarm(w);
         w.memory.resize(0);
         way.send(w.asked(now), std::move(w.operation), std::move(w.progress));
     }
@@ -189,10 +188,10 @@ void route::fail(boost::system::error_code code, std::string_view message) {
     auto requests = std::exchange(requests_, {});
     auto binders = std::exchange(binders_, {});
     for (const auto& w : requests) {
-        engine_->deadlines().disarm(*w);
+        host_->deadlines().disarm(*w);
     }
     for (const auto& w : requests) {
-        engine_->completions().fail(std::move(w->operation), code, message, std::move(w->progress));
+        host_->completions().fail(std::move(w->operation), code, message, std::move(w->progress));
     }
     for (const auto& b : binders) {
         b.ready(nullptr, code, message);
@@ -206,8 +205,8 @@ void route::stop() {
     binders_.clear();
     links_.clear();
     for (const auto& w : std::exchange(requests_, {})) {
-        engine_->fail_later(std::move(w->operation), errc::stopped, "the service has been stopped",
-                            std::move(w->progress));
+        host_->fail_later(std::move(w->operation), errc::stopped, "the service has been stopped",
+                          std::move(w->progress));
     }
 }
 

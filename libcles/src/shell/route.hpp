@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/link.hpp>
+#include <cles/line_link.hpp>
 #include <cles/pending.hpp>
 
 #include "core/deadlines.hpp"
@@ -26,9 +26,9 @@ namespace cles::shell {
 /// The way to one URL: the links that lead there, made when they are needed, and what waits for one.
 class route : public std::enable_shared_from_this<route> {
   public:
-    route(std::shared_ptr<detail::engine> host, url where);
+    route(std::shared_ptr<local_node> host, url where);
     /// To a node of which nobody has heard yet: holds what is to go there until `hand_over` or `fail`.
-    route(std::shared_ptr<detail::engine> host, std::string_view node);
+    route(std::shared_ptr<local_node> host, std::string_view node);
 
     struct request {
         cles::verb verb = verb::pull;
@@ -106,7 +106,7 @@ class route : public std::enable_shared_from_this<route> {
     void on_dialled(boost::system::error_code code, link_ptr made);
     void serve_waiting(const std::shared_ptr<connection>& c);
 
-    std::shared_ptr<detail::engine> engine_;
+    std::shared_ptr<local_node> host_;
     std::optional<url> where_; // nothing: not known yet
     std::string address_;
     std::vector<std::shared_ptr<connection>> links_;

@@ -2,8 +2,7 @@
 #include "shell/routes.hpp"
 
 #include "protocol/grammar.hpp"
-#include "shell/engine.hpp"
-#include "transport/inproc.hpp"
+#include "shell/local_node.hpp"
 
 #include <iterator>
 #include <utility>
@@ -26,7 +25,7 @@ void routes::set_peer(std::string_view name, std::string_view where) {
     }
     if (!where.empty()) {
         const auto address = parse_url(where);
-        if (find_transport(address.scheme) == nullptr) {
+        if (!host_.environment().has_transport(address.scheme)) {
             throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
         }
     }
@@ -47,16 +46,16 @@ route* routes::to(std::string_view target, std::string_view at, bool urgent, boo
 }
 
 std::string routes::address_of(std::string_view target) const {
-    const auto& own_name = engine_.node().name;
-    const auto& listeners = engine_.listeners();
-    const bool routed = engine_.node().way != nullptr && protocol::is_reserved_target(target);
+    const auto& own_name = host_.node().name;
+    const auto& listeners = host_.listeners();
+    const bool routed = host_.node().way != nullptr && protocol::is_reserved_target(target);
     if (target == "self" || target == own_name || routed) {
         return "inproc://" + listeners.self_door();
     }
     if (const auto configured = directory_.find(target); !configured.empty()) {
         return std::string{configured};
     }
-    if (const auto door = listeners.shared_door(target); transport::is_open(door)) {
+    if (const auto door = listeners.shared_door(target); host_.environment().is_open(door)) {
         return "inproc://" + door;
     }
     if (protocol::is_reserved_target(target)) {
@@ -65,7 +64,7 @@ std::string routes::address_of(std::string_view target) const {
                                          "service_options::routing, or say with call_options::at where another is");
     }
     const auto unknown = own_name + " cannot find '" + std::string{target} + "': ";
-    const auto& neighbours = engine_.neighbours();
+    const auto& neighbours = host_.neighbours();
     if (const auto heard = neighbours.find(target); heard && !neighbours.expects_more_of(target)) {
         if (const auto second = neighbours.second_of(target)) {
             throw error(errc::no_target, "there are two nodes that call themselves '" + std::string{target} + "', at " +
@@ -94,14 +93,14 @@ route* routes::find(std::string_view target, std::string_view at, bool urgent, b
         }
         std::shared_ptr<route> made;
         if (waits) {
-            made = std::make_shared<route>(engine_.shared_from_this(), target);
-            engine_.neighbours().ask_for(target);
+            made = std::make_shared<route>(host_.shared_from_this(), target);
+            host_.neighbours().ask_for(target);
         } else {
             const auto where = parse_url(address);
-            if (find_transport(where.scheme) == nullptr) {
+            if (!host_.environment().has_transport(where.scheme)) {
                 throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + address + "'");
             }
-            made = std::make_shared<route>(engine_.shared_from_this(), where);
+            made = std::make_shared<route>(host_.shared_from_this(), where);
         }
         if (routes_.size() >= routes_before_tidying) { // to many a node of the past
             std::erase_if(routes_, [](const auto& entry) { return entry.second->idle(); });
@@ -118,7 +117,7 @@ route* routes::find(std::string_view target, std::string_view at, bool urgent, b
 void routes::on_whereabouts(std::string_view node) {
     recent_ = nullptr;
     const auto waiting = routes_.find(std::string{unheard}.append(node));
-    if (waiting == routes_.end() || engine_.neighbours().expects_more_of(node)) {
+    if (waiting == routes_.end() || host_.neighbours().expects_more_of(node)) {
         return;
     }
     const auto held = waiting->second;
@@ -130,11 +129,11 @@ void routes::on_whereabouts(std::string_view node) {
     } else {
         held->fail(code, why);
     }
-    engine_.settle();
+    host_.settle();
 }
 
 void routes::on_round_over() {
-    const auto keep = engine_.shared_from_this();
+    const auto keep = host_.shared_from_this();
     for (;;) {
         const auto next = routes_.lower_bound(unheard);
         if (next == routes_.end() || !next->first.starts_with(unheard)) {

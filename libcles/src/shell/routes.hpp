@@ -20,17 +20,15 @@ namespace cles::core {
 class feed_machine;
 } // namespace cles::core
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 /// The ways from a service to others, and which of them leads to a node: first what was configured, then services on
 /// the same context, then what the nodes themselves announce.
 class routes {
   public:
-    explicit routes(detail::engine& host) noexcept : engine_(host) {}
+    explicit routes(local_node& host) noexcept : host_(host) {}
 
     /// Says where a node is; an empty URL forgets it. \throws cles::error
     void set_peer(std::string_view name, std::string_view where);
@@ -59,7 +57,7 @@ class routes {
     route* find(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
                 std::string& why);
 
-    detail::engine& engine_;
+    local_node& host_;
     core::directory directory_;
     std::map<std::string, std::shared_ptr<route>, std::less<>> routes_; // by URL, and whether urgent
     std::string recent_target_;                                         // most requests go where the one before went

@@ -5,9 +5,11 @@
 
 #include <memory>
 
-namespace cles::detail {
+namespace cles::shell {
+class local_node;
+} // namespace cles::shell
 
-class engine;
+namespace cles::detail {
 
 /// A service's routing, as the rest of the service sees it.
 class routing_host {
@@ -29,7 +31,7 @@ class routing_host {
 
 /// How it is made for a service, which has its node ask it from then on.
 struct routing_part {
-    std::unique_ptr<routing_host> (*make)(engine& host);
+    std::unique_ptr<routing_host> (*make)(shell::local_node& host);
 };
 
 } // namespace cles::detail

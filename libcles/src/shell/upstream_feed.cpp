@@ -3,9 +3,6 @@
 
 #include "protocol/reply_line.hpp"
 
-#include <boost/asio/post.hpp>
-
-#include <random>
 #include <utility>
 
 namespace cles::shell {
@@ -53,10 +50,10 @@ class upstream_feed::first_answer final : public detail::pending {
     std::weak_ptr<upstream_feed> to_;
 };
 
-upstream_feed::upstream_feed(std::shared_ptr<detail::engine> host, std::string node, std::string path,
+upstream_feed::upstream_feed(std::shared_ptr<local_node> host, std::string node, std::string path,
                              core::feed_events& to, std::function<void()> ended)
     : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
-                                       std::move(node), std::move(path), false, std::random_device{}()),
+                                       std::move(node), std::move(path), false, host_->environment().random()),
       to_(&to), ended_(std::move(ended)) {}
 
 upstream_feed::~upstream_feed() { host_->feeds().leave(machine_); }
@@ -69,15 +66,11 @@ void upstream_feed::begin(std::string_view adverbs) {
                           .adverbs = std::string{adverbs},
                           .marked = true});
     wait();
-    start(detail::pending_ptr{new first_answer(weak_from_this())});
+    machine_.start(detail::pending_ptr{new first_answer(weak_from_this())});
     host_->settle();
 }
 
-void upstream_feed::start(detail::pending_ptr bound) { machine_.start(std::move(bound)); }
-
-void upstream_feed::next(detail::event_ptr operation) { static_cast<void>(machine_.mail().next(std::move(operation))); }
-
-void upstream_feed::wait() { next(detail::event_ptr{this}); }
+void upstream_feed::wait() { static_cast<void>(machine_.mail().next(core::pending_event_ptr{this})); }
 
 void upstream_feed::close() {
     if (std::exchange(to_, nullptr) == nullptr) {
@@ -86,7 +79,7 @@ void upstream_feed::close() {
     machine_.close(errc::cancelled);
     host_->feeds().leave(machine_);
     // It may be closed from inside its own event: what is up the stack still needs it.
-    boost::asio::post(host_->executor(), [self = shared_from_this()] {});
+    core::post(host_->environment(), [self = shared_from_this()] {});
 }
 
 void upstream_feed::on_refused(boost::system::error_code code, std::string_view message) {
@@ -97,7 +90,7 @@ void upstream_feed::on_refused(boost::system::error_code code, std::string_view 
     }
     const auto why = failure_of(code, machine_.target(), message);
     host_->feeds().leave(machine_);
-    boost::asio::post(host_->executor(), [self] {});
+    core::post(host_->environment(), [self] {});
     ended_();
     to->on_refused(why);
 }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/feed.hpp>
+#include <cles/feed_event.hpp>
+#include <cles/pending.hpp>
 
 #include "core/feed_machine.hpp"
 #include "core/onward.hpp"
-#include "shell/engine.hpp"
+#include "shell/local_node.hpp"
 
 #include <functional>
 #include <memory>
@@ -15,26 +16,18 @@
 namespace cles::shell {
 
 /// A noun of another node that is bound for the clients of this one.
-class upstream_feed final : public detail::feed_control,
-                            private detail::pending_event,
-                            public std::enable_shared_from_this<upstream_feed> {
+class upstream_feed final : private detail::pending_event, public std::enable_shared_from_this<upstream_feed> {
   public:
     /// `ended`: it could not be bound, and is to be let go of.
-    upstream_feed(std::shared_ptr<detail::engine> host, std::string node, std::string path, core::feed_events& to,
+    upstream_feed(std::shared_ptr<local_node> host, std::string node, std::string path, core::feed_events& to,
                   std::function<void()> ended);
-    ~upstream_feed() override;
+    ~upstream_feed();
 
     void begin(std::string_view adverbs);
-    void close() override;
+    void close();
 
   private:
     class first_answer;
-
-    void start(detail::pending_ptr bound) override;
-    void next(detail::event_ptr operation) override;
-    void cancel_start() override {}
-    void cancel(const detail::pending_event*) override {}
-    [[nodiscard]] const boost::asio::any_io_executor& executor() const override { return host_->executor(); }
 
     // What waits for events: this itself, always.
     bool deliver(const detail::raw_event& event) override;
@@ -45,7 +38,7 @@ class upstream_feed final : public detail::feed_control,
     void wait();
     void on_refused(boost::system::error_code code, std::string_view message);
 
-    std::shared_ptr<detail::engine> host_;
+    std::shared_ptr<local_node> host_;
     core::feed_machine machine_;
     core::feed_events* to_; // null: closed
     std::function<void()> ended_;

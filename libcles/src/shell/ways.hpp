@@ -8,18 +8,16 @@
 #include <memory>
 #include <string_view>
 
-namespace cles::detail {
-class engine;
-} // namespace cles::detail
-
 namespace cles::shell {
+
+class local_node;
 
 class upstream_feed;
 
 /// The routes of a service, as its router uses them for its clients.
 class ways final : public core::onward {
   public:
-    explicit ways(detail::engine& host) noexcept : engine_(host) {}
+    explicit ways(local_node& host) noexcept : host_(host) {}
     ~ways();
     /// Closes all feeds.
     void stop();
@@ -32,7 +30,7 @@ class ways final : public core::onward {
     void unbind(std::uint64_t ticket) override;
 
   private:
-    detail::engine& engine_;
+    local_node& host_;
     std::map<std::uint64_t, std::shared_ptr<upstream_feed>> feeds_;
 };
 

@@ -66,7 +66,7 @@ datagram_burst::datagram_burst(udp::socket& socket) noexcept : socket_(socket) {
     segments_ = ::setsockopt(socket.native_handle(), SOL_UDP, UDP_SEGMENT, &not_by_itself, sizeof not_by_itself) == 0;
 }
 
-lines_done datagram_burst::send(std::string_view lines, const udp::endpoint* to) noexcept {
+core::lines_done datagram_burst::send(std::string_view lines, const udp::endpoint* to) noexcept {
     if (segments_) {
         if (const auto done = send_runs(lines, most_in_run, to)) {
             return *done;
@@ -75,8 +75,8 @@ lines_done datagram_burst::send(std::string_view lines, const udp::endpoint* to)
     return *send_runs(lines, 1, to);
 }
 
-std::optional<lines_done> datagram_burst::send_runs(std::string_view lines, std::size_t longest,
-                                                    const udp::endpoint* to) noexcept {
+std::optional<core::lines_done> datagram_burst::send_runs(std::string_view lines, std::size_t longest,
+                                                          const udp::endpoint* to) noexcept {
     // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): as far as they are used
     std::array<std::size_t, most_runs> in_each;
     std::array<iovec, most_runs> texts;
@@ -106,13 +106,13 @@ std::optional<lines_done> datagram_burst::send_runs(std::string_view lines, std:
         sent = try_it();
     }
     if (sent < 0 && errno == EAGAIN) {
-        return lines_done{};
+        return core::lines_done{};
     }
     if (sent < 0 && in_each[0] > 1) { // each alone might go: the way there may have short frames, for one
         segments_ = errno != EIO;     // that is the interface's
         return std::nullopt;
     }
-    lines_done done;
+    core::lines_done done;
     const auto count_done = static_cast<std::size_t>(std::max(sent, 1)); // the first is sent, or lost
     for (std::size_t i = 0; i < count_done; ++i) {
         done.lines += in_each[i];

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "port/group_port.hpp"
+
 #include <boost/asio/ip/udp.hpp>
 
 #include <cstddef>
@@ -8,12 +10,6 @@
 #include <string_view>
 
 namespace cles::transport {
-
-/// How much of some lines needs no more care.
-struct lines_done {
-    std::size_t lines = 0;
-    std::size_t bytes = 0;
-};
 
 /// Sends whole lines, each with its LF as a datagram of its own, as many as go by one system call (sendmmsg(2)). Those
 /// of one length that follow each other pass through the system as one, until the network or a socket that does not
@@ -29,11 +25,12 @@ class datagram_burst {
 
     /// To whom the socket is connected, or else to `to`. A line that cannot be sent is as good as lost on its way, and
     /// done with. \return what is done; nothing: there is no room \pre there is a line
-    lines_done send(std::string_view lines, const udp::endpoint* to = nullptr) noexcept;
+    core::lines_done send(std::string_view lines, const udp::endpoint* to = nullptr) noexcept;
 
   private:
     // Nothing: the first run cannot go as one.
-    std::optional<lines_done> send_runs(std::string_view lines, std::size_t longest, const udp::endpoint* to) noexcept;
+    std::optional<core::lines_done> send_runs(std::string_view lines, std::size_t longest,
+                                              const udp::endpoint* to) noexcept;
 
     udp::socket& socket_;
     bool segments_;

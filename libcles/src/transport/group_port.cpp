@@ -12,19 +12,20 @@ namespace cles::transport {
 namespace asio = boost::asio;
 using boost::system::error_code;
 
-group_port::group_port(const asio::any_io_executor& executor, const ip_interface& by, const multicast_options& where)
+group_port::group_port(const asio::any_io_executor& executor, const core::network_interface& by,
+                       const multicast_options& where)
     : group_(asio::ip::make_address_v4(where.group), where.port), receiver_(group_receiver::of(executor, by, group_)),
       own_(executor, udp::v4()), burst_(own_) {
-    own_.bind({by.address, 0});
+    own_.bind({asio::ip::address_v4{by.address}, 0});
     set_ip_option(own_, IP_MULTICAST_IF, membership(group_, by.index));
     set_ip_option(own_, IP_MULTICAST_TTL, 1);
     set_ip_option(own_, IP_MULTICAST_LOOP, 1); // other nodes of this host hear it too
     own_.non_blocking(true);
     drop_all(own_); // nobody reads there
-    source_ = own_.local_endpoint();
+    source_ = source_of(own_.local_endpoint());
 }
 
-void group_port::start(group_events& owner) {
+void group_port::start(core::group_listener& owner) {
     owner_ = &owner;
     receiver_->add(owner, source_);
 }
@@ -40,11 +41,11 @@ void group_port::close() {
 
 // -- sending -------------------------------------------------------------------------------------------------------
 
-lines_done group_port::send(std::string_view lines) {
+core::lines_done group_port::send(std::string_view lines) {
     if (!own_.is_open()) {
         return {.bytes = lines.size()}; // all of it is lost
     }
-    lines_done taken;
+    core::lines_done taken;
     bool room = unsent() == 0;
     while (room && taken.bytes < lines.size()) {
         const auto sent = burst_.send(lines.substr(taken.bytes), &group_);

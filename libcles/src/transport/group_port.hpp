@@ -3,10 +3,10 @@
 
 #include <cles/multicast.hpp>
 
+#include "port/group_port.hpp"
+#include "port/network_interface.hpp"
 #include "transport/datagram_burst.hpp"
-#include "transport/group_events.hpp"
 #include "transport/group_receiver.hpp"
-#include "transport/ip_interface.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/udp.hpp>
@@ -18,28 +18,21 @@
 
 namespace cles::transport {
 
-/// A node's place in a multicast group, by one interface: where it receives the group, and a socket of its own to send
-/// from, which tells the others who it is for as long as the node runs.
-class group_port : public std::enable_shared_from_this<group_port> {
+/// A place in a multicast group over UDP: receives by a socket that nodes on one executor share, and sends from one of
+/// its own.
+class group_port final : public core::group_port, public std::enable_shared_from_this<group_port> {
   public:
     using udp = boost::asio::ip::udp;
 
     /// Joins. \throws boost::system::system_error
-    group_port(const boost::asio::any_io_executor& executor, const ip_interface& by, const multicast_options& where);
+    group_port(const boost::asio::any_io_executor& executor, const core::network_interface& by,
+               const multicast_options& where);
 
-    /// Begins to hand over what comes. The owner stays until `close`.
-    void start(group_events& owner);
-    /// Sends whole lines, each with its LF as one datagram; what finds no room in the socket waits for it. A datagram
-    /// that cannot be sent for another reason is as good as lost on its way.
-    /// \return what it took; less than all where as much waits as may
-    lines_done send(std::string_view lines);
-    /// Bytes that wait for room.
-    [[nodiscard]] std::size_t unsent() const noexcept { return waiting_.size() - waiting_at_; }
-    void close();
-
-    /// Where what this node sends comes from.
-    [[nodiscard]] const udp::endpoint& source() const noexcept { return source_; }
-    [[nodiscard]] const udp::endpoint& group() const noexcept { return group_; }
+    void start(core::group_listener& owner) override;
+    core::lines_done send(std::string_view lines) override;
+    [[nodiscard]] std::size_t unsent() const noexcept override { return waiting_.size() - waiting_at_; }
+    void close() override;
+    [[nodiscard]] const core::group_source& source() const noexcept override { return source_; }
 
     static constexpr std::size_t most_waiting = 1U << 16U;
 
@@ -48,11 +41,11 @@ class group_port : public std::enable_shared_from_this<group_port> {
     void wait_for_room();
 
     udp::endpoint group_;
-    udp::endpoint source_;
+    core::group_source source_;
     std::shared_ptr<group_receiver> receiver_;
     udp::socket own_;
     datagram_burst burst_;
-    group_events* owner_ = nullptr; // null: closed
+    core::group_listener* owner_ = nullptr; // null: closed
     std::string waiting_;
     std::size_t waiting_at_ = 0;
     bool waits_for_room_ = false;

@@ -27,7 +27,7 @@ class group_receivers final : public asio::execution_context::service {
 
     explicit group_receivers(asio::execution_context& context) : service(context) {}
 
-    std::shared_ptr<group_receiver> find(const asio::any_io_executor& executor, const ip_interface& by,
+    std::shared_ptr<group_receiver> find(const asio::any_io_executor& executor, const core::network_interface& by,
                                          const asio::ip::udp::endpoint& group) {
         const std::lock_guard lock{mutex_}; // executors of one context may be used by several threads
         std::erase_if(all_, [](const auto& each) { return each.expired(); });
@@ -50,13 +50,17 @@ class group_receivers final : public asio::execution_context::service {
 
 } // namespace
 
-std::shared_ptr<group_receiver> group_receiver::of(const asio::any_io_executor& executor, const ip_interface& by,
-                                                   const udp::endpoint& group) {
+core::group_source source_of(const asio::ip::udp::endpoint& end) {
+    return {.address = end.address().to_v4().to_uint(), .port = end.port()};
+}
+
+std::shared_ptr<group_receiver> group_receiver::of(const asio::any_io_executor& executor,
+                                                   const core::network_interface& by, const udp::endpoint& group) {
     auto& context = asio::query(executor, asio::execution::context);
     return asio::use_service<group_receivers>(context).find(executor, by, group);
 }
 
-group_receiver::group_receiver(const asio::any_io_executor& executor, const ip_interface& by,
+group_receiver::group_receiver(const asio::any_io_executor& executor, const core::network_interface& by,
                                const udp::endpoint& group)
     : group_(group), interface_(by.index), socket_(executor, udp::v4()) {
     socket_.set_option(asio::socket_base::reuse_address{true});
@@ -71,11 +75,12 @@ group_receiver::group_receiver(const asio::any_io_executor& executor, const ip_i
 }
 
 // Only its own executor may ask whether the socket is open; from others the executor differs.
-bool group_receiver::is_for(const asio::any_io_executor& executor, const ip_interface& by, const udp::endpoint& group) {
+bool group_receiver::is_for(const asio::any_io_executor& executor, const core::network_interface& by,
+                            const udp::endpoint& group) {
     return socket_.get_executor() == executor && interface_ == by.index && group_ == group && socket_.is_open();
 }
 
-void group_receiver::add(group_events& listener, const udp::endpoint& source) {
+void group_receiver::add(core::group_listener& listener, const core::group_source& source) {
     listeners_.push_back({&listener, source});
     ++hearing_;
     filter();
@@ -84,7 +89,7 @@ void group_receiver::add(group_events& listener, const udp::endpoint& source) {
     }
 }
 
-void group_receiver::remove(const group_events& listener) {
+void group_receiver::remove(const core::group_listener& listener) {
     const auto found =
         std::find_if(listeners_.begin(), listeners_.end(), [&](const auto& each) { return each.events == &listener; });
     if (found == listeners_.end()) {
@@ -108,7 +113,7 @@ void group_receiver::filter() {
     if (hearing_ == 1) {
         const auto alone =
             std::find_if(listeners_.begin(), listeners_.end(), [](const auto& each) { return each.events != nullptr; });
-        drop_from(socket_, alone->source);
+        drop_from(socket_, {asio::ip::address_v4{alone->source.address}, alone->source.port});
     } else {
         drop_nothing(socket_);
     }
@@ -164,7 +169,7 @@ bool group_receiver::fetch() {
         more_ = arrived_.fetch(socket_);
         while (!arrived_.empty()) {
             const auto one = arrived_.take();
-            auto& kept = heard_.emplace_back(heard{.from = one.from, .text = one.text});
+            auto& kept = heard_.emplace_back(heard{.from = source_of(one.from), .text = one.text});
             kept.good = protocol::parse_group_message(kept.text, kept.said);
         }
     }

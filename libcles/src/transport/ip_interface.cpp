@@ -46,7 +46,7 @@ class query {
     ifreq request_{};
 };
 
-void take_flags(ip_interface& of, unsigned flags) noexcept {
+void take_flags(core::network_interface& of, unsigned flags) noexcept {
     of.loopback = (flags & IFF_LOOPBACK) != 0;
     of.running = (flags & IFF_UP) != 0 && (flags & IFF_RUNNING) != 0;
     of.multicast = (flags & IFF_MULTICAST) != 0;
@@ -55,11 +55,11 @@ void take_flags(ip_interface& of, unsigned flags) noexcept {
 
 } // namespace
 
-ip_interface find_interface(const std::string& name) {
+core::network_interface find_interface(const std::string& name) {
     if (name.empty() || name.size() >= IFNAMSIZ) {
         refuse(ENODEV);
     }
-    ip_interface found{.name = name};
+    core::network_interface found{.name = name};
     found.index = query{name}.ask(SIOCGIFINDEX).ifr_ifindex;
     const auto flags = query{name}.ask(SIOCGIFFLAGS).ifr_flags;
     if ((flags & IFF_UP) == 0) {
@@ -69,17 +69,17 @@ ip_interface find_interface(const std::string& name) {
     query address{name};
     sockaddr_in in{};
     std::memcpy(&in, &address.ask(SIOCGIFADDR).ifr_addr, sizeof in);
-    found.address = boost::asio::ip::address_v4{ntohl(in.sin_addr.s_addr)};
+    found.address = ntohl(in.sin_addr.s_addr);
     return found;
 }
 
-std::vector<ip_interface> interfaces_of_host() {
+std::vector<core::network_interface> interfaces_of_host() {
     ifaddrs* first = nullptr;
     if (::getifaddrs(&first) != 0) {
         refuse(errno);
     }
     const std::unique_ptr<ifaddrs, decltype(&::freeifaddrs)> entries{first, &::freeifaddrs};
-    std::vector<ip_interface> all;
+    std::vector<core::network_interface> all;
     for (const auto* entry = first; entry != nullptr; entry = entry->ifa_next) {
         const auto index = static_cast<int>(::if_nametoindex(entry->ifa_name));
         auto at = std::find_if(all.begin(), all.end(), [&](const auto& each) { return each.index == index; });
@@ -88,22 +88,13 @@ std::vector<ip_interface> interfaces_of_host() {
             take_flags(*at, entry->ifa_flags);
         }
         if (at != all.end() && entry->ifa_addr != nullptr && entry->ifa_addr->sa_family == AF_INET &&
-            at->address.is_unspecified()) {
+            at->address == 0) {
             sockaddr_in in{};
             std::memcpy(&in, entry->ifa_addr, sizeof in);
-            at->address = boost::asio::ip::address_v4{ntohl(in.sin_addr.s_addr)};
+            at->address = ntohl(in.sin_addr.s_addr);
         }
     }
     std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.index < b.index; });
-    return all;
-}
-
-std::vector<ip_interface> automatic(std::vector<ip_interface> all) {
-    std::erase_if(all, [](const ip_interface& each) {
-        return !each.running || each.address.is_unspecified() || each.point_to_point ||
-               !(each.multicast || each.loopback);
-    });
-    std::stable_partition(all.begin(), all.end(), [](const ip_interface& each) { return each.loopback; });
     return all;
 }
 

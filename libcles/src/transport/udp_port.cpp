@@ -148,7 +148,7 @@ std::shared_ptr<udp_link> udp_port::link_of(const udp::endpoint& sender) {
 
 // -- sending -------------------------------------------------------------------------------------------------------
 
-lines_done udp_port::send(const udp_link& to, std::string_view lines) {
+core::lines_done udp_port::send(const udp_link& to, std::string_view lines) {
     return burst_.send(lines, connected_ ? nullptr : &to.endpoint());
 }
 

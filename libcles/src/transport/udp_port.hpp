@@ -41,7 +41,7 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
     void receive();
     /// Sends whole lines, each with its LF as a datagram. One that cannot be sent is as good as lost on its way.
     /// \return what is done; nothing: the socket has no room just now \pre there is a line
-    lines_done send(const udp_link& to, std::string_view lines);
+    core::lines_done send(const udp_link& to, std::string_view lines);
     void wait_for_room(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }

@@ -27,7 +27,7 @@ if(options)
     message(SEND_ERROR "cles::cles links its users with ${options}")
 endif()
 get_target_property(definitions cles::cles INTERFACE_COMPILE_DEFINITIONS)
-if(NOT "${definitions}" MATCHES "^BOOST_ASIO_[A-Z_]+(;BOOST_ASIO_[A-Z_]+)*$")
+if(NOT "${definitions}" MATCHES "^BOOST_ASIO_NO_DEPRECATED;\\$<[^;]+:BOOST_ASIO_SEPARATE_COMPILATION>$")
     message(SEND_ERROR "cles::cles defines ${definitions}")
 endif()
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // A plugin in C++ that does all that a plugin may, and on demand refuses to start.
+#include <cles/coroutine_handler.hpp>
 #include <cles/plugin.hpp>
 
 #include <boost/asio/awaitable.hpp>

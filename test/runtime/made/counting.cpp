@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// A plugin whose jobs leave a mark in a file when they run, "number node" a line, so that a test sees what became of
-// each: also where nobody is left who could have answered. Noun: task/number/milliseconds of work.
+// A plugin whose jobs append a line "number node" to a file when they run, so that a test sees which ones ran, even if
+// their node cannot answer any more. Noun: task/number/milliseconds of work.
 #include <cles/plugin.hpp>
 
 #include <boost/describe/class.hpp>
@@ -34,7 +34,7 @@ class mark_file {
     mark_file& operator=(const mark_file&) = delete;
     ~mark_file() { ::close(file_); }
 
-    // In one piece, whoever else writes: it is a single write at the end of a file.
+    // A single write at the end of the file, so that lines of several writers do not mix.
     void leave(const cles::request& asked) const {
         const auto line = std::string{asked.parameter(0)} + " " + std::string{asked.node()} + "\n";
         if (::write(file_, line.data(), line.size()) != static_cast<ssize_t>(line.size())) {
@@ -63,7 +63,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
         marks->leave(asked);
         throw std::runtime_error{"as it should"};
     });
-    // Runs as long as anybody waits for it.
+    // Runs until it is stopped.
     to.on_delegate("holds", [marks](const cles::request& asked, const cles::responder& answer) {
         marks->leave(asked);
         while (!answer.stopped()) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A plugin whose tasks do what no task should, and one that is as it should be.
+// A plugin whose tasks misbehave, except for one.
 #include <cles/plugin.hpp>
 
 #include <boost/system/error_code.hpp>
@@ -25,7 +25,7 @@ using namespace std::chrono_literals;
     }
 }
 
-// What a callback blocks on goes with the library's global objects, unless the process ends without destroying them.
+// Callbacks block on this, which is destroyed with the library's global objects unless the process skips that.
 std::atomic<int> blocked_callbacks{0};
 struct global_state {
     ~global_state() {
@@ -35,8 +35,8 @@ struct global_state {
     }
 } const state;
 
-// Writes down when it was called, by the clock that Python calls `time.monotonic_ns`; in one piece, whoever else
-// writes.
+// Appends the time of the call (of the clock that Python calls `time.monotonic_ns`) in a single write, so that lines of
+// several writers do not mix.
 void mark(const std::string& file, const std::string& what) {
     const auto now = std::chrono::steady_clock::now().time_since_epoch();
     const auto line = what + " " + std::to_string(std::chrono::nanoseconds{now}.count()) + "\n";
@@ -47,7 +47,7 @@ void mark(const std::string& file, const std::string& what) {
     ::close(out);
 }
 
-// What jobs do when they are stopped. Noun: task/file of marks/name.
+// What jobs do when they are stopped. Noun: task/file/name.
 void register_stops(cles::registrar& to) {
     to.on_delegate("listens", [](const cles::request& asked, cles::responder answer) {
         const std::string file{asked.parameter(0)};
@@ -68,7 +68,7 @@ void register_stops(cles::registrar& to) {
         });
         mark(file, "begun");
     });
-    // What it controls takes a moment to stop.
+    // It takes a moment to stop.
     to.on_delegate("ends_when_stopped", [](const cles::request& asked, cles::responder answer) {
         const std::string file{asked.parameter(0)};
         mark(file, "begun");
@@ -93,7 +93,7 @@ void register_tasks(cles::registrar& to) {
     to.on_pull("hangs", [] { hang(); });
     to.on_pull("lingers", [] { std::this_thread::sleep_for(50ms); }, {.inline_ok = true});
     to.on_delegate("empty", [] {});
-    // Does not look whether anybody waits.
+    // Does not check whether it is stopped.
     to.on_delegate("never_ends", [](const cles::request&, const cles::responder&) { hang(); });
     to.on_delegate("throws", [](const cles::request&, const cles::responder&) { throw std::runtime_error{"dropped"}; });
     to.on_delegate("throws_anything", [](const cles::request&, const cles::responder&) { throw 7; });
@@ -103,7 +103,7 @@ void register_tasks(cles::registrar& to) {
         answer.fail(cles::errc::failed, "three");
     });
     to.on_delegate("forgets", [](const cles::request&, const cles::responder&) {});
-    // Ends when the file is there, which the test makes.
+    // Ends when the test creates the file.
     to.on_delegate("waits", [](const cles::request& asked, cles::responder answer) {
         const std::string file{asked.parameter(0)};
         answer.log(cles::log_level::info, "waiting");

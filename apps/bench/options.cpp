@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "options.hpp"
+
+#include "options/duration.hpp"
+
+#include <unistd.h>
+
+namespace tool {
+
+bench_options to_options(const bench_arguments& given, measurement what) {
+    bench_options options{.transport = carrier_of(given.transport),
+                          .style = given.style == "callback" ? cles::perf::handler_style::callback
+                                                             : cles::perf::handler_style::coroutine,
+                          .rounds = given.rounds,
+                          .requests = given.requests,
+                          .against = given.against,
+                          .in_flight = given.in_flight,
+                          .one_core = given.one_core,
+                          .keep = given.keep,
+                          .as_json = given.form == "json"};
+    if (!given.duration.empty()) {
+        options.duration = parse_positive_duration(given.duration);
+    }
+    options.how.busy_poll = std::chrono::microseconds{given.busy_poll_us};
+    if (given.wake_within_us) {
+        options.wake_within = std::chrono::microseconds{*given.wake_within_us};
+    }
+    if (!given.binders.empty()) {
+        options.binders = given.binders;
+    } else if (what == measurement::fan_out) {
+        options.binders = {1, 8, 64};
+    }
+    return options;
+}
+
+cles::perf::placement places_of(const bench_options& options) {
+    auto cores = cles::perf::place_ends();
+    if (options.one_core) {
+        cores.server = cores.client;
+    }
+    return cores;
+}
+
+std::optional<std::int64_t> wake_within_us(const bench_options& options) {
+    const auto& within = options.wake_within;
+    return within ? std::optional<std::int64_t>{within->count()} : std::nullopt;
+}
+
+std::chrono::nanoseconds limit_of(const bench_options& options) {
+    return options.duration ? std::chrono::nanoseconds{*options.duration} : std::chrono::nanoseconds::max();
+}
+
+const char* to_string(carrier c) {
+    switch (c) {
+    case carrier::tcp: return "tcp";
+    case carrier::udp: return "udp";
+    case carrier::unix_socket: return "unix";
+    case carrier::inproc: return "inproc";
+    case carrier::multicast: return "multicast";
+    }
+    return "";
+}
+
+const char* to_string(cles::perf::handler_style s) {
+    return s == cles::perf::handler_style::coroutine ? "coroutine" : "callback";
+}
+
+std::string bench_url(carrier c) {
+    switch (c) {
+    case carrier::tcp:
+    case carrier::multicast: return "tcp://127.0.0.1:0";
+    case carrier::udp: return "udp://127.0.0.1:0";
+    case carrier::unix_socket: return "unix://@cles-bench-" + std::to_string(::getpid());
+    case carrier::inproc: return "inproc://cles-bench";
+    }
+    return {};
+}
+
+} // namespace tool

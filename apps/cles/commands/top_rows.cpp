@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "commands/top_rows.hpp"
+
+#include <cles/json_writer.hpp>
+
+#include "output/json_node.hpp"
+#include "output/statistics.hpp"
+#include "output/table.hpp"
+#include "output/terminal.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <optional>
+#include <string_view>
+#include <system_error>
+#include <tuple>
+
+namespace tool {
+namespace {
+
+template <class T>
+std::optional<T> number_in(const json_node* node) {
+    T value{};
+    if (node == nullptr || node->kind != json_node::type::other) {
+        return {};
+    }
+    const auto* end = node->text.data() + node->text.size();
+    const auto [rest, code] = std::from_chars(node->text.data(), end, value);
+    return code == std::errc{} && rest == end ? std::optional{value} : std::nullopt;
+}
+
+double per_second(std::uint64_t before, std::uint64_t after, double seconds) {
+    return after <= before ? 0 : static_cast<double>(after - before) / seconds;
+}
+
+double jobs_per_worker(const top_row& row) {
+    if (!row.node.load) {
+        return 0;
+    }
+    const auto& load = *row.node.load;
+    return (static_cast<double>(load.running) + load.queued) / std::max(1U, load.workers);
+}
+
+std::string number_text(const std::optional<double>& value, int digits) { return value ? fixed(*value, digits) : "-"; }
+
+// In the unit that keeps it short: "6.1 us", "3.22 s".
+std::string time_text(const std::optional<double>& us) {
+    if (!us) {
+        return "-";
+    }
+    if (*us < 999.95) {
+        return fixed(*us, 1) + " us";
+    }
+    return *us < 999'995 ? fixed(*us / 1e3, 2) + " ms" : fixed(*us / 1e6, 2) + " s";
+}
+
+void write_rate(cles::json_writer& w, std::string_view name, const std::optional<double>& value) {
+    if (value) {
+        w.key(name);
+        w.value(rounded(*value, 3));
+    }
+}
+
+} // namespace
+
+node_rate node_rates::update(const std::string& run, std::string_view metrics, time_point now) {
+    const auto document = parse_json(metrics);
+    counters current{.when = now};
+    if (const auto* requests = document.find("requests"); requests != nullptr) {
+        for (const auto& [verb, count] : requests->members) {
+            current.requests += number_in<std::uint64_t>(&count).value_or(0);
+        }
+    }
+    current.errors = number_in<std::uint64_t>(document.find("errors")).value_or(0);
+
+    node_rate out;
+    if (const auto* times = document.find("handler_us");
+        times != nullptr && number_in<std::uint64_t>(times->find("samples")).value_or(0) > 0) {
+        out.p50_us = number_in<double>(times->find("p50"));
+        out.p99_us = number_in<double>(times->find("p99"));
+    }
+    const auto before = last_.find(run);
+    if (before != last_.end() && now > before->second.when) {
+        const auto seconds = std::chrono::duration<double>{now - before->second.when}.count();
+        out.requests =
+            per_second(before->second.requests + 1, current.requests, seconds); // one of them was this request
+        out.errors = per_second(before->second.errors, current.errors, seconds);
+    }
+    last_[run] = current;
+    return out;
+}
+
+void node_rates::remove_before(time_point when) {
+    std::erase_if(last_, [&](const auto& each) { return each.second.when < when; });
+}
+
+void sort_rows(std::vector<top_row>& rows, top_order order) {
+    const auto rank = [&](const top_row& row) {
+        const auto first = order == top_order::load ? -jobs_per_worker(row) : 0.0;
+        const auto second = order == top_order::load ? -row.rate.requests.value_or(0) : 0.0;
+        return std::tuple{first, second, std::string_view{row.node.node}};
+    };
+    std::stable_sort(rows.begin(), rows.end(), [&](const top_row& a, const top_row& b) { return rank(a) < rank(b); });
+}
+
+std::string summary_of(const std::vector<top_row>& rows) {
+    std::uint64_t queued = 0;
+    std::uint64_t running = 0;
+    double requests = 0;
+    for (const auto& row : rows) {
+        if (row.node.load) {
+            queued += row.node.load->queued;
+            running += row.node.load->running;
+        }
+        requests += row.rate.requests.value_or(0);
+    }
+    return std::to_string(rows.size()) + (rows.size() == 1 ? " node, " : " nodes, ") + fixed(requests, 0) +
+           " requests/s, " + std::to_string(running) + " running, " + std::to_string(queued) + " queued";
+}
+
+std::string to_table(const std::vector<top_row>& rows) {
+    table out{"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50", "P99", "HEARD"};
+    const auto number = [&](std::size_t column, std::string text) { out.set(column, std::move(text), true); };
+    for (const auto& row : rows) {
+        const auto& node = row.node;
+        out.row();
+        out.set(0, printable(node.node));
+        out.set(1, printable(node.state));
+        number(2, node.load && node.load->workers != 0 ? std::to_string(node.load->workers) : "-");
+        number(3, node.load ? std::to_string(node.load->running) : "-");
+        number(4, node.load ? std::to_string(node.load->queued) : "-");
+        number(5, number_text(row.rate.requests, 0));
+        number(6, number_text(row.rate.errors, 0));
+        number(7, time_text(row.rate.p50_us));
+        number(8, time_text(row.rate.p99_us));
+        out.set(9, node.last_seen() + (node.error.empty() ? "" : " (" + printable(node.error) + ")"));
+    }
+    return out.text();
+}
+
+std::string to_json(const std::vector<top_row>& rows) {
+    std::string out;
+    cles::json_writer w{out};
+    w.begin_object();
+    w.key("nodes");
+    w.begin_array();
+    for (const auto& row : rows) {
+        w.begin_object();
+        w.key("node");
+        w.value(std::string_view{row.node.node});
+        w.key("state");
+        w.value(std::string_view{row.node.state});
+        if (row.node.load) {
+            w.key("load");
+            write_load(w, *row.node.load);
+        }
+        write_rate(w, "requests_per_s", row.rate.requests);
+        write_rate(w, "errors_per_s", row.rate.errors);
+        write_rate(w, "handler_p50_us", row.rate.p50_us);
+        write_rate(w, "handler_p99_us", row.rate.p99_us);
+        w.key("age_ms");
+        w.value(row.node.age_ms.value_or(0));
+        if (!row.node.error.empty()) {
+            w.key("failure");
+            w.value(std::string_view{row.node.error});
+        }
+        w.end_object();
+    }
+    w.end_array();
+    w.end_object();
+    return out;
+}
+
+} // namespace tool

@@ -1,0 +1,155 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/convert.hpp>
+#include <cles/error.hpp>
+
+#include "client/client.hpp"
+#include "discovery/ask_all.hpp"
+#include "discovery/find_nodes.hpp"
+#include "doctor/checks.hpp"
+#include "output/statistics.hpp"
+
+#include <boost/describe.hpp>
+
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace tool {
+
+using namespace std::chrono_literals;
+namespace asio = boost::asio;
+using steady = std::chrono::steady_clock;
+
+namespace {
+
+constexpr auto query_timeout = 1s;
+constexpr auto announcement_time = 400ms; // until all nodes have announced themselves, with some reserve
+constexpr double max_offset_s = 0.1;
+
+struct protocol_version {
+    int protocol = 1;
+};
+BOOST_DESCRIBE_STRUCT(protocol_version, (), (protocol))
+
+struct time_of_day {
+    double seconds = 0;
+};
+BOOST_DESCRIBE_STRUCT(time_of_day, (), (seconds))
+
+void check_node(const listed_node& node, const node_answer& answer, findings& found) {
+    if (node.state == "clash") {
+        return; // reported by check_names
+    }
+    if (node.endpoints.empty()) {
+        found.warning("nodes", node.node + " does not listen at an address that is reachable from this host",
+                      "let it listen at an address of its network: --listen tcp://0.0.0.0 --insecure");
+    } else if (!answer.error.empty()) {
+        found.failure("nodes",
+                      node.node + " announces itself, but does not answer at " + node.url() + ": " + answer.error,
+                      "check that it runs, and that no firewall on its host blocks the port");
+    } else if (node.state == "suspect") {
+        found.warning("nodes", node.node + " answers, but its announcements are no longer received",
+                      "multicast is lost on the way: IGMP snooping without a querier, or Wi-Fi");
+    }
+}
+
+void check_protocol(const listed_node& node, const std::string& description, findings& found) {
+    try {
+        const auto version = cles::from_json<protocol_version>(description).protocol;
+        if (version != 1) {
+            found.warning("nodes", node.node + " uses version " + std::to_string(version) + " of the protocol, not 1");
+        }
+    } catch (const cles::error&) {
+        found.failure("nodes", "the answer of " + node.node + " is not the description of a node",
+                      "check that " + node.url() + " is a CLES node");
+    }
+}
+
+// The nodes know of a name conflict sooner than this command, which has just started.
+asio::awaitable<void> check_names(client& requester, const std::vector<listed_node>& nodes, findings& found) {
+    auto urls = urls_of(nodes);
+    const auto answers = co_await ask_all(requester, "self:cles/peers", std::move(urls), query_timeout);
+    auto all = nodes;
+    for (const auto& answer : answers) {
+        try {
+            const auto peers = answer.error.empty() ? peers_in(answer.json) : std::vector<listed_node>{};
+            all.insert(all.end(), peers.begin(), peers.end());
+        } catch (const cles::error&) {
+            continue; // check_protocol reports it
+        }
+    }
+    std::set<std::string> names;
+    for (const auto& node : all) {
+        if (node.state == "clash" && names.insert(node.node).second) {
+            found.failure("nodes", "two nodes have the name " + node.node + "; one of them gets no requests",
+                          "give each a unique name: --name of cles serve, node in clesd.yaml");
+        }
+    }
+}
+
+// Compares the clocks of nodes that offer `utc` with this host's, up to half the time that the request takes.
+asio::awaitable<void> compare_clocks(client& requester, const std::vector<listed_node>& nodes, findings& found) {
+    for (const auto& node : nodes) {
+        if (node.endpoints.empty() || !node.offers("pull:utc")) {
+            continue;
+        }
+        std::vector<std::string> url{node.url()};
+        const auto before = std::chrono::system_clock::now();
+        const auto answers = co_await ask_all(requester, "self:utc", std::move(url), query_timeout);
+        const auto after = std::chrono::system_clock::now();
+        double seconds = 0;
+        try {
+            seconds = cles::from_json<time_of_day>(answers.front().json).seconds;
+        } catch (const cles::error&) {
+            continue; // another task of that name
+        }
+        const auto duration = std::chrono::duration<double>{after - before}.count();
+        const auto middle = std::chrono::duration<double>{before.time_since_epoch()}.count() + duration / 2;
+        const auto offset = seconds - middle;
+        if (std::abs(offset) > max_offset_s + duration / 2) {
+            found.warning("clock",
+                          "the clock of " + node.node + " is " + fixed(std::abs(offset), 3) + " s " +
+                              (offset > 0 ? "ahead of" : "behind") + " that of this host",
+                          "synchronise both if their times are compared");
+        }
+    }
+}
+
+std::string count_text(std::size_t nodes) {
+    return nodes == 0 ? "no nodes found" : nodes == 1 ? "1 node found" : std::to_string(nodes) + " nodes found";
+}
+
+} // namespace
+
+asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, findings& found) {
+    if (!addresses.finds_by_name() && !addresses.has_url()) {
+        found.ok("nodes", "no nodes are found without multicast; --at URL asks a node for those that it knows");
+        co_return;
+    }
+    std::vector<listed_node> nodes;
+    try {
+        const auto limit = std::chrono::milliseconds{query_timeout};
+        auto all = co_await find_nodes(requester, addresses, steady::now() + announcement_time, limit);
+        nodes = std::move(all);
+    } catch (const cles::error&) {
+        co_return; // check_ports reports it
+    }
+    auto urls = urls_of(nodes);
+    const auto answers = co_await ask_all(requester, "self:cles", std::move(urls), query_timeout);
+    found.ok("nodes", count_text(nodes.size()));
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        check_node(nodes[i], answers[i], found);
+        if (answers[i].error.empty()) {
+            nodes[i].read_tasks(answers[i].json);
+            check_protocol(nodes[i], answers[i].json, found);
+        }
+    }
+    co_await check_names(requester, nodes, found);
+    co_await compare_clocks(requester, nodes, found);
+}
+
+} // namespace tool

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/error.hpp>
+#include <cles/url.hpp>
+
+#include "client/client.hpp"
+#include "discovery/host.hpp"
+#include "doctor/checks.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address_v4.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/ip/udp.hpp>
+#include <boost/describe.hpp>
+
+#include <chrono>
+#include <concepts>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace tool {
+
+using namespace std::chrono_literals;
+namespace asio = boost::asio;
+
+namespace {
+
+constexpr auto port_timeout = 500ms;
+
+struct listener {
+    std::string node;
+    std::string version;
+};
+BOOST_DESCRIBE_STRUCT(listener, (), (node, version))
+
+/// The node that listens somewhere, or why it is not known.
+struct listener_or_error : listener {
+    std::string error;
+    bool is_node = false; // even if it does not say which
+};
+
+// Only a node answers with these. By datagram, the description of a node with many tasks exceeds the size of an answer.
+bool is_error_of_node(boost::system::error_code code) {
+    return code == cles::errc::too_large || code == cles::errc::denied || code == cles::errc::busy;
+}
+
+asio::awaitable<listener_or_error> identify(client& requester, cles::call_options options) {
+    listener_or_error out;
+    try {
+        const auto answer = co_await requester.node().async_pull<listener>("self:cles", options);
+        out.node = answer.node;
+        out.version = answer.version;
+        out.is_node = true;
+    } catch (const cles::error& e) {
+        out.is_node = is_error_of_node(e.code());
+        out.error = e.message().empty() ? e.code().message() : e.message();
+    }
+    co_return out;
+}
+
+void report_node(const std::string& url, const listener_or_error& node, findings& found) {
+    found.ok("ports", node.node.empty() ? url + ": a node is there, which answers: " + node.error
+                                        : url + ": the node " + node.node + " is there, version " + node.version);
+}
+
+// What a node that wants to listen there would get.
+template <class Protocol>
+boost::system::error_code try_to_bind(asio::io_context& io) {
+    boost::system::error_code code;
+    typename Protocol::socket socket{io};
+    socket.open(Protocol::v4(), code);
+    if constexpr (std::same_as<Protocol, asio::ip::tcp>) {
+        socket.set_option(asio::socket_base::reuse_address{true}, code); // as nodes do; it allows no second listener
+    }
+    socket.bind({asio::ip::address_v4::loopback(), cles::default_port}, code);
+    return code;
+}
+
+asio::awaitable<void> check_default_port(client& requester, std::string_view protocol, findings& found) {
+    const auto url = std::string{protocol} + "://127.0.0.1:" + std::to_string(cles::default_port);
+    const auto code = protocol == "tcp" ? try_to_bind<asio::ip::tcp>(requester.context())
+                                        : try_to_bind<asio::ip::udp>(requester.context());
+    if (!code) {
+        found.ok("ports", url + " is free");
+        co_return;
+    }
+    if (code != asio::error::address_in_use) {
+        found.failure("ports", url + " is not available: " + code.message(),
+                      "check that the interface lo is up: ip link set lo up");
+        co_return;
+    }
+    cles::call_options options;
+    options.at(url).deadline(port_timeout);
+    const auto answer = co_await identify(requester, options);
+    if (answer.is_node) {
+        report_node(url, answer, found);
+        co_return;
+    }
+    const auto process = process_listening_at(protocol, cles::default_port);
+    found.failure("ports",
+                  url + ": " + (process.empty() ? "another program" : process) +
+                      " is there, which is not a node: " + answer.error,
+                  "stop it, or let nodes listen elsewhere: --listen of cles serve, listen in clesd.yaml");
+}
+
+asio::awaitable<void> check_given_address(client& requester, const address_book& addresses, findings& found) {
+    const auto url = addresses.url_for("self");
+    const auto options = requester.options_for("self:cles", port_timeout);
+    const auto answer = co_await identify(requester, options);
+    if (answer.is_node) {
+        report_node(url, answer, found);
+    } else {
+        found.failure("ports", url + " does not answer: " + answer.error,
+                      "start a node there (clesd, or cles serve --listen URL), or list the nodes: cles ls");
+    }
+}
+
+} // namespace
+
+asio::awaitable<void> check_ports(client& requester, const address_book& addresses, findings& found) {
+    if (addresses.has_url()) {
+        co_await check_given_address(requester, addresses, found);
+        co_return;
+    }
+    co_await check_default_port(requester, "tcp", found);
+    co_await check_default_port(requester, "udp", found);
+}
+
+} // namespace tool

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "options/addresses.hpp"
+
+#include <cles/error.hpp>
+#include <cles/link.hpp>
+#include <cles/url.hpp>
+
+#include "options/arguments.hpp"
+#include "output/errors.hpp"
+
+#include <CLI/App.hpp>
+#include <CLI/Option.hpp>
+
+#include <cstdlib>
+
+namespace tool {
+namespace {
+
+cles::multicast_options parse_group(const std::string& text, const std::string& source) {
+    try {
+        return cles::parse_multicast(text);
+    } catch (const cles::error& e) {
+        throw usage_error(source + ": " + e.message());
+    }
+}
+
+void check_url(const std::string& text) {
+    const auto scheme = cles::parse_url(text).scheme;
+    if (cles::find_transport(scheme) == nullptr) {
+        throw usage_error("'" + text + "': there is no transport called " + scheme);
+    }
+}
+
+} // namespace
+
+void multicast_option::add_to(CLI::App& command, const std::string& help) {
+    command
+        .add_option_function<std::string>(
+            "-m,--multicast",
+            [this](const std::string& text) {
+                parse_group(text, "--multicast");
+                given_ = text;
+            },
+            help + " (default CLES_MULTICAST, or else lo)")
+        ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto|off");
+}
+
+cles::multicast_options multicast_option::group() const {
+    if (is_given()) {
+        return parse_group(given_, "--multicast");
+    }
+    if (const char* variable = std::getenv("CLES_MULTICAST"); variable != nullptr && *variable != '\0') {
+        return parse_group(variable, "CLES_MULTICAST");
+    }
+    cles::multicast_options loopback{.interface = "lo"};
+    loopback.required = false;
+    return loopback;
+}
+
+void multicast_option::restrict_to(const std::vector<std::string>& interfaces) {
+    const auto all = group();
+    given_ = interfaces.empty() ? "off" : joined(interfaces, ",") + "," + all.group + ":" + std::to_string(all.port);
+}
+
+std::string joined(const std::vector<std::string>& names, const char* separator) {
+    std::string all;
+    for (const auto& name : names) {
+        all.append(all.empty() ? "" : separator).append(name);
+    }
+    return all;
+}
+
+void address_book::add_options(CLI::App& command, const std::string& multicast_help) {
+    auto* at = command.add_option("-a,--at", at_,
+                                  "Where the node is (default CLES_AT; else it is found by its name, and self is " +
+                                      std::string{default_url} + ")");
+    at->type_name("URL");
+    auto* peer = command.add_option("-p,--peer", peers_, "The URL of the node of that name; may be repeated");
+    peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    multicast_.add_to(command, multicast_help);
+}
+
+std::string address_book::at() const {
+    const char* variable = std::getenv("CLES_AT");
+    return at_.empty() && variable != nullptr ? variable : at_;
+}
+
+void address_book::check() const {
+    if (const auto url = at(); !url.empty()) {
+        check_url(url);
+    }
+    for (const auto& peer : peers_) {
+        const auto equals = peer.find('=');
+        const std::string_view name = std::string_view{peer}.substr(0, equals);
+        if (equals == std::string::npos || !is_name(name)) {
+            throw usage_error("--peer '" + peer + "': write NAME=URL, as in car1=tcp://127.0.0.1:25370");
+        }
+        if (name == "self" || name == "any" || name == "all") {
+            throw usage_error("--peer '" + peer + "': " + std::string{name} + " is not the name of a node");
+        }
+        check_url(peer.substr(equals + 1));
+    }
+}
+
+void address_book::check_discovery() const {
+    if (!finds_by_name() && !has_url()) {
+        throw usage_error("no nodes are found without multicast: select an interface with --multicast IFACE, or ask a "
+                          "node for those that it knows with --at URL");
+    }
+}
+
+std::map<std::string, std::string> address_book::peers() const {
+    std::map<std::string, std::string> out;
+    for (const auto& peer : peers_) {
+        const auto equals = peer.find('=');
+        out[peer.substr(0, equals)] = peer.substr(equals + 1);
+    }
+    return out;
+}
+
+std::string address_book::url_for(std::string_view node) const {
+    if (peers().contains(std::string{node})) {
+        return {};
+    }
+    const auto url = at();
+    if (url.empty() && !peers_.empty()) {
+        throw cles::error(cles::errc::no_target, "there is no --peer '" + std::string{node} + "', and no --at");
+    }
+    if (finds_by_name() && node != "self" && node != "any" && node != "all") {
+        return {};
+    }
+    return url.empty() ? std::string{default_url} : url;
+}
+
+std::string address_book::endpoint_of(std::string_view node) const {
+    const auto known = peers();
+    const auto peer = known.find(std::string{node});
+    return peer != known.end() ? peer->second : url_for(node);
+}
+
+std::string address_book::use_target(const std::string& target) {
+    const bool is_url = target.find("://") != std::string::npos;
+    if (!is_url && !is_name(target)) {
+        throw usage_error("'" + target + "' is neither the name of a node nor a URL such as tcp://10.0.0.7:25370");
+    }
+    if (is_url) {
+        at_ = target;
+    }
+    return (is_url ? "self" : target) + ":cles";
+}
+
+} // namespace tool

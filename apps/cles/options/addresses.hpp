@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/multicast.hpp>
+
+#include <map>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace CLI {
+class App;
+}
+
+namespace tool {
+
+/// Where a node listens by default.
+inline constexpr std::string_view default_url = "tcp://127.0.0.1:25370";
+
+/// --multicast: the interfaces and the group to use for multicast. The default is CLES_MULTICAST, and without that the
+/// loopback interface, if the group can be joined there.
+class multicast_option {
+  public:
+    /// `help` says what the command uses it for.
+    void add_to(CLI::App& command, const std::string& help);
+
+    /// On the command line; the environment does not count.
+    [[nodiscard]] bool is_given() const noexcept { return !given_.empty(); }
+    /// \throws usage_error if it is invalid
+    [[nodiscard]] cles::multicast_options group() const;
+    /// Restricts multicast to these of its interfaces; none turns it off.
+    void restrict_to(const std::vector<std::string>& interfaces);
+
+  private:
+    std::string given_;
+};
+
+/// "lo, eth0"
+std::string joined(const std::vector<std::string>& names, const char* separator = ", ");
+
+/// --at, --peer and --multicast: where the command finds the nodes that it talks to.
+class address_book {
+  public:
+    void add_options(CLI::App& command,
+                     const std::string& multicast_help = "Interfaces on which nodes are found by their names");
+
+    /// Checks what was given. \throws usage_error
+    void check() const;
+    /// For commands that list nodes. \throws usage_error if neither multicast nor a node can name them
+    void check_discovery() const;
+
+    [[nodiscard]] std::map<std::string, std::string> peers() const;
+    /// Without --at and --peer, nodes are found by their announcements, and `self` is at the default address.
+    [[nodiscard]] bool finds_by_name() const { return !has_url() && peers_.empty() && group().is_on(); }
+    /// --at or CLES_AT is set.
+    [[nodiscard]] bool has_url() const { return !at().empty(); }
+    /// The multicast group, which not every command joins.
+    [[nodiscard]] cles::multicast_options group() const { return multicast_.group(); }
+    /// Restricts multicast to these interfaces; none turns it off.
+    void restrict_group_to(const std::vector<std::string>& interfaces) { multicast_.restrict_to(interfaces); }
+    /// --multicast was given.
+    [[nodiscard]] bool has_group() const noexcept { return multicast_.is_given(); }
+    /// The URL to which requests for this node are sent; empty if it is one of the peers, or found by its name.
+    /// \throws cles::error with `no_target`
+    [[nodiscard]] std::string url_for(std::string_view node) const;
+    /// The same, but with the URL of a peer; empty if it is found by its name.
+    [[nodiscard]] std::string endpoint_of(std::string_view node) const;
+
+    /// --at was given; CLES_AT does not count.
+    [[nodiscard]] bool has_at() const noexcept { return !at_.empty(); }
+    /// For a command whose argument is a URL or the name of a node: a URL becomes --at.
+    /// \return the noun that describes the node, "car1:cles". \throws usage_error if the argument is neither
+    std::string use_target(const std::string& target);
+
+  private:
+    [[nodiscard]] std::string at() const;
+
+    std::string at_;
+    std::vector<std::string> peers_;
+    multicast_option multicast_;
+};
+
+} // namespace tool

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "options/arguments.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "output/errors.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <iostream>
+#include <iterator>
+#include <system_error>
+
+namespace tool {
+namespace {
+
+constexpr std::size_t max_name = 64;
+
+bool is_alphanumeric(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9'); }
+
+bool is_hex(char c) { return (c >= '0' && c <= '9') || (c >= 'a' && c <= 'f') || (c >= 'A' && c <= 'F'); }
+
+bool is_name_character(char c) { return is_alphanumeric(c) || c == '_' || c == '-' || c == '.'; }
+
+[[noreturn]] void refuse_noun(std::string_view noun, const std::string& reason) {
+    throw usage_error("'" + std::string{noun} + "': " + reason);
+}
+
+void check_parameter(std::string_view noun, std::string_view parameter) {
+    if (parameter.empty()) {
+        refuse_noun(noun, "a parameter is empty; a noun must not end in '/'");
+    }
+    for (std::size_t i = 0; i < parameter.size(); ++i) {
+        const char c = parameter[i];
+        if (c == '%' && i + 2 < parameter.size() && is_hex(parameter[i + 1]) && is_hex(parameter[i + 2])) {
+            i += 2;
+        } else if (!is_name_character(c) && c != '~' && c != '+') {
+            refuse_noun(noun, "the parameter '" + std::string{parameter} +
+                                  "' may only contain letters, digits and _ - . ~ +; write others as %HH");
+        }
+    }
+}
+
+std::string contents_of(std::istream& in) { return {std::istreambuf_iterator<char>{in}, {}}; }
+
+std::string contents_of_file(const std::string& name) {
+    std::ifstream file{name, std::ios::binary};
+    // A directory can be opened, but not read.
+    if (!file || file.peek() == std::ifstream::traits_type::eof()) {
+        if (!file.is_open() || errno == EISDIR) {
+            throw usage_error("cannot read " + name + ": " + std::generic_category().message(errno));
+        }
+        file.clear();
+    }
+    return contents_of(file);
+}
+
+} // namespace
+
+bool is_name(std::string_view text) {
+    return !text.empty() && text.size() <= max_name && std::all_of(text.begin(), text.end(), is_name_character);
+}
+
+std::string_view target_of(std::string_view noun) { return noun.substr(0, noun.find(':')); }
+
+void check_noun(std::string_view noun) {
+    const auto colon = noun.find(':');
+    if (colon == std::string_view::npos) {
+        refuse_noun(noun, "a noun is NODE:TASK or NODE:TASK/PARAMETER..., as in car1:localization");
+    }
+    if (!is_name(noun.substr(0, colon))) {
+        refuse_noun(noun, "the node before ':' must be 1 to 64 letters, digits, '_', '-', '.'");
+    }
+    auto rest = noun.substr(colon + 1);
+    const auto slash = rest.find('/');
+    if (!is_name(rest.substr(0, slash))) {
+        refuse_noun(noun, "the task after ':' must be 1 to 64 letters, digits, '_', '-', '.'");
+    }
+    while (rest.find('/') != std::string_view::npos) {
+        rest.remove_prefix(rest.find('/') + 1);
+        check_parameter(noun, rest.substr(0, rest.find('/')));
+    }
+}
+
+std::string read_body(const std::string& argument) {
+    std::string text = argument;
+    std::string origin = "the body";
+    if (argument == "-") {
+        origin = "the body from stdin";
+        text = contents_of(std::cin);
+    } else if (argument.starts_with('@')) {
+        origin = argument.substr(1);
+        text = contents_of_file(origin);
+    }
+
+    std::string reason;
+    if (!cles::is_valid_json(text, 32, &reason)) {
+        throw usage_error(origin + " is not valid JSON: " + reason);
+    }
+    const auto kind = cles::json_reader{text}.peek();
+    if (kind != cles::json_reader::kind::object && kind != cles::json_reader::kind::array) {
+        throw usage_error(origin + " must be an object or an array, as in {\"value\":1}");
+    }
+    std::string line;
+    cles::append_compact_json(text, line);
+    return line;
+}
+
+} // namespace tool

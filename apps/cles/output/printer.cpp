@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "output/printer.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "output/terminal.hpp"
+
+#include <CLI/App.hpp>
+#include <CLI/Option.hpp>
+#include <CLI/Validators.hpp>
+
+#include <map>
+#include <string>
+#include <utility>
+
+namespace tool {
+
+void add_output_option(CLI::App& command, output_format& format) {
+    const std::map<std::string, output_format> names{
+        {"table", output_format::table}, {"json", output_format::json}, {"raw", output_format::raw}};
+    command
+        .add_option_function<std::string>(
+            "-o,--output", [&format, names](const std::string& name) { format = names.at(name); },
+            "table, json (one document per line) or raw (as it came); default: table on a terminal, else json")
+        ->type_name("FORMAT")
+        ->check(CLI::IsMember({"table", "json", "raw"}).description(""));
+}
+
+void add_json_option(CLI::App& command, bool& json, const std::string& documents) {
+    command
+        .add_option_function<std::string>(
+            "-o,--output", [&json](const std::string& name) { json = name == "json"; },
+            "text, or json: " + documents + " (default text)")
+        ->type_name("FORMAT")
+        ->check(CLI::IsMember({"text", "json"}).description(""));
+}
+
+output_format resolved(output_format format) {
+    if (format != output_format::automatic) {
+        return format;
+    }
+    return is_terminal(stream::out) ? output_format::table : output_format::json;
+}
+
+void printer::print(std::string_view json, std::vector<json_cell> leading) {
+    std::string text;
+    switch (format_) {
+    case output_format::raw: text.append(json).append("\n"); break;
+    case output_format::table: text = stream_ ? rows_.add(json, std::move(leading)) : to_table(json); break;
+    case output_format::json:
+    case output_format::automatic:
+        cles::append_compact_json(json, text);
+        text.append("\n");
+        break;
+    }
+    write_output(text);
+}
+
+} // namespace tool

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace tool {
+
+enum class stream { out = 1, err = 2 };
+
+bool is_terminal(stream s);
+
+/// Whether to colour: only on a terminal with colours, and never where NO_COLOR is set (no-color.org).
+bool has_colours(stream s);
+
+/// The text in bold, where the stream supports it.
+std::string bold(stream s, std::string_view text);
+/// The text in red, where the stream supports it.
+std::string red(stream s, std::string_view text);
+
+/// Makes text from elsewhere safe for a terminal: control characters, and those that change the direction of writing,
+/// become escapes, so that a peer's text cannot control the terminal.
+std::string printable(std::string_view text);
+
+/// The columns that printable text takes, counting characters.
+std::size_t width_of(std::string_view text);
+
+/// The text, filled with spaces up to that width, at its left or right.
+std::string padded(std::string text, std::size_t width, bool align_right = false);
+
+/// Writes all of the text to stdout, at once, so that the reader of a pipe sees each document as soon as it is there.
+/// \throws output_closed, output_interrupted, or a system error
+void write_output(std::string_view text);
+
+/// Writes the text to stderr in one call, so that lines of several processes do not mix.
+void write_stderr(std::string_view text);
+
+/// Whether the reader of stdout is gone, where that can be determined without writing.
+bool is_output_closed();
+
+} // namespace tool

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/run.hpp>
+#include <cles/wake_bound.hpp>
+
+#include "client/logging.hpp"
+#include "commands.hpp"
+#include "options/addresses.hpp"
+#include "output/errors.hpp"
+#include "output/terminal.hpp"
+#include "serve/demo_node.hpp"
+
+#include <boost/asio/signal_set.hpp>
+
+#include <CLI/App.hpp>
+#include <CLI/Option.hpp>
+#include <CLI/Validators.hpp>
+
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace tool {
+
+namespace asio = boost::asio;
+
+namespace {
+
+struct serve_arguments {
+    std::string name = "car1";
+    std::string pool;
+    bool allow_clash = false;
+    std::vector<std::string> listen;
+    bool insecure = false;
+    std::vector<std::string> networks;
+    multicast_option multicast;
+    double rate = 10;
+    int busy_poll_us = 0;
+    int real_time = 0;
+    std::optional<int> wake_within_us;
+};
+
+cles::service_options options_of(const serve_arguments& args, const cles::log_sink& log) {
+    cles::service_options options;
+    options.name = args.name;
+    const char* pool = std::getenv("CLES_POOL");
+    options.pool = args.pool.empty() && pool != nullptr ? pool : args.pool;
+    options.listen = args.listen;
+    if (options.listen.empty()) {
+        options.listen.emplace_back(default_url);
+    }
+    for (const auto& where : options.listen) {
+        if (where.starts_with("inproc:")) {
+            throw usage_error("--listen '" + where + "': it cannot be reached from outside this process");
+        }
+    }
+    options.insecure = args.insecure;
+    options.networks = args.networks;
+    options.multicast = args.multicast.group();
+    options.log = log;
+    return options;
+}
+
+int serve(const serve_arguments& args, int verbosity) {
+    const auto log = make_server_log(verbosity);
+    std::optional<cles::wake_bound> latency_limit;
+    if (args.wake_within_us) {
+        latency_limit.emplace(std::chrono::microseconds{*args.wake_within_us});
+    }
+    asio::io_context io{1};
+    asio::signal_set signals{io, SIGINT, SIGTERM};
+    int code = exit_code::success;
+    demo_node* running = nullptr;
+    auto options = options_of(args, log);
+    if (!args.allow_clash) {
+        options.on_name_taken = [&](std::string_view where) {
+            log(cles::log_level::error, "stopping: the node at " + std::string{where} + " had the name '" + args.name +
+                                            "' first; --name gives another, --allow-clash goes on");
+            code = exit_code::local_failure;
+            signals.cancel();
+            running->stop();
+        };
+    }
+    demo_node node{io, std::move(options), args.rate};
+    running = &node;
+
+    signals.async_wait([&](boost::system::error_code failed, int signal) {
+        if (!failed) {
+            log(cles::log_level::info, signal == SIGINT ? "stopping on SIGINT" : "stopping on SIGTERM");
+            node.stop();
+        }
+    });
+    for (const auto& endpoint : node.service().endpoints()) {
+        write_output(args.name + " listening on " + endpoint + "\n");
+    }
+    cles::run(io, {.busy_poll = std::chrono::microseconds{args.busy_poll_us},
+                   .fifo_priority = args.real_time,
+                   .lock_memory = args.real_time != 0});
+    return code;
+}
+
+} // namespace
+
+void add_serve(CLI::App& app, context& shared) {
+    auto args = std::make_shared<serve_arguments>();
+    auto* command = app.add_subcommand("serve", "Run a node to experiment with");
+    command->add_option("--name", args->name, "The name of the node (default car1)")->type_name("NAME");
+    command
+        ->add_option("--pool", args->pool,
+                     "The pool it belongs to; it does not see nodes of other pools (default CLES_POOL)")
+        ->type_name("NAME");
+    command->add_flag("--allow-clash", args->allow_clash, "Keep running if another live node already has its name");
+    command
+        ->add_option("-l,--listen", args->listen,
+                     "Where it listens; port 0: any free port; may be repeated (default " + std::string{default_url} +
+                         ")")
+        ->type_name("URL")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    command->add_option("--rate", args->rate, "Localizations published per second; 0: only on PULL (default 10)")
+        ->type_name("HZ")
+        ->check(CLI::Range(0.0, 1e6).description(""));
+    command
+        ->add_option("--busy-poll", args->busy_poll_us,
+                     "Microseconds to poll for work before sleeping: faster answers, more processor time (default 0)")
+        ->type_name("US")
+        ->check(CLI::Range(0, 1'000'000).description(""));
+    command
+        ->add_option("--real-time", args->real_time,
+                     "Run under SCHED_FIFO with this priority, 1 to 99, with all memory locked")
+        ->type_name("PRIO")
+        ->check(CLI::Range(1, 99).description(""));
+    command
+        ->add_option("--wake-within", args->wake_within_us,
+                     "Limit the wake-up latency of the processor to this many microseconds; 0: it never sleeps (needs "
+                     "/dev/cpu_dma_latency)")
+        ->type_name("US")
+        ->check(CLI::Range(0, 1'000'000).description(""));
+    command->add_flag("--insecure", args->insecure,
+                      "Allow listening and multicast beyond this host, where anyone may send any request");
+    command
+        ->add_option("--network", args->networks,
+                     "Hosts to which UDP answers are not limited, as in 10.0.0.0/8; may be repeated")
+        ->type_name("NETWORK")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    args->multicast.add_to(
+        *command, "Interfaces on which it is found by its name, and publishes to those that bind by multicast");
+    command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
+                    "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop it.\n\n"
+                    "Examples:\n"
+                    "  cles serve\n"
+                    "  cles serve --name car2 --listen tcp://127.0.0.1:0 --listen unix:///tmp/car2.sock --rate 50\n"
+                    "  cles serve --listen tcp://0.0.0.0 --insecure\n"
+                    "  cles serve --listen tcp://127.0.0.1 --listen udp://127.0.0.1\n"
+                    "  cles serve --multicast eth0 --insecure");
+    command->callback([args, &shared] { shared.exit_code = serve(*args, shared.verbosity); });
+}
+
+} // namespace tool

@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "asio/asio_environment.hpp"
+
+#include <cles/link.hpp>
+
+#include "asio/boottime_timer.hpp"
+#include "transport/group_port.hpp"
+#include "transport/inproc.hpp"
+#include "transport/ip_interface.hpp"
+
+#include <boost/asio/execution/context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/query.hpp>
+
+#include <cstdint>
+#include <utility>
+
+namespace cles::asio_port {
+namespace asio = boost::asio;
+
+namespace {
+
+/// A task as a function of the executor, which discards it where its execution context is destroyed.
+class posted_task {
+  public:
+    explicit posted_task(std::shared_ptr<core::task> next) noexcept : task_(std::move(next)) {}
+    posted_task(posted_task&&) noexcept = default;
+    posted_task(const posted_task&) = delete;
+    posted_task& operator=(const posted_task&) = delete;
+    posted_task& operator=(posted_task&&) = delete;
+    ~posted_task() {
+        if (task_) {
+            task_->discard();
+        }
+    }
+
+    void operator()() { std::exchange(task_, nullptr)->run(); }
+
+  private:
+    std::shared_ptr<core::task> task_;
+};
+
+} // namespace
+
+class asio_environment::timer : public std::enable_shared_from_this<timer> {
+  public:
+    timer(const asio::any_io_executor& executor, std::function<void()> due) : timer_(executor), due_(std::move(due)) {}
+
+    void set(time_point due) {
+        timer_.set(due);
+        wait();
+    }
+    void stop() {
+        due_ = nullptr;
+        timer_.cancel();
+    }
+
+  private:
+    void wait() {
+        if (!due_ || std::exchange(waiting_, true)) {
+            return;
+        }
+        timer_.async_wait([self = shared_from_this()](boost::system::error_code code) {
+            self->waiting_ = false;
+            if (code || !self->due_) {
+                return;
+            }
+            if (self->timer_.take()) {
+                self->due_();
+            } else { // it was set anew while this was on its way
+                self->wait();
+            }
+        });
+    }
+
+    boottime_timer timer_;
+    std::function<void()> due_; // empty: stopped
+    bool waiting_ = false;
+};
+
+asio_environment::~asio_environment() = default;
+
+void asio_environment::post(std::shared_ptr<core::task> next) { asio::post(executor_, posted_task{std::move(next)}); }
+
+void asio_environment::start_timer(std::function<void()> due) {
+    timer_ = std::make_shared<timer>(executor_, std::move(due));
+}
+
+void asio_environment::set_timer(time_point due) {
+    if (timer_) {
+        timer_->set(due);
+    }
+}
+
+void asio_environment::stop_timer() {
+    if (timer_) { // not where making it has failed
+        timer_->stop();
+    }
+}
+
+bool asio_environment::has_transport(std::string_view scheme) const { return find_transport(scheme) != nullptr; }
+
+bool asio_environment::is_exposed(const url& where) const {
+    const auto* by = find_transport(where.scheme);
+    return by != nullptr && by->is_exposed(where);
+}
+
+std::unique_ptr<acceptor> asio_environment::listen(const url& where, const limits& bounds) {
+    return find_transport(where.scheme)->listen(executor_, where, bounds);
+}
+
+std::function<void()> asio_environment::dial(const url& where, const limits& bounds, dial_callback done) {
+    return find_transport(where.scheme)->dial(executor_, where, bounds, std::move(done));
+}
+
+std::string asio_environment::local_scope() const {
+    const auto& context = asio::query(executor_, asio::execution::context);
+    return "context/" + std::to_string(reinterpret_cast<std::uintptr_t>(&context));
+}
+
+bool asio_environment::is_open(const std::string& name) const { return transport::is_open(name); }
+
+std::vector<core::network_interface> asio_environment::interfaces() { return transport::interfaces_of_host(); }
+
+core::network_interface asio_environment::find_interface(const std::string& name) {
+    return transport::find_interface(name);
+}
+
+std::shared_ptr<core::group_port> asio_environment::join(const core::network_interface& by,
+                                                         const multicast_options& where) {
+    return std::make_shared<transport::group_port>(executor_, by, where);
+}
+
+} // namespace cles::asio_port

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSL-1.0
+// The parts of the operations that do not depend on the type of their handler.
+#include <cles/completion.hpp>
+#include <cles/feed.hpp>
+#include <cles/reply_operation.hpp>
+
+#include <boost/asio/dispatch.hpp>
+#include <boost/asio/execution/context.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/query.hpp>
+#include <boost/asio/system_executor.hpp>
+
+#include <utility>
+
+namespace cles::detail {
+namespace asio = boost::asio;
+
+// --- Handlers on other executors ---
+
+void dispatch_call(const asio::any_io_executor& executor, remote_call_ptr call) {
+    asio::dispatch(executor, [call = std::move(call)]() mutable { call.release()->call(); });
+}
+
+void post_call(const asio::any_io_executor& executor, remote_call_ptr call) {
+    asio::post(executor, [call = std::move(call)]() mutable { call.release()->call(); });
+}
+
+std::exception_ptr failure_of(boost::system::error_code code, std::string_view message) {
+    return code ? std::make_exception_ptr(error(code, std::string{message})) : std::exception_ptr{};
+}
+
+handler_executor::handler_executor(const asio::any_io_executor& own, const asio::any_io_executor& service) {
+    if (own != service) {
+        work_.emplace(own);
+        namespace execution = asio::execution;
+        elsewhere_ = &asio::query(own, execution::context) != &asio::query(asio::system_executor{}, execution::context);
+    }
+}
+
+void handler_executor::dispatch(remote_call_ptr call) && {
+    dispatch_call(work_->get_executor(), std::move(call));
+    work_.reset();
+}
+
+// --- Feeds ---
+
+void next_withdrawal::operator()() const {
+    const auto withdraw = [weak = feed, waiting = operation] {
+        if (const auto alive = weak.lock()) {
+            alive->cancel(waiting);
+        }
+    };
+    if (executor) {
+        asio::dispatch(executor, withdraw);
+    } else {
+        withdraw();
+    }
+}
+
+void dispatch_next(std::shared_ptr<feed_control> control, event_ptr operation) {
+    const auto executor = control->executor();
+    asio::dispatch(executor, [control = std::move(control), operation = std::move(operation)]() mutable {
+        control->next(std::move(operation));
+    });
+}
+
+void dispatch_close(std::shared_ptr<feed_control> control, const asio::any_io_executor& service) {
+    asio::dispatch(service, [control = std::move(control)] { control->close(); });
+}
+
+// --- Results ---
+
+pending::verdict judge_unread(const json_reader& reader, std::string_view json, boost::system::error_code& code,
+                              std::string& why, std::string_view what) {
+    if (!is_valid_answer(json)) {
+        return pending::verdict::malformed;
+    }
+    code = errc::conversion;
+    why = std::string{what} + " does not fit: " + reader.error();
+    return pending::verdict::completed;
+}
+
+void judge_thrown(const std::exception& thrown, boost::system::error_code& code, std::string& why,
+                  std::string_view what) {
+    code = errc::conversion;
+    why = std::string{what} + " cannot be read: " + thrown.what();
+}
+
+} // namespace cles::detail

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "daemon/daemon.hpp"
+
+#include "config/config.hpp"
+#include "config/config_file.hpp"
+#include "config/config_values.hpp"
+#include "jobs/pooled_registrar.hpp"
+#include "plugins/plugin_search.hpp"
+#include "plugins/plugin_start_guard.hpp"
+#include "plugins/plugin_trial.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <csignal>
+#include <utility>
+
+namespace cles::runtime {
+namespace {
+
+using namespace std::chrono_literals;
+using std::chrono::milliseconds;
+using std::chrono::steady_clock;
+
+constexpr int exit_configuration_error = 2;
+constexpr std::chrono::seconds start_limit{10};
+
+service_options options_of(const config& setup, const daemon_log& log) {
+    service_options options{.name = setup.node};
+    options.pool = setup.pool;
+    options.listen = setup.listen;
+    options.peers = setup.peers;
+    options.insecure = setup.insecure;
+    options.networks = setup.networks;
+    options.multicast = setup.multicast;
+    options.limits = setup.limits;
+    options.log = log.sink();
+    options.routing = cles::routing();
+    options.gossip = cles::gossip(setup.seeds); // without any, this node may be the seed of others
+    return options;
+}
+
+pool_options pool_options_of(const config& setup, const daemon_log& log) {
+    pool_options options;
+    options.workers = setup.workers;
+    options.queue = setup.queue;
+    options.replacements = setup.replacements;
+    options.grace = std::chrono::ceil<milliseconds>(setup.stuck_after);
+    options.check_interval = 250ms;
+    options.log = log.sink();
+    return options;
+}
+
+plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
+    plugin_host_options options{.node = setup.node};
+    options.folders = plugin_search_path(setup);
+    options.trial = 0ms; // they were tried before threads were started
+    options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
+        log.write(level, std::string{plugin} + ": " + std::string{text});
+    };
+    return options;
+}
+
+std::string counted(std::size_t count, const char* what) {
+    return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+// The settings that a reload does not change, as text to compare.
+std::string fixed_part(config setup) {
+    setup.seeds.clear();
+    setup.log = {};
+    setup.origins.clear();
+    return to_yaml(setup);
+}
+
+} // namespace
+
+daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log,
+               const service_manager& manager)
+    : io_(io), setup_(std::move(setup)), sources_(std::move(sources)), log_(log), service_manager_(manager),
+      service_(io,
+               [this] {
+                   auto options = options_of(setup_, log_);
+                   options.load = [this] { return has_pool_ ? pool_.load() : node_load{}; };
+                   if (!setup_.allow_clash) {
+                       options.on_name_taken = [this](std::string_view where) { on_name_conflict(where); };
+                   }
+                   options.metrics = [this](json_writer& w) { write_metrics(w); };
+                   return options;
+               }()),
+      pool_(service_, pool_options_of(setup_, log)), plugins_(host_options_of(setup_, log)),
+      signals_(io, SIGTERM, SIGINT, SIGHUP) {
+    wait_for_signal();
+    has_pool_ = true;
+    try {
+        load_plugins();
+    } catch (...) {
+        service_.stop(); // while everything that it uses exists
+        throw;
+    }
+}
+
+daemon::~daemon() { service_.stop(); }
+
+void daemon::load_plugins() {
+    pooled_registrar tasks{service_, pool_};
+    for (std::size_t i = 0; i < setup_.plugins.size(); ++i) {
+        const auto& wanted = setup_.plugins[i];
+        if (!wanted.trial_error.empty()) {
+            log_.warning(wanted.trial_error + " (continuing without it)");
+            continue;
+        }
+        try {
+            const auto path = resolve_plugin_path(setup_, wanted);
+            const plugin_start_guard guard{"clesd: " + setup_.location_of("plugins[" + std::to_string(i) + "].path") +
+                                               ": " + path,
+                                           exit_configuration_error, start_limit};
+            plugins_.load(path, wanted.config, tasks);
+        } catch (const plugin_error& e) {
+            const auto message = plugin_error_message(setup_, i, e);
+            if (wanted.required) {
+                throw config_error(message);
+            }
+            log_.warning(message + " (continuing without it)");
+            continue;
+        }
+        const auto& loaded = plugins_.plugins().back();
+        log_.info("plugin " + loaded.name + " " + loaded.version + " with " + counted(loaded.tasks.size(), "task") +
+                  " from " + loaded.path);
+    }
+}
+
+void daemon::write_metrics(json_writer& w) const {
+    w.key("pool");
+    write_json(w, pool_.figures());
+    const auto figures = plugins_.figures();
+    w.key("plugins");
+    w.begin_object();
+    w.key("loaded");
+    w.value(std::uint64_t{plugins_.plugins().size()});
+    w.key("jobs");
+    w.value(std::uint64_t{figures.jobs});
+    w.key("answered_twice");
+    w.value(figures.answered_twice);
+    w.end_object();
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void daemon::wait_for_signal() {
+    signals_.async_wait([this](boost::system::error_code code, int signal) {
+        if (code) {
+            return;
+        }
+        wait_for_signal(); // first, because stopping and reloading may cancel it
+        if (signal == SIGHUP) {
+            reload();
+        } else {
+            stop(signal);
+        }
+    });
+}
+
+void daemon::stop(int signal) {
+    const std::string name = signal == SIGINT ? "SIGINT" : "SIGTERM";
+    if (std::exchange(signalled_, true)) {
+        log_.warning("stopping immediately on a second signal");
+        stopped_at_once_ = true;
+        finish();
+        return;
+    }
+    if (std::exchange(stopping_, true)) {
+        log_.info(name + ": already stopping; a second signal stops immediately");
+        return;
+    }
+    stop_begun_ = steady_clock::now();
+    const auto load = pool_.load();
+    log_.info("stopping on " + name + "; " + counted(load.running, "job") + " running, " + std::to_string(load.queued) +
+              " waiting");
+    drain();
+}
+
+void daemon::on_name_conflict(std::string_view where) {
+    if (std::exchange(stopping_, true)) {
+        return;
+    }
+    lost_name_ = true;
+    stop_begun_ = steady_clock::now();
+    log_.error("stopping: the node at " + std::string{where} + " had the name '" + setup_.node +
+               "' first; choose another name (--node), or allow it (--allow-clash)");
+    drain();
+}
+
+void daemon::drain() {
+    if (!service_manager_.stopping()) {
+        log_.warning("the service manager could not be notified");
+    }
+    service_.leave(); // so that other nodes send no jobs that would be refused
+    pool_.drain(std::chrono::ceil<milliseconds>(setup_.drain), [this](const drain_report& report) { close(report); });
+}
+
+milliseconds daemon::time_left() const {
+    return std::chrono::floor<milliseconds>(stop_begun_ + setup_.drain - steady_clock::now());
+}
+
+void daemon::close(const drain_report& report) {
+    if (report.abandoned > 0) {
+        log_.warning(counted(report.abandoned, "job") + " did not end in time");
+    }
+    // Forwarded requests, and those that plugins serve without workers, have to be answered too.
+    service_.async_close(std::max<milliseconds>(time_left(), 100ms), [this](boost::system::error_code) { finish(); });
+}
+
+void daemon::finish() {
+    if (std::exchange(finished_, true)) {
+        return;
+    }
+    // Plugins may use the remaining time to stop, and at least `min_stop_time`: only a plugin that blocks takes so
+    // long.
+    const auto stopped = plugins_.stop(
+        stopped_at_once_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::min_stop_time, 2000ms));
+    for (const auto& name : stopped.late) {
+        log_.warning("plugin " + name + " did not stop in time");
+    }
+    if (stopped.callbacks > 0) {
+        log_.warning(counted(stopped.callbacks, "on_stop callback") + " of plugins did not return");
+    }
+    unfinished_work_ = !stopped.late.empty() || stopped.callbacks > 0;
+    service_.stop();
+    close_pool();
+    signals_.cancel();
+    log_.info("stopped");
+    // A job that does not end is still watched, and keeps the context running.
+    boost::asio::post(io_, [this] { io_.stop(); });
+}
+
+// Closed here, and not in the destructor, to find out whether work is unfinished. Jobs that were told to stop at the
+// end of the drain get a moment to do so.
+void daemon::close_pool() {
+    if (!stopped_at_once_) {
+        unfinished_work_ = pool_.close(std::clamp<milliseconds>(time_left(), 100ms, 2000ms)) > 0 || unfinished_work_;
+    }
+}
+
+// -- reload --------------------------------------------------------------------------------------------------------
+
+void daemon::reload() {
+    bool notified = service_manager_.reloading(steady_clock::now());
+    try {
+        auto fresh = load(sources_);
+        log_.set(fresh.log);
+        log_.info("reloaded the configuration: " + counted(fresh.seeds.size(), "seed") + ", log " +
+                  std::string{to_string(fresh.log.level)});
+        if (fixed_part(fresh) != fixed_part(setup_)) {
+            log_.warning("other changes of the configuration take effect at the next start");
+        }
+        service_.set_gossip(cles::gossip(fresh.seeds));
+        setup_.seeds = fresh.seeds;
+        setup_.log = fresh.log;
+    } catch (const config_error& e) {
+        log_.error(std::string{"kept the old configuration, because the new one cannot be used: "} + e.what());
+    }
+    notified = service_manager_.ready() && notified;
+    if (!notified) {
+        log_.warning("the service manager could not be notified");
+    }
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/service.hpp>
+
+#include "config/config.hpp"
+#include "config/config_sources.hpp"
+#include "daemon/daemon_log.hpp"
+#include "daemon/service_manager.hpp"
+#include "jobs/job_pool.hpp"
+#include "plugins/plugin_host.hpp"
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/signal_set.hpp>
+
+#include <chrono>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::runtime {
+
+/// `clesd`: a node that runs plugins on its workers until it is told to stop.
+///
+/// To be used on the thread that runs the context. After SIGTERM or SIGINT it admits no more jobs, lets the running
+/// ones end within `config::drain`, and stops the context; a second signal stops it at once. It also stops if another
+/// live node had its name first, unless `config::allow_clash` is set.
+class daemon {
+  public:
+    /// Loads the plugins and listens. \param log, manager have to outlive this
+    /// \throws config_error if a required plugin cannot be used; cles::error as `service` does
+    daemon(boost::asio::io_context& io, config setup, config_sources sources, daemon_log& log,
+           const service_manager& manager);
+    daemon(const daemon&) = delete;
+    daemon& operator=(const daemon&) = delete;
+    ~daemon();
+
+    [[nodiscard]] std::vector<std::string> endpoints() const { return service_.endpoints(); }
+    /// Whether it stopped because another live node had its name first.
+    [[nodiscard]] bool lost_name() const noexcept { return lost_name_; }
+    /// Whether a job, an `on_stop` callback or a plugin has not ended: the process then has to end with `std::_Exit`,
+    /// without waiting for it.
+    [[nodiscard]] bool has_unfinished_work() const noexcept { return stopped_at_once_ || unfinished_work_; }
+
+  private:
+    void load_plugins();
+    void write_metrics(json_writer& w) const;
+    void wait_for_signal();
+    void stop(int signal);
+    void on_name_conflict(std::string_view where);
+    void drain();
+    void close(const drain_report& report);
+    void finish();
+    void close_pool();
+    [[nodiscard]] std::chrono::milliseconds time_left() const;
+    void reload();
+
+    boost::asio::io_context& io_;
+    config setup_;
+    const config_sources sources_;
+    daemon_log& log_;
+    const service_manager& service_manager_;
+    bool has_pool_ = false; // whether the service may read its load
+    service service_;
+    job_pool pool_;
+    plugin_host plugins_;
+    boost::asio::signal_set signals_;
+    std::chrono::steady_clock::time_point stop_begun_;
+    bool stopping_ = false;
+    bool signalled_ = false;
+    bool stopped_at_once_ = false; // by a second signal: unfinished work is unknown
+    bool finished_ = false;
+    bool unfinished_work_ = false;
+    bool lost_name_ = false;
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/log.hpp>
+
+#include "config/config.hpp"
+
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+namespace spdlog {
+class logger;
+} // namespace spdlog
+
+namespace cles::runtime {
+
+/// A log entry for people, on one line: "sat1 tcp://127.0.0.1:4242 id=7: denied". Control characters are escaped, so
+/// that a peer's text can neither control a terminal nor start a new line.
+std::string format_text(std::string_view node, const log_entry& entry);
+
+/// The same as the members of a JSON object, without braces: `"node":"sat1","peer":"tcp://…","id":7,"message":"…"`.
+/// Missing ones are omitted.
+std::string format_json(std::string_view node, const log_entry& entry);
+
+/// The daemon's log, on stderr: text, in colour on a terminal (unless NO_COLOR is set), or JSON, one object per line.
+/// May be used from any thread.
+class daemon_log {
+  public:
+    daemon_log(std::string node, log_config how);
+
+    /// Changes level and format.
+    void set(log_config how);
+    void write(log_level level, const log_entry& entry) const;
+
+    void info(std::string_view text) const { write(log_level::info, text); }
+    void warning(std::string_view text) const { write(log_level::warning, text); }
+    void error(std::string_view text) const { write(log_level::error, text); }
+
+    /// For functions that take a sink; the log has to outlive it.
+    [[nodiscard]] log_sink sink() const;
+
+  private:
+    const std::string node_;
+    const std::shared_ptr<spdlog::logger> logger_;
+    mutable std::mutex mutex_; // so that a line is formatted and written in one format
+    log_format format_;
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,540 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "jobs/job_dispatcher.hpp"
+
+#include "jobs/service_time.hpp"
+
+#include <boost/asio/execution/outstanding_work.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/prefer.hpp>
+
+#include <algorithm>
+#include <mutex>
+#include <utility>
+
+namespace cles::runtime {
+
+void drain_operation::begin(std::chrono::milliseconds limit, std::function<void()> on_limit,
+                            std::function<void(const drain_report&)> done) {
+    done_ = std::move(done);
+    limit_->expires_after(limit);
+    limit_->async_wait([on_limit = std::move(on_limit)](boost::system::error_code code) {
+        if (!code) {
+            on_limit();
+        }
+    });
+}
+
+void drain_operation::complete(const drain_report& report) {
+    limit_->cancel();
+    const auto done = std::exchange(done_, nullptr);
+    done(report);
+}
+
+void drain_operation::cancel() {
+    done_ = nullptr;
+    limit_.reset();
+}
+
+namespace asio = boost::asio;
+using clock = time_point::clock;
+using namespace std::chrono_literals;
+
+namespace {
+
+// After so many jobs of one burst further workers are woken at once, and not when the burst has been read.
+constexpr std::size_t max_unwoken_jobs = 32;
+
+// The input that arrived during a pause counts as read when so many rounds of the executor have brought no job and no
+// withdrawal, or after this time.
+constexpr unsigned max_quiet_rounds = 16;
+constexpr std::chrono::milliseconds max_recovery{250};
+
+std::string seconds(std::chrono::nanoseconds span) {
+    const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(span).count() / 100;
+    return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " s";
+}
+
+} // namespace
+
+job_dispatcher::job_dispatcher(asio::any_io_executor executor, pool_options options)
+    : executor_(std::move(executor)), options_(std::move(options)), completions_([this] {
+          // The thread that wakes the executor holds a job, and so this object.
+          asio::post(executor_, [weak = weak_from_this()] {
+              if (const auto self = weak.lock()) {
+                  self->process_completions();
+              }
+          });
+      }),
+      workers_(options_, completions_), delegated_(workers_), timer_(std::in_place, executor_), drain_(executor_),
+      close_timeout_(options_.close_timeout) {}
+
+job_dispatcher::~job_dispatcher() = default;
+
+asio::any_io_executor job_dispatcher::executor() const {
+    const std::lock_guard lock{executor_mutex_};
+    return executor_;
+}
+
+void job_dispatcher::start() {
+    workers_.start(std::shared_ptr<worker_pool>{shared_from_this(), &workers_}, [this] {
+        // If this fails, the next timer does it.
+        static_cast<void>(completions_.post([this] { check_for_pause(); }));
+    });
+    if (options_.check_interval.count() > 0) {
+        // Once the executor runs, which may be later.
+        asio::post(executor_, [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->arm_timer();
+            }
+        });
+    }
+}
+
+void job_dispatcher::write_log(log_level level, const log_entry& what) const {
+    if (options_.log) {
+        options_.log(level, what);
+    }
+}
+
+// -- records -------------------------------------------------------------------------------------------------------
+
+job_record& job_dispatcher::acquire_record() {
+    auto& r = records_.acquire(shared_from_this());
+    if (records_.size() == 1) {
+        work_guard_ = asio::prefer(executor_, asio::execution::outstanding_work.tracked);
+        arm_timer();
+    }
+    return r;
+}
+
+void job_dispatcher::recycle(job_record& r) {
+    records_.recycle(r);
+    if (records_.size() == 0) {
+        work_guard_ = {};
+    }
+}
+
+void job_dispatcher::return_record(job_record& r) noexcept {
+    if (!completions_.push({&r, completion_queue::event::released}, !draining_.load(std::memory_order_relaxed))) {
+        const std::unique_ptr<job_record> owned{&r};
+        const auto keep = std::move(r.dispatcher_);
+    }
+}
+
+// -- admission -----------------------------------------------------------------------------------------------------
+
+void job_dispatcher::submit(job what) {
+    if (closed_) {
+        what.answer.fail(errc::unavailable, "its workers have stopped");
+        return;
+    }
+    if (draining_) {
+        refuse(what.answer, worker_pool::admission::no_workers);
+        return;
+    }
+    detect_pause();
+    ++changes_;
+    auto& r = acquire_record();
+    r.requester = reinterpret_cast<std::uintptr_t>(&what.what.peer());
+    r.request_.assign(what.what, identities_.copy_of(what.what.peer()));
+    r.work_ = std::move(what.work);
+    const auto admission = workers_.push(r);
+    if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
+        r.answered_ = true;
+        recycle(r);
+        refuse(what.answer, admission);
+        return;
+    }
+    ++figures_.admitted;
+    // A worker may already run it; workers do not use what is set here.
+    replies_.add(r, std::move(what.answer));
+    r.requester_->on_stop([this, &r] { stop(r); });
+    if (admission == worker_pool::admission::needs_wake) {
+        wake_workers();
+    }
+}
+
+// A single job starts at once. Otherwise more may come with the same read, and workers are woken for all together.
+void job_dispatcher::wake_workers() {
+    if (replies_.size() == 1 || ++unwoken_jobs_ >= max_unwoken_jobs) {
+        unwoken_jobs_ = 0;
+        workers_.wake();
+    } else if (!std::exchange(wake_posted_, true)) {
+        asio::post(executor_, [self = shared_from_this()] {
+            self->wake_posted_ = false;
+            self->unwoken_jobs_ = 0;
+            self->workers_.wake();
+        });
+    }
+}
+
+void job_dispatcher::refuse(responder& answer, worker_pool::admission why) {
+    ++figures_.refused;
+    const auto retry = retry_delay(workers_.queued(), workers_.usable(), workers_.read_figures().service_time);
+    if (draining_) {
+        answer.refuse("it is shutting down", 1s);
+    } else if (why == worker_pool::admission::no_workers) {
+        answer.refuse("all its workers are stuck", std::max<std::chrono::milliseconds>(retry, 1s));
+    } else {
+        answer.refuse("its queue is full", retry);
+    }
+}
+
+// -- results -------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::process_completions() {
+    auto entries = std::move(entries_);
+    auto functions = std::move(functions_);
+    entries.clear();
+    functions.clear();
+    completions_.take(entries, functions);
+    for (const auto& [record, what] : entries) {
+        if (what == completion_queue::event::released) {
+            recycle(*record);
+            continue;
+        }
+        replies_.send_progress(*record);
+        if (what == completion_queue::event::answered) {
+            figures_.answered += replies_.send(*record) ? 1 : 0;
+        }
+        release_record(*record);
+    }
+    for (const auto& function : functions) {
+        function();
+    }
+    entries_ = std::move(entries);
+    functions_ = std::move(functions);
+    functions_.clear();
+    update_drain(false);
+}
+
+void job_dispatcher::release_record(job_record& r) {
+    // The caller has dealt with its answer.
+    if (r.references_.fetch_sub(1, std::memory_order_acq_rel) == 1) {
+        r.answered_.load() ? recycle(r) : (r.add_reference(), r.release());
+    }
+}
+
+// -- stopping ------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::stop(job_record& r) {
+    ++changes_;
+    std::function<void()> callback;
+    {
+        const std::lock_guard lock{r.mutex_};
+        r.stopped_.store(true, std::memory_order_release);
+        callback.swap(r.on_stop_);
+    }
+    replies_.stop_awaiting(r);
+    if (workers_.withdraw(r)) {
+        ++figures_.withdrawn;
+        r.answered_ = true;
+        replies_.remove(r);
+        release_record(r);
+        return;
+    }
+    workers_.job_stopped(r, clock::now());
+    if (callback) {
+        r.add_reference();
+        stop_notifier_.notify(
+            {.callback = std::move(callback), .log = [job = job_context{r}](log_level level, const std::string& text) {
+                 const auto& what = job.request();
+                 job.log(level, std::string{to_string(what.verb())} + " '" + std::string{what.task()} + "': " + text);
+             }});
+    }
+}
+
+// -- requests to other nodes ---------------------------------------------------------------------------------------
+
+void job_dispatcher::delegate(job_context job, std::string command, call_options options, answer_callback answered) {
+    const auto callback = std::make_shared<answer_callback>(std::move(answered));
+    const auto put = completions_.post([this, job, command = std::move(command), options, callback] {
+        const auto& by = job.record_->requester_;
+        delegated_.send(job, by ? &*by : nullptr, command, options, *callback);
+    });
+    if (put) {
+        return;
+    }
+    // Like any other answer: later, as a continuation of the job.
+    const auto refuse = [callback, ending = draining_.load()] {
+        ending ? (*callback)(errc::unavailable, "{}", "the node is stopping")
+               : (*callback)(errc::busy, "{}", "too many requests at once");
+    };
+    if (!workers_.schedule(*job.record_, refuse)) {
+        refuse(); // no worker is left
+    }
+}
+
+// -- figures -------------------------------------------------------------------------------------------------------
+
+node_load job_dispatcher::load() const noexcept {
+    const auto queued = workers_.queued();
+    const auto open = static_cast<std::uint32_t>(replies_.size());
+    const auto started = open - std::min(queued, open);
+    // While no worker becomes free, the next job waits at least as long as this has lasted.
+    const auto saturated =
+        std::chrono::duration_cast<std::chrono::microseconds>(workers_.saturated_for(clock::now())).count();
+    constexpr std::int64_t max_us = 1'000'000'000;
+    return {.queued = queued,
+            .running = std::max(started, workers_.running()),
+            .workers = workers_.usable(),
+            .service_us =
+                std::max(workers_.service_us(), static_cast<std::uint32_t>(std::min<std::int64_t>(saturated, max_us)))};
+}
+
+pool_figures job_dispatcher::figures() const {
+    const auto now = load();
+    const auto workers = workers_.read_figures();
+    auto all = figures_;
+    all.threw = counts_.threw.load(std::memory_order_relaxed);
+    all.answerless = counts_.answerless.load(std::memory_order_relaxed);
+    all.answered_twice = counts_.answered_twice.load(std::memory_order_relaxed);
+    all.logs_dropped = counts_.logs_dropped.load(std::memory_order_relaxed);
+    all.stuck = workers.stuck;
+    all.replaced = workers.replaced;
+    all.revived = workers.revived;
+    all.queued = now.queued;
+    all.running = workers_.running();
+    all.waiting = now.running - std::min(now.running, all.running);
+    all.workers = now.workers;
+    all.stuck_now = workers.stuck_now;
+    all.service_time_us =
+        static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(workers.service_time).count());
+    return all;
+}
+
+// -- log -----------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::log(job_context job, log_level level, std::string text) {
+    const auto put = completions_.post([this, job = std::move(job), level, text = std::move(text)] {
+        const auto& r = *job.record_;
+        if (r.requester_) {
+            r.requester_->log(level, text); // adds the request's id
+        } else {
+            write_log(level, {text, r.request().peer().address});
+        }
+    });
+    if (!put) {
+        counts_.logs_dropped.fetch_add(1, std::memory_order_relaxed);
+    }
+}
+
+void job_dispatcher::record_inline_call(std::string_view task, std::chrono::nanoseconds took) {
+    ++figures_.inline_calls;
+    const auto us = static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(took).count());
+    figures_.inline_worst_us = std::max(figures_.inline_worst_us, us);
+    if (took > options_.slow_inline) {
+        ++figures_.inline_slow;
+        write_log(log_level::warning, "the task '" + std::string{task} + "' blocked the node for " +
+                                          std::to_string(us / 1000) + " ms: it should not be marked inline_ok");
+    }
+}
+
+// -- timer ---------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::arm_timer() {
+    const bool has_jobs = records_.size() != 0;
+    if (closed_ || (timer_armed_ && !(timer_idle_ && has_jobs))) {
+        return;
+    }
+    timer_armed_ = true;
+    timer_idle_ = !has_jobs;
+    timer_interval_ =
+        has_jobs ? std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms) : options_.check_interval;
+    update_executor_due(clock::now());
+    timer_->expires_after(timer_interval_);
+    timer_->async_wait([weak = weak_from_this()](boost::system::error_code code) {
+        if (const auto self = weak.lock(); self && !code) {
+            self->on_timer();
+        }
+    });
+}
+
+void job_dispatcher::on_timer() {
+    timer_armed_ = false;
+    if (closed_) {
+        return;
+    }
+    check_for_pause();
+    report_stuck();
+    process_completions(); // deferred ones
+    if (records_.size() != 0 || options_.check_interval.count() > 0) {
+        arm_timer();
+    }
+}
+
+// -- pauses --------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::update_executor_due(time_point now) {
+    if (options_.check_interval.count() > 0) {
+        workers_.set_executor_due(now + timer_interval_ + options_.executor_lateness);
+    }
+}
+
+// The process or the machine was suspended, or a handler blocked the executor. Requesters may have withdrawn in the
+// meantime, in input that has not been read.
+void job_dispatcher::detect_pause() {
+    const auto now = clock::now();
+    if (closed_ || !workers_.executor_is_late(now)) {
+        return;
+    }
+    update_executor_due(now);
+    if (std::exchange(recovering_, true)) {
+        return;
+    }
+    workers_.pause();
+    recovery_began_ = now;
+    quiet_rounds_ = 0;
+    changes_last_round_ = changes_;
+    write_log(log_level::warning, "this node was suspended or blocked for more than " +
+                                      seconds(timer_interval_ + options_.executor_lateness) +
+                                      ": no job starts until the input that arrived since has been read");
+    post_recovery_round();
+}
+
+// A worker that has found the executor late waits to be woken, even if the pause has been handled before the worker
+// reports it.
+void job_dispatcher::check_for_pause() {
+    detect_pause();
+    if (!recovering_ && !closed_) {
+        workers_.wake();
+    }
+}
+
+// Posted functions run after those that are ready, and after a check for new input.
+void job_dispatcher::post_recovery_round() {
+    asio::post(executor_, [weak = weak_from_this()] {
+        if (const auto self = weak.lock(); self && !self->closed_) {
+            self->recovery_round();
+        }
+    });
+}
+
+void job_dispatcher::recovery_round() {
+    quiet_rounds_ = changes_ == changes_last_round_ ? quiet_rounds_ + 1 : 0;
+    changes_last_round_ = changes_;
+    const auto now = clock::now();
+    if (quiet_rounds_ < max_quiet_rounds && now - recovery_began_ < max_recovery) {
+        post_recovery_round();
+        return;
+    }
+    recovering_ = false;
+    update_executor_due(now);
+    workers_.unpause();
+}
+
+void job_dispatcher::report_stuck() {
+    workers_.check_stuck(clock::now(), [this](const worker_watchdog::stuck_worker& found, const job_record& r) {
+        write_log(log_level::error, {"worker " + std::to_string(found.slot + 1) + " is stuck in " +
+                                         std::string{to_string(r.request().verb())} + " '" +
+                                         std::string{r.request().task()} + "' for " + seconds(found.busy_for) +
+                                         (found.replaced ? ": replaced by another" : ": no replacement is left"),
+                                     r.request().peer().address});
+    });
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done) {
+    draining_ = true;
+    drain_.begin(
+        limit,
+        [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->update_drain(true);
+            }
+        },
+        std::move(done));
+    asio::post(executor_, [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) {
+            self->update_drain(false);
+        }
+    });
+}
+
+void job_dispatcher::update_drain(bool over) {
+    if (!drain_.is_pending() || !(over || (replies_.awaited() == 0 && workers_.running() == 0))) {
+        return;
+    }
+    drain_report report;
+    if (over) {
+        fail_open_jobs(report);
+        close_timeout_ = 0ms;
+    }
+    report.stuck = workers_.running();
+    drain_.complete(report);
+}
+
+// Answers all open jobs, and tells them to stop.
+void job_dispatcher::fail_open_jobs(drain_report& report) {
+    for (std::size_t i = 0; i < records_.size();) {
+        auto& r = records_[i];
+        if (!r.requester_) {
+            ++i;
+            continue; // a withdrawn record leaves the list, and another takes its index
+        }
+        auto requester = *r.requester_;
+        const auto before = figures_.withdrawn;
+        stop(r);
+        if (figures_.withdrawn != before) {
+            ++report.refused;
+            requester.refuse("it is shutting down", 1s);
+        } else {
+            ++report.abandoned;
+            requester.fail(errc::unavailable, "it shut down before the job had ended");
+            replies_.remove(r);
+        }
+    }
+}
+
+std::size_t job_dispatcher::close(std::chrono::milliseconds limit) {
+    if (closed_) {
+        return 0;
+    }
+    const auto end = clock::now() + limit;
+    draining_ = true;
+    drain_report unreported;
+    fail_open_jobs(unreported);
+    closed_ = true;
+    drain_.cancel();
+    timer_.reset();
+    workers_.close([](job_record& r) { r.release(); });
+    std::vector<completion_queue::entry> entries;
+    std::vector<completion_queue::function> functions;
+    completions_.close(entries, functions);
+    for (const auto& function : functions) { // their requests have to be answered
+        function();
+    }
+    delegated_.close();
+    records_.detach_all();
+    work_guard_ = {};
+    for (const auto& [record, what] : entries) {
+        if (what == completion_queue::event::released) {
+            const std::unique_ptr<job_record> owned{record};
+            record->dispatcher_.reset();
+        } else {
+            record->release();
+        }
+    }
+    functions.clear();
+    {
+        const std::lock_guard lock{executor_mutex_};
+        executor_ = {};
+    }
+    const auto time_left = [end] {
+        return std::max(std::chrono::ceil<std::chrono::milliseconds>(end - clock::now()), 0ms);
+    };
+    const auto workers = workers_.join(time_left());
+    if (workers != 0) {
+        write_log(log_level::error, "workers abandoned in jobs that do not end: " + std::to_string(workers));
+    }
+    const auto callbacks = stop_notifier_.close(time_left());
+    if (callbacks != 0) {
+        write_log(log_level::error,
+                  "threads abandoned in on_stop callbacks that do not return: " + std::to_string(callbacks));
+    }
+    records_.free_spare();
+    return workers + callbacks;
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/log.hpp>
+#include <cles/peer.hpp>
+#include <cles/request.hpp>
+#include <cles/responder.hpp>
+#include <cles/service.hpp>
+
+#include "jobs/job_context.hpp"
+
+#include <boost/describe/class.hpp>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+
+namespace cles::runtime {
+
+/// The settings of a pool of workers.
+struct pool_options {
+    unsigned workers = 0;      ///< threads; 0: as many as there are cores
+    std::size_t queue = 1024;  ///< jobs that may wait; further ones are refused with `busy`
+    unsigned replacements = 4; ///< how many stuck workers may be replaced
+    /// A job is stuck if it still holds its worker this long after its deadline, or after its requester withdrew.
+    std::chrono::milliseconds grace{2'000};
+    /// How long the destructor waits for workers that run a job, before it abandons them.
+    std::chrono::milliseconds close_timeout{2'000};
+    /// How often a timer runs on the service's executor, even without jobs. If the timer is late by more than
+    /// `executor_lateness`, the process was suspended or the executor was blocked: no job starts until the input that
+    /// arrived in the meantime, above all withdrawals, has been read. 0: not checked, for an executor that does not run
+    /// all the time.
+    std::chrono::milliseconds check_interval{0};
+    std::chrono::milliseconds executor_lateness{250};
+    /// A handler on the I/O thread (`inline_ok`) that takes longer is logged.
+    std::chrono::microseconds slow_inline{5'000};
+    log_sink log{}; ///< called on the service's executor
+};
+
+/// The counters of a pool of workers since its start, and its current state.
+struct pool_figures {
+    std::uint64_t admitted = 0;        ///< jobs that were queued
+    std::uint64_t refused = 0;         ///< with `busy`: the queue was full, or the pool was draining
+    std::uint64_t withdrawn = 0;       ///< removed from the queue before they started
+    std::uint64_t answered = 0;        ///< ended with a result, or a failure of their own
+    std::uint64_t threw = 0;           ///< whose handler threw
+    std::uint64_t answerless = 0;      ///< ended without an answer, because its last holder was destroyed
+    std::uint64_t answered_twice = 0;  ///< further answers to a job that had been answered
+    std::uint64_t logs_dropped = 0;    ///< log entries that came too fast
+    std::uint64_t stuck = 0;           ///< jobs that did not end in time, so far
+    std::uint64_t replaced = 0;        ///< of these, those whose worker was replaced
+    std::uint64_t revived = 0;         ///< of these, those that ended after all
+    std::uint64_t inline_calls = 0;    ///< handlers that ran on the I/O thread
+    std::uint64_t inline_slow = 0;     ///< of these, those that took longer than `slow_inline`
+    std::uint64_t inline_worst_us = 0; ///< the longest inline call
+
+    std::uint32_t queued = 0;
+    std::uint32_t running = 0;         ///< on workers
+    std::uint32_t waiting = 0;         ///< started, but on no worker: they wait for other nodes
+    std::uint32_t workers = 0;         ///< that are not stuck
+    std::uint32_t stuck_now = 0;       ///< workers that are
+    std::uint64_t service_time_us = 0; ///< how long a job holds a worker, smoothed
+};
+BOOST_DESCRIBE_STRUCT(pool_figures, (),
+                      (admitted, refused, withdrawn, answered, threw, answerless, answered_twice, logs_dropped, stuck,
+                       replaced, revived, inline_calls, inline_slow, inline_worst_us, queued, running, waiting, workers,
+                       stuck_now, service_time_us))
+
+/// A request to be served by a worker.
+struct job {
+    const cles::request& what;            ///< copied by `job_pool::submit`
+    responder answer;                     ///< used on the service's executor only
+    std::shared_ptr<const job_work> work; ///< shared by all jobs of the task
+};
+
+class job_dispatcher;
+
+/// How a drain ended.
+struct drain_report {
+    std::size_t refused = 0;   ///< jobs that had not started and were answered `busy`
+    std::size_t abandoned = 0; ///< jobs that had started and were answered `unavailable`
+    std::size_t stuck = 0;     ///< of these, those that still hold a worker
+};
+
+/// Runs the jobs of a service on workers.
+///
+/// A job is admitted to a bounded queue, or answered `busy` with `retry_ms`, an estimate of how long the queue will
+/// take. Requesters (links) take turns, so one with many jobs does not delay the others. A job that is withdrawn, whose
+/// link is lost or whose time is over is removed from the queue; if it runs already, it is told to stop. A job that
+/// does not stop then is stuck: it is reported, and its worker is replaced while there are replacements.
+///
+/// All functions have to be called on the service's executor, and the pool has to be destroyed before its service. At
+/// its end, jobs without an answer are answered `unavailable`. Threads that are still in a job or an `on_stop` callback
+/// after `pool_options::close_timeout` are abandoned: such a program has to end with `std::_Exit` or `std::quick_exit`,
+/// because there is no way to end a thread from outside.
+class job_pool {
+  public:
+    job_pool(service& host, pool_options options);
+    job_pool(const job_pool&) = delete;
+    job_pool& operator=(const job_pool&) = delete;
+    ~job_pool();
+
+    void submit(job what);
+
+    /// For announcements and `any:`; cheap.
+    [[nodiscard]] node_load load() const noexcept;
+    [[nodiscard]] pool_figures figures() const;
+
+    /// Admits no more jobs, and calls back when all have ended. At the limit it answers those that are left, tells
+    /// those that run to stop, and calls back; after that the destructor waits for no job, and `close` only as long as
+    /// its argument says. To be called once.
+    void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
+
+    /// Does what the destructor does, with another limit than `pool_options::close_timeout`: answers what is left, and
+    /// waits that long in total for workers and `on_stop` callbacks, and up to a second for those about to end. Returns
+    /// how many threads are abandoned; 0 if the pool has been closed before.
+    std::size_t close(std::chrono::milliseconds limit);
+
+    /// For `pooled_registrar`, whose handlers may be called after the pool has been destroyed.
+    [[nodiscard]] const std::shared_ptr<job_dispatcher>& dispatcher() const noexcept { return dispatcher_; }
+
+  private:
+    std::shared_ptr<job_dispatcher> dispatcher_;
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "jobs/pooled_registrar.hpp"
+
+#include "jobs/job_dispatcher.hpp"
+
+#include <chrono>
+#include <utility>
+
+namespace cles::runtime {
+namespace {
+
+/// Reports its own lifetime to the dispatcher, even if an exception passes.
+class inline_timer {
+  public:
+    inline_timer(job_dispatcher& dispatcher, std::string_view task) noexcept : dispatcher_(dispatcher), task_(task) {}
+    inline_timer(const inline_timer&) = delete;
+    inline_timer& operator=(const inline_timer&) = delete;
+    ~inline_timer() { dispatcher_.record_inline_call(task_, std::chrono::steady_clock::now() - begun_); }
+
+  private:
+    job_dispatcher& dispatcher_;
+    std::string_view task_;
+    std::chrono::steady_clock::time_point begun_ = std::chrono::steady_clock::now();
+};
+
+} // namespace
+
+void pooled_registrar::add(registration task) {
+    if (task.info.inline_ok || task.coroutine) {
+        add_inline(std::move(task));
+    } else if (task.plain) {
+        add_work(task.verb, std::move(task.task), std::move(task.info),
+                 [handler = std::move(task.plain)](const job_context& job) {
+                     job.answer_last([&](json_writer& w) { handler(job.request(), w); });
+                 });
+    } else if (task.async) {
+        add_work(
+            task.verb, std::move(task.task), std::move(task.info),
+            [handler = std::move(task.async)](const job_context& job) { handler(job.request(), job.as_responder()); });
+    } else {
+        host_.add(std::move(task));
+    }
+}
+
+void pooled_registrar::add_inline(registration task) {
+    if (task.plain) {
+        task.plain = [handler = std::move(task.plain), dispatcher = dispatcher_](const request& r, json_writer& w) {
+            const inline_timer timed{*dispatcher, r.task()};
+            handler(r, w);
+        };
+    }
+    if (task.async) {
+        task.async = [handler = std::move(task.async), dispatcher = dispatcher_](const request& r, responder answer) {
+            const inline_timer timed{*dispatcher, r.task()};
+            handler(r, std::move(answer));
+        };
+    }
+    host_.add(std::move(task));
+}
+
+void pooled_registrar::add_work(cles::verb verb, std::string task, task_info info, job_work work) {
+    registration entry{.verb = verb, .task = std::move(task), .info = std::move(info)};
+    entry.async = [dispatcher = dispatcher_,
+                   work = std::make_shared<const job_work>(std::move(work))](const request& r, responder answer) {
+        dispatcher->submit({.what = r, .answer = std::move(answer), .work = work});
+    };
+    host_.add(std::move(entry));
+}
+
+publisher pooled_registrar::make_publisher() { return host_.make_publisher(); }
+
+} // namespace cles::runtime

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "jobs/adaptive_mutex.hpp"
+#include "jobs/completion_queue.hpp"
+#include "jobs/job_queue.hpp"
+#include "jobs/service_time.hpp"
+#include "jobs/worker_threads.hpp"
+#include "jobs/worker_watchdog.hpp"
+
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+namespace cles::runtime {
+
+class job_record;
+struct pool_options;
+
+/// The workers, and the jobs that wait for them.
+///
+/// A worker that is awake takes one job after another until there are none. A worker is woken only if there are more
+/// jobs than workers awake, so that a burst of jobs costs one wake-up, not one for each.
+class worker_pool {
+  public:
+    worker_pool(const pool_options& options, completion_queue& completions);
+    worker_pool(const worker_pool&) = delete;
+    worker_pool& operator=(const worker_pool&) = delete;
+    ~worker_pool() = default;
+
+    /// To be called first. \param self keeps this alive while a worker uses it \param on_executor_late called on a
+    /// worker that found the executor late (`set_executor_due`). The worker has put its job back and looks for no
+    /// other: the executor has to call `wake` once it has read the input that arrived in the meantime.
+    void start(std::weak_ptr<worker_pool> self, std::function<void()> on_executor_late) {
+        self_ = std::move(self);
+        on_executor_late_ = std::move(on_executor_late);
+    }
+
+    // On the service's executor:
+    enum class admission : std::uint8_t {
+        queued,
+        needs_wake, ///< queued; `wake` has to be called, perhaps after more jobs were pushed
+        full,
+        no_workers, ///< all workers are stuck
+    };
+    /// Queues a new job.
+    [[nodiscard]] admission push(job_record& job);
+    /// Wakes as many workers as there are jobs for.
+    void wake();
+    /// Removes a job that has not started. False if it has.
+    bool withdraw(job_record& job);
+    /// By when the executor's timer will have run. If it has not, the process was suspended or the executor blocked:
+    /// workers may have missed withdrawals, and start no job.
+    void set_executor_due(time_point until) noexcept { executor_due_.store(until, std::memory_order_relaxed); }
+    [[nodiscard]] bool executor_is_late(time_point now) const noexcept {
+        return now > executor_due_.load(std::memory_order_relaxed);
+    }
+    /// No job or continuation starts until `unpause`.
+    void pause() noexcept;
+    void unpause();
+    /// The job has been told to stop: its grace period begins.
+    void job_stopped(const job_record& job, time_point now);
+    /// Calls `found` for each worker that has become stuck, after adding replacements.
+    void check_stuck(time_point now,
+                     const std::function<void(const worker_watchdog::stuck_worker&, const job_record&)>& found);
+    /// No job starts any more. Jobs that have not started are passed to `dropped`.
+    void close(const std::function<void(job_record&)>& dropped);
+    /// After `close`: waits up to the limit for the workers, which still run the continuations of started jobs; free
+    /// workers get a moment for that in any case. Returns how many workers are abandoned in a job; one whose job ends
+    /// after all still runs its continuations.
+    std::size_t join(std::chrono::milliseconds limit);
+
+    // On any thread:
+    /// Queues a continuation of a job that has started. False after `join`: it is dropped.
+    bool schedule(job_record& job, std::function<void()> continuation);
+
+    [[nodiscard]] std::uint32_t queued() const noexcept { return queued_.load(std::memory_order_relaxed); }
+    [[nodiscard]] std::uint32_t running() const noexcept { return running_.load(std::memory_order_relaxed); }
+    [[nodiscard]] std::uint32_t usable() const noexcept { return usable_.load(std::memory_order_relaxed); }
+    /// How long a job holds a worker, on average, in microseconds; zero before the first job.
+    [[nodiscard]] std::uint32_t service_us() const noexcept { return service_us_.load(std::memory_order_relaxed); }
+    /// For how long all workers have been busy; zero if one is free.
+    [[nodiscard]] std::chrono::nanoseconds saturated_for(time_point now) const noexcept;
+    struct figures {
+        std::uint64_t stuck = 0;
+        std::uint64_t replaced = 0;
+        std::uint64_t revived = 0;
+        std::uint32_t stuck_now = 0;
+        std::chrono::nanoseconds service_time{0};
+    };
+    [[nodiscard]] figures read_figures() const;
+
+  private:
+    void work();
+    void finish_job(job_record* job, bool may_defer, completion_batcher& batcher, time_point now,
+                    std::vector<std::function<void()>>& dropped);
+    void schedule_worker();
+    void requeue(job_record& job);
+    void drop_continuations();
+    [[nodiscard]] bool needs_worker() const noexcept;
+    void publish_figures() noexcept;
+    void update_saturation(time_point now) noexcept;
+
+    completion_queue& completions_;
+    worker_threads threads_;
+    std::weak_ptr<worker_pool> self_;
+    std::function<void()> on_executor_late_;
+    std::atomic<time_point> executor_due_{time_point::max()};
+    mutable adaptive_mutex mutex_; // of all that follows
+    job_queue queue_;
+    worker_watchdog watchdog_;
+    std::size_t awake_ = 0; // workers that look for jobs, or are about to
+    std::uint32_t busy_ = 0;
+    service_time service_time_;
+    figures figures_;
+    bool paused_ = false; // no job or continuation starts
+    bool closed_ = false; // no job starts
+    bool ended_ = false;  // no continuation starts
+    std::condition_variable_any idle_;
+    // Copies for readers without the lock.
+    std::atomic<std::uint32_t> queued_{0};
+    std::atomic<std::uint32_t> running_{0};
+    std::atomic<std::uint32_t> usable_{0};
+    std::atomic<std::uint32_t> service_us_{0};
+    std::atomic<time_point::rep> saturated_since_{0}; // 0: a worker is free
+};
+
+} // namespace cles::runtime

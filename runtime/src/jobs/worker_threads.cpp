@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "jobs/worker_threads.hpp"
+
+#include <condition_variable>
+#include <mutex>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace cles::runtime {
+namespace {
+
+constexpr std::chrono::seconds idle_stop_limit{1};
+
+} // namespace
+
+struct worker_threads::state {
+    struct worker {
+        std::thread thread;
+        bool ended = false;
+    };
+
+    boost::asio::thread_pool pool{0};
+    std::mutex mutex;
+    std::condition_variable one_ended;
+    std::vector<std::unique_ptr<worker>> workers;
+    std::size_t running = 0;
+};
+
+worker_threads::worker_threads(std::size_t count) : state_(std::make_shared<state>()) {
+    try {
+        for (std::size_t i = 0; i < count; ++i) {
+            add();
+        }
+    } catch (...) {
+        stop(std::chrono::milliseconds::max());
+        throw;
+    }
+}
+
+worker_threads::~worker_threads() { stop(std::chrono::milliseconds{0}, count()); }
+
+void worker_threads::add() {
+    const std::lock_guard lock{state_->mutex};
+    auto made = std::make_unique<state::worker>();
+    made->thread = std::thread{[self = state_, mine = made.get()] {
+        self->pool.attach();
+        const std::lock_guard ending{self->mutex};
+        mine->ended = true;
+        --self->running;
+        self->one_ended.notify_all();
+    }};
+    state_->workers.push_back(std::move(made));
+    ++state_->running;
+}
+
+std::size_t worker_threads::count() const noexcept {
+    const std::lock_guard lock{state_->mutex};
+    return state_->workers.size();
+}
+
+boost::asio::thread_pool::executor_type worker_threads::get_executor() const noexcept {
+    return state_->pool.get_executor();
+}
+
+std::size_t worker_threads::stop(std::chrono::milliseconds limit, std::size_t busy) {
+    state_->pool.stop();
+    std::unique_lock lock{state_->mutex};
+    const auto all_ended = [this] { return state_->running == 0; };
+    if (limit == std::chrono::milliseconds::max()) {
+        state_->one_ended.wait(lock, all_ended);
+    } else {
+        state_->one_ended.wait_for(lock, limit, all_ended);
+        // Idle threads take a moment too.
+        state_->one_ended.wait_for(lock, idle_stop_limit, [&] { return state_->running <= busy; });
+    }
+    // An abandoned thread can still set its `ended`: it shares the state.
+    std::vector<std::thread> ended;
+    std::size_t left = 0;
+    for (const auto& w : state_->workers) {
+        if (!w->thread.joinable()) {
+            continue;
+        }
+        if (w->ended) {
+            ended.push_back(std::move(w->thread));
+        } else {
+            w->thread.detach();
+            ++left;
+        }
+    }
+    lock.unlock();
+    for (auto& t : ended) {
+        t.join();
+    }
+    return left;
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "plugins/plugin_host.hpp"
+
+#include <cles/error.hpp>
+#include <cles/plugin_abi.h>
+#include <cles/plugin_text.hpp>
+
+#include "plugins/plugin_library.hpp"
+#include "plugins/plugin_search.hpp"
+#include "plugins/plugin_trial.hpp"
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+namespace cles::runtime {
+namespace {
+
+// Keeps the plugins of all hosts until the process ends, because a host cannot know whether a plugin is idle.
+template <class T>
+void keep_forever(T kept) {
+    static std::mutex mutex;
+    static auto* const all = new std::vector<T>;
+    const std::scoped_lock lock{mutex};
+    all->push_back(std::move(kept));
+}
+
+} // namespace
+
+struct plugin_host::state {
+    plugin_jobs jobs;
+    stop_notifier notifier; ///< for inline jobs; a pool has its own
+    std::vector<std::unique_ptr<loaded_plugin>> plugins;
+    std::vector<boost::dll::shared_library> libraries;
+    std::vector<const cles_plugin*> descriptions; ///< of the loaded ones, to detect duplicates
+
+    // Used by the thread that stops them.
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool all_stopped = false;
+    std::size_t callbacks_left = 0;
+};
+
+plugin_host::plugin_host(plugin_host_options options)
+    : options_(std::move(options)), state_(std::make_shared<state>()) {
+    keep_forever(state_);
+}
+
+plugin_host::~plugin_host() { stop(std::chrono::seconds{2}); }
+
+void plugin_host::load(const std::string& path, const std::string& config, registrar& into) {
+    const auto file = find_plugin(path, options_.folders);
+    if (options_.trial.count() > 0) {
+        try_plugin(path, file, options_.node, config, options_.trial);
+    }
+    auto library = open_library(path, file);
+    const auto& described = describe_plugin(path, library);
+    if (std::find(state_->descriptions.begin(), state_->descriptions.end(), &described) != state_->descriptions.end()) {
+        throw plugin_error(path, "it is already loaded");
+    }
+    auto owned = std::make_unique<loaded_plugin>(detail::known_part(&described), options_.node, state_->jobs,
+                                                 state_->notifier, options_.log);
+    auto& plugin = *owned;
+    state_->libraries.push_back(std::move(library));
+    state_->plugins.push_back(std::move(owned));
+    state_->descriptions.push_back(&described);
+
+    const auto owner_of = [this](cles::verb verb, std::string_view task) -> std::optional<std::string> {
+        const auto wanted = std::string{to_string(verb)} + " " + std::string{task};
+        for (const auto& p : plugins_) {
+            if (std::find(p.tasks.begin(), p.tasks.end(), wanted) != p.tasks.end()) {
+                return "the plugin '" + p.name + "' (" + p.path + ")";
+            }
+        }
+        return std::nullopt;
+    };
+    if (const auto refused = plugin.start(config, into.make_publisher(), owner_of)) {
+        throw plugin_error(path, refused->why, refused->setting);
+    }
+    plugin_info info{.path = path, .name = plugin.name(), .version = plugin.version()};
+    try {
+        for (auto& task : plugin.tasks()) {
+            info.tasks.push_back(std::string{to_string(task.verb)} + " " + task.task);
+            into.add(std::move(task));
+        }
+    } catch (const error& e) {
+        // Tasks that were registered are answered `unavailable` from now on.
+        plugin.close();
+        plugin.stop();
+        throw plugin_error(path, e.what());
+    }
+    plugins_.push_back(std::move(info));
+}
+
+plugin_figures plugin_host::figures() const {
+    return {.jobs = state_->jobs.size(), .answered_twice = state_->jobs.unknown_answers()};
+}
+
+plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {
+    if (std::exchange(stopped_, true)) {
+        return {};
+    }
+    for (const auto& plugin : state_->plugins) {
+        plugin->close();
+    }
+    auto callbacks =
+        state_->jobs.close([&](const responder& to) { to.fail(errc::unavailable, options_.node + " has stopped"); });
+    for (auto& callback : callbacks) {
+        if (callback) {
+            state_->notifier.notify({.callback = std::move(callback)});
+        }
+    }
+    // On a thread of its own, because a plugin may take long, or never return.
+    std::thread{[state = state_, limit] {
+        const auto left_behind =
+            state->notifier.close(limit / 2); // a callback that blocks must not prevent the plugins from stopping
+        {
+            const std::scoped_lock lock{state->mutex};
+            state->callbacks_left = left_behind;
+        }
+        for (auto left = state->plugins.size(); left > 0; --left) {
+            state->plugins[left - 1]->stop();
+        }
+        const std::scoped_lock lock{state->mutex};
+        state->all_stopped = true;
+        state->changed.notify_all();
+    }}.detach();
+    std::unique_lock lock{state_->mutex};
+    state_->changed.wait_for(lock, limit, [this] { return state_->all_stopped; });
+    plugin_stop_report report{.callbacks = state_->callbacks_left};
+    for (const auto& plugin : state_->plugins) {
+        if (!plugin->has_stopped()) {
+            report.late.push_back(plugin->name());
+        }
+        plugin->disable_log(); // the log may be destroyed before a plugin that does not end
+    }
+    return report;
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "plugins/plugin_jobs.hpp"
+
+#include <cles/plugin_text.hpp>
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/post.hpp>
+
+#include <string>
+
+namespace cles::runtime {
+namespace {
+
+// Posts the use of a responder, which is released there, too.
+void post_to(responder to, std::function<void(const responder&)> use) {
+    const auto executor = to.get_executor();
+    boost::asio::post(executor, [to = std::move(to), use = std::move(use)] { use(to); });
+}
+
+// \param name of the error, as static text
+void deliver(decltype(cles_ask::answered) call, void* user, std::string_view name, std::string_view json,
+             std::string_view message) noexcept {
+    try {
+        call(user, detail::abi_text(name), detail::abi_text(json), detail::abi_text(message));
+    } catch (...) { // ignore errors of the plugin
+    }
+}
+
+} // namespace
+
+// -- callbacks -----------------------------------------------------------------------------------------------------
+
+plugin_callback::~plugin_callback() {
+    if (drop_ != nullptr) {
+        try {
+            drop_(user_);
+        } catch (...) { // ignore errors of the plugin
+        }
+    }
+}
+
+void plugin_callback::operator()() {
+    if (const auto call = std::exchange(call_, nullptr); call != nullptr) {
+        try {
+            call(user_);
+        } catch (...) { // ignore errors of the plugin
+        }
+    }
+}
+
+// -- handles -------------------------------------------------------------------------------------------------------
+
+// A handle consists of a slot's number and generation, so that an old handle is invalid for the slot's next job.
+plugin_jobs::slot* plugin_jobs::find(id job) noexcept {
+    return const_cast<slot*>(std::as_const(*this).find(job)); // NOLINT(cppcoreguidelines-pro-type-const-cast)
+}
+
+const plugin_jobs::slot* plugin_jobs::find(id job) const noexcept {
+    const auto index = static_cast<std::size_t>(job & 0xFFFFFFFFU);
+    if (index >= slots_.size()) {
+        return nullptr;
+    }
+    const auto& s = slots_[index];
+    return s.answer && s.generation == job >> 32U ? &s : nullptr;
+}
+
+plugin_jobs::id plugin_jobs::open(responder answer) {
+    const std::scoped_lock lock{mutex_};
+    if (closed_ || open_ >= max_open) {
+        return 0;
+    }
+    if (free_.empty()) {
+        free_.push_back(static_cast<std::uint32_t>(slots_.size()));
+        slots_.emplace_back();
+    }
+    const auto index = free_.back();
+    free_.pop_back();
+    auto& s = slots_[index];
+    if (++s.generation == 0) {
+        s.generation = 1; // avoids the handle 0
+    }
+    s.stopped = false;
+    s.thread_safe = answer.is_thread_safe();
+    s.starting_thread = std::this_thread::get_id();
+    s.answer.emplace(std::move(answer));
+    ++open_;
+    return (static_cast<id>(s.generation) << 32U) | index;
+}
+
+void plugin_jobs::started(id job) {
+    const std::scoped_lock lock{mutex_};
+    if (auto* s = find(job)) {
+        s->starting_thread = {};
+    }
+}
+
+plugin_jobs::slot plugin_jobs::release(id job) {
+    auto* s = find(job);
+    slot out{.answer = std::exchange(s->answer, std::nullopt), .on_stop = std::move(s->on_stop)};
+    free_.push_back(static_cast<std::uint32_t>(job & 0xFFFFFFFFU));
+    --open_;
+    return out;
+}
+
+// -- use of the responders -----------------------------------------------------------------------------------------
+
+std::optional<responder> plugin_jobs::take_if_direct(id job) {
+    slot gone;
+    const std::scoped_lock lock{mutex_};
+    if (const auto* s = find(job); s != nullptr && is_direct(*s)) {
+        gone = release(job);
+    }
+    return std::exchange(gone.answer, std::nullopt);
+}
+
+bool plugin_jobs::finish(id job, std::function<void(const responder&)> answer) {
+    slot gone;
+    {
+        const std::scoped_lock lock{mutex_};
+        const auto* s = find(job);
+        if (s == nullptr) {
+            ++unknown_answers_;
+            return false;
+        }
+        const bool direct = is_direct(*s);
+        gone = release(job);
+        if (!direct) {
+            // With the lock, so that nothing is posted after `close` to an executor that may be gone.
+            post_to(*std::exchange(gone.answer, std::nullopt), std::move(answer));
+            return true;
+        }
+    }
+    answer(*gone.answer);
+    return true;
+}
+
+bool plugin_jobs::use(id job, std::function<void(const responder&)> use) {
+    std::optional<responder> here;
+    {
+        const std::scoped_lock lock{mutex_};
+        const auto* s = find(job);
+        if (s == nullptr) {
+            return false;
+        }
+        if (!is_direct(*s)) {
+            post_to(*s->answer, std::move(use));
+            return true;
+        }
+        here = s->answer;
+    }
+    use(*here);
+    return true;
+}
+
+bool plugin_jobs::stopped(id job) const {
+    const std::scoped_lock lock{mutex_};
+    const auto* s = find(job);
+    return s == nullptr || s->stopped || (s->thread_safe && s->answer->stopped());
+}
+
+void plugin_jobs::on_stop(id job, plugin_callback callback) {
+    shared_callback wanted{std::move(callback)};
+    shared_callback replaced; // destroyed without the lock
+    std::optional<responder> by;
+    {
+        const std::scoped_lock lock{mutex_};
+        auto* s = find(job);
+        if (s == nullptr) {
+            return;
+        }
+        if (!s->stopped) {
+            if (s->thread_safe) {
+                by = s->answer;
+            }
+            replaced = std::exchange(s->on_stop, wanted);
+            if (!by) {
+                wanted = {}; // `stop` returns it
+            }
+        }
+    }
+    if (by) {
+        by->on_stop([wanted] { wanted(); });
+    } else {
+        wanted();
+    }
+}
+
+shared_callback plugin_jobs::stop(id job) {
+    const std::scoped_lock lock{mutex_};
+    auto* s = find(job);
+    if (s == nullptr) {
+        return {};
+    }
+    s->stopped = true;
+    return std::exchange(s->on_stop, {});
+}
+
+// -- close ---------------------------------------------------------------------------------------------------------
+
+std::vector<shared_callback> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
+    std::vector<slot> gone;
+    {
+        const std::scoped_lock lock{mutex_};
+        closed_ = true;
+        for (std::size_t i = 0; i < slots_.size(); ++i) {
+            if (slots_[i].answer) {
+                gone.push_back(release((static_cast<id>(slots_[i].generation) << 32U) | i));
+            }
+        }
+    }
+    std::vector<shared_callback> callbacks;
+    for (auto& s : gone) {
+        answer(*s.answer);
+        callbacks.push_back(std::move(s.on_stop));
+    }
+    return callbacks;
+}
+
+std::size_t plugin_jobs::size() const {
+    const std::scoped_lock lock{mutex_};
+    return open_;
+}
+
+std::uint64_t plugin_jobs::unknown_answers() const {
+    const std::scoped_lock lock{mutex_};
+    return unknown_answers_;
+}
+
+// -- requests ------------------------------------------------------------------------------------------------------
+
+plugin_request::plugin_request(const cles_ask& ask, deferred_call call_later)
+    : answered_(ask.answered), progress_(ask.progress), user_(ask.user), call_later_(std::move(call_later)),
+      sending_thread_(std::this_thread::get_id()) {}
+
+plugin_request::~plugin_request() { complete(errc::unavailable, "{}", "the node has stopped"); }
+
+void plugin_request::complete(boost::system::error_code code, std::string_view json,
+                              std::string_view message) noexcept {
+    if (completed_.exchange(true) || answered_ == nullptr) {
+        return;
+    }
+    const auto name =
+        !code ? std::string_view{}
+              : wire_name(code.category() == error_category() ? static_cast<errc>(code.value()) : errc::unavailable);
+    const auto result = code ? std::string_view{"{}"} : json;
+    try {
+        if (sending_thread_.load() == std::this_thread::get_id()) {
+            call_later_([call = answered_, user = user_, name, result = std::string{result},
+                         text = std::string{message}] { deliver(call, user, name, result, text); });
+            return;
+        }
+    } catch (...) { // no memory or no thread: better now than never
+    }
+    deliver(answered_, user_, name, result, message);
+}
+
+void plugin_request::report_progress(double fraction, std::string_view json) noexcept {
+    if (progress_ != nullptr && !completed_) {
+        try {
+            progress_(user_, fraction, detail::abi_text(json));
+        } catch (...) { // ignore errors of the plugin
+        }
+    }
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+#include <cles/plugin_abi.h>
+#include <cles/responder.hpp>
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+namespace cles::runtime {
+
+/// A callback of a plugin: called at most once, then dropped.
+class plugin_callback {
+  public:
+    using function = void (*)(void*);
+
+    plugin_callback() = default;
+    plugin_callback(function call, function drop, void* user) noexcept : call_(call), drop_(drop), user_(user) {}
+    plugin_callback(plugin_callback&& other) noexcept
+        : call_(std::exchange(other.call_, nullptr)), drop_(std::exchange(other.drop_, nullptr)), user_(other.user_) {}
+    plugin_callback& operator=(plugin_callback other) noexcept {
+        std::swap(call_, other.call_);
+        std::swap(drop_, other.drop_);
+        std::swap(user_, other.user_);
+        return *this;
+    }
+    ~plugin_callback();
+
+    void operator()();
+
+  private:
+    function call_ = nullptr;
+    function drop_ = nullptr;
+    void* user_ = nullptr;
+};
+
+/// A callback with several holders, of whom only the first call counts.
+class shared_callback {
+  public:
+    shared_callback() = default;
+    explicit shared_callback(plugin_callback what) : shared_(std::make_shared<shared_state>(std::move(what))) {}
+
+    void operator()() const {
+        if (shared_ && !shared_->called.exchange(true)) {
+            shared_->what();
+        }
+    }
+    [[nodiscard]] explicit operator bool() const noexcept { return shared_ != nullptr; }
+
+  private:
+    struct shared_state {
+        explicit shared_state(plugin_callback w) : what(std::move(w)) {}
+        plugin_callback what;
+        std::atomic<bool> called{false};
+    };
+    std::shared_ptr<shared_state> shared_;
+};
+
+/// The open jobs of plugins, by their handles.
+///
+/// A plugin holds a number, never a pointer: if it answers a job twice, or one that does not exist, the number is
+/// invalid, which is counted.
+///
+/// A plugin answers from any thread. The responder of a job on a pool of workers is used on that thread; it knows
+/// itself whether it is stopped, and calls the `on_stop` callback. The responder of an inline job belongs to an
+/// executor: while the task's `start` runs, its thread may use it; from other threads the use is posted, and `stop` has
+/// to be called when the job is stopped. All functions may be called from any thread, except for `close`, which has to
+/// be called on the executor of the responders.
+class plugin_jobs {
+  public:
+    using id = std::uint64_t;
+
+    static constexpr std::size_t max_open = 65536;
+
+    /// A handle for a request whose `start` is about to be called on this thread. 0 if there are too many, or after
+    /// `close`.
+    id open(responder answer);
+    /// `start` has returned.
+    void started(id job);
+
+    /// Ends a job and returns its responder, if this thread may use it. Nothing if it may not, or there is no such job.
+    std::optional<responder> take_if_direct(id job);
+    /// Ends a job: calls `answer` with its responder, once, now or soon. False if there is no such job.
+    bool finish(id job, std::function<void(const responder&)> answer);
+    /// Calls `use` with the responder of a job, now or soon. False if there is no such job.
+    bool use(id job, std::function<void(const responder&)> use);
+    /// Whether its requester does not wait for it any more.
+    [[nodiscard]] bool stopped(id job) const;
+    /// Calls back when the job is stopped; at once if it has been.
+    void on_stop(id job, plugin_callback callback);
+    /// An inline job is stopped. Returns its `on_stop` callback, to be called on a thread where it may take long.
+    [[nodiscard]] shared_callback stop(id job);
+
+    /// Ends all jobs with `answer`, and accepts no more. Returns their `on_stop` callbacks, to be called on a thread
+    /// where they may take long. Nothing is posted after it returns.
+    std::vector<shared_callback> close(const std::function<void(const responder&)>& answer);
+
+    [[nodiscard]] std::size_t size() const;
+    /// How many answers were for jobs that do not exist (any more).
+    [[nodiscard]] std::uint64_t unknown_answers() const;
+
+  private:
+    struct slot {
+        std::uint32_t generation = 0;
+        bool stopped = false;
+        bool thread_safe = false; ///< any thread may use the responder
+        std::thread::id starting_thread{};
+        std::optional<responder> answer{};
+        shared_callback on_stop{};
+    };
+    [[nodiscard]] slot* find(id job) noexcept;
+    [[nodiscard]] const slot* find(id job) const noexcept;
+    [[nodiscard]] static bool is_direct(const slot& s) noexcept {
+        return s.thread_safe || s.starting_thread == std::this_thread::get_id();
+    }
+    /// Empties the slot. The returned contents have to be destroyed without the lock.
+    slot release(id job);
+
+    mutable std::mutex mutex_;
+    std::vector<slot> slots_;
+    std::vector<std::uint32_t> free_;
+    std::size_t open_ = 0;
+    std::uint64_t unknown_answers_ = 0;
+    bool closed_ = false;
+};
+
+/// A request that a plugin's job has sent. The plugin gets the answer exactly once, even if it never arrives, and never
+/// during the call that sends the request.
+class plugin_request {
+  public:
+    /// Calls a function soon, on another thread.
+    using deferred_call = std::function<void(std::function<void()>)>;
+
+    plugin_request(const cles_ask& ask, deferred_call call_later);
+    plugin_request(const plugin_request&) = delete;
+    plugin_request& operator=(const plugin_request&) = delete;
+    ~plugin_request();
+
+    /// The call that sends the request is about to return: from now on this thread may deliver the answer.
+    void sent() noexcept { sending_thread_ = std::thread::id{}; }
+    void complete(boost::system::error_code code, std::string_view json, std::string_view message) noexcept;
+    void report_progress(double fraction, std::string_view json) noexcept;
+
+  private:
+    decltype(cles_ask::answered) answered_;
+    decltype(cles_ask::progress) progress_;
+    void* user_;
+    deferred_call call_later_;
+    std::atomic<std::thread::id> sending_thread_;
+    std::atomic<bool> completed_{false};
+};
+
+} // namespace cles::runtime

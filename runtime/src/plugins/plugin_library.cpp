@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "plugins/plugin_library.hpp"
+
+#include "plugins/plugin_search.hpp"
+
+#include <cstddef>
+#include <exception>
+#include <system_error>
+
+#include <dlfcn.h>
+
+namespace cles::runtime {
+namespace {
+
+using entry_function = const cles_plugin*();
+
+std::string missing_entry_message(const boost::dll::shared_library& library) {
+    constexpr unsigned max_version = 16;
+    for (unsigned version = 2; version <= max_version; ++version) {
+        if (library.has("cles_plugin_v" + std::to_string(version))) {
+            return "it was made for version " + std::to_string(version) + " of the plugin ABI, this host has version " +
+                   std::to_string(CLES_PLUGIN_ABI_MAJOR);
+        }
+    }
+    return std::string{"it is not a plugin: it has no function '"} + CLES_PLUGIN_ENTRY + "'";
+}
+
+const cles_plugin& call_entry(const std::string& path, const boost::dll::shared_library& library) {
+    if (!library.has(CLES_PLUGIN_ENTRY)) {
+        throw plugin_error(path, missing_entry_message(library));
+    }
+    const cles_plugin* described = nullptr;
+    try {
+        described = library.get<entry_function>(CLES_PLUGIN_ENTRY)();
+    } catch (const std::exception& e) {
+        throw plugin_error(path, std::string{"its entry threw: "} + e.what());
+    } catch (...) {
+        throw plugin_error(path, "its entry threw something that is not an exception");
+    }
+    if (described == nullptr) {
+        throw plugin_error(path, "its entry returns no description");
+    }
+    return *described;
+}
+
+void check_version(const std::string& path, const cles_plugin& described) {
+    if (described.size < offsetof(cles_plugin, name)) {
+        throw plugin_error(path, "its description is too short");
+    }
+    const auto wanted = std::to_string(described.abi_major) + "." + std::to_string(described.abi_minor);
+    if (described.abi_major != CLES_PLUGIN_ABI_MAJOR || described.abi_minor > CLES_PLUGIN_ABI_MINOR) {
+        throw plugin_error(path, "it needs version " + wanted + " of the plugin ABI, this host has " +
+                                     std::to_string(CLES_PLUGIN_ABI_MAJOR) + "." +
+                                     std::to_string(CLES_PLUGIN_ABI_MINOR));
+    }
+    const std::size_t min_size = described.abi_minor == 0 ? offsetof(cles_plugin, check) : sizeof(cles_plugin);
+    if (described.size < min_size || described.start == nullptr) {
+        throw plugin_error(path, "its description lacks members of version " + wanted + " of the plugin ABI");
+    }
+}
+
+} // namespace
+
+boost::dll::shared_library open_library(const std::string& path, const std::filesystem::path& file) {
+    boost::dll::shared_library library;
+    std::error_code failed;
+    library.load(file, failed, boost::dll::load_mode::rtld_now);
+    if (failed) {
+        const char* why = ::dlerror();
+        throw plugin_error(path, std::string{"it cannot be loaded: "} + (why == nullptr ? "" : why));
+    }
+    return library;
+}
+
+const cles_plugin& describe_plugin(const std::string& path, const boost::dll::shared_library& library) {
+    const auto& described = call_entry(path, library);
+    check_version(path, described);
+    return described;
+}
+
+} // namespace cles::runtime

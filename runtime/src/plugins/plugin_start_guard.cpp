@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "plugins/plugin_start_guard.hpp"
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <string_view>
+
+#include <sys/time.h>
+#include <unistd.h>
+
+namespace cles::runtime {
+namespace {
+
+constexpr std::array crashes{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGSYS};
+constexpr std::array requests{SIGTERM, SIGINT};
+constexpr std::size_t alternate_stack = 65536;
+
+// Read by signal handlers; not changed while signals may arrive.
+struct {
+    std::array<char, 4096> who;
+    std::size_t size;
+    int code;
+    volatile sig_atomic_t active;
+    std::array<struct sigaction, crashes.size()> crash_before;
+    std::array<struct sigaction, requests.size()> request_before;
+    struct sigaction alarm_before;
+    stack_t stack_before;
+    std::array<char, alternate_stack> stack; // for stack overflows
+} guard_state;
+
+void write_out(std::string_view text) {
+    [[maybe_unused]] const auto done = ::write(STDERR_FILENO, text.data(), text.size());
+}
+
+[[noreturn]] void exit_with(std::string_view what) {
+    write_out({guard_state.who.data(), guard_state.size});
+    write_out(": its start ");
+    write_out(what);
+    write_out("\n");
+    ::_exit(guard_state.code);
+}
+
+void on_crash(int number) {
+    std::array<char, 32> text{"ends the process by signal "};
+    auto at = std::find(text.begin(), text.end(), '\0');
+    if (number >= 10) {
+        *at++ = static_cast<char>('0' + number / 10);
+    }
+    *at++ = static_cast<char>('0' + number % 10);
+    exit_with({text.data(), static_cast<std::size_t>(at - text.begin())});
+}
+
+void on_timeout(int) { exit_with("does not end"); }
+
+void on_exit() {
+    if (guard_state.active != 0) {
+        exit_with("ends the process");
+    }
+}
+
+void set_time_limit(std::chrono::seconds limit) {
+    const itimerval wanted{.it_interval = {}, .it_value = {.tv_sec = limit.count(), .tv_usec = 0}};
+    ::setitimer(ITIMER_REAL, &wanted, nullptr);
+}
+
+} // namespace
+
+plugin_start_guard::plugin_start_guard(const std::string& who, int exit_code, std::chrono::seconds limit) {
+    guard_state.size = std::min(who.size(), guard_state.who.size());
+    std::copy_n(who.begin(), guard_state.size, guard_state.who.begin());
+    guard_state.code = exit_code;
+    guard_state.active = 1;
+    [[maybe_unused]] static const int once = std::atexit(on_exit);
+    const stack_t stack{.ss_sp = guard_state.stack.data(), .ss_flags = 0, .ss_size = guard_state.stack.size()};
+    ::sigaltstack(&stack, &guard_state.stack_before);
+    struct sigaction action {};
+    action.sa_flags = SA_ONSTACK;
+    action.sa_handler = on_crash;
+    for (std::size_t i = 0; i < crashes.size(); ++i) {
+        ::sigaction(crashes[i], &action, &guard_state.crash_before[i]);
+    }
+    action.sa_handler = on_timeout;
+    ::sigaction(SIGALRM, &action, &guard_state.alarm_before);
+    action.sa_handler = SIG_DFL;
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+        ::sigaction(requests[i], &action, &guard_state.request_before[i]);
+    }
+    set_time_limit(limit);
+}
+
+plugin_start_guard::~plugin_start_guard() {
+    set_time_limit(std::chrono::seconds{0});
+    guard_state.active = 0;
+    for (std::size_t i = 0; i < crashes.size(); ++i) {
+        ::sigaction(crashes[i], &guard_state.crash_before[i], nullptr);
+    }
+    for (std::size_t i = 0; i < requests.size(); ++i) {
+        ::sigaction(requests[i], &guard_state.request_before[i], nullptr);
+    }
+    ::sigaction(SIGALRM, &guard_state.alarm_before, nullptr);
+    ::sigaltstack(&guard_state.stack_before, nullptr);
+}
+
+} // namespace cles::runtime

@@ -1,0 +1,318 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "plugins/plugin_trial.hpp"
+
+#include <cles/plugin_text.hpp>
+
+#include "config/config.hpp"
+#include "plugins/loaded_plugin.hpp"
+#include "plugins/plugin_library.hpp"
+#include "plugins/plugin_search.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <exception>
+#include <string_view>
+#include <system_error>
+#include <utility>
+
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+namespace cles::runtime {
+namespace {
+
+// The child's exit codes. Unusual numbers, because a library that ends the process may use any, including 0.
+constexpr int usable = 123;
+constexpr int refused = 124;
+constexpr std::chrono::seconds trial_limit{10}; // for loading a plugin and its settings check
+constexpr std::size_t max_output = 2000;        // its last bytes, which say why it ended
+constexpr std::size_t max_read = 256 * 1024;
+// Small enough for the pipe to take a report at once, before it is read.
+constexpr std::size_t max_report = 2000;
+
+// The report of the child: a character at the beginning of each step; then, if the plugin is refused, a line with the
+// key of the invalid setting, and a line with the reason.
+constexpr char loading = 'l';
+constexpr char describing = 'd';
+constexpr char checking = 'c';
+constexpr char blames_setting = 's';
+constexpr char blames_plugin = 'p';
+constexpr std::string_view verdict_marks{"sp"};
+
+std::string_view step_name(char step) {
+    switch (step) {
+    case describing: return "its entry point";
+    case checking: return "its settings check";
+    default: return "its initialization";
+    }
+}
+
+class descriptor {
+  public:
+    explicit descriptor(int fd) noexcept : fd_(fd) {}
+    descriptor(const descriptor&) = delete;
+    descriptor& operator=(const descriptor&) = delete;
+    ~descriptor() { close(); }
+    [[nodiscard]] int get() const noexcept { return fd_; }
+    void close() noexcept {
+        if (fd_ >= 0) {
+            ::close(std::exchange(fd_, -1));
+        }
+    }
+
+  private:
+    int fd_;
+};
+
+void write_all(int to, std::string_view text) {
+    [[maybe_unused]] const auto written = ::write(to, text.data(), std::min(text.size(), max_report));
+}
+
+// As in a new process: without the parent's signal handling, and without a core dump if it crashes.
+void reset_process_state(int output) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL); // it may hang, and the parent may be killed before it kills the child
+    for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGTERM, SIGINT, SIGHUP, SIGPIPE, SIGCHLD}) {
+        ::signal(number, SIG_DFL);
+    }
+    sigset_t none;
+    ::sigemptyset(&none);
+    ::sigprocmask(SIG_SETMASK, &none, nullptr);
+    const rlimit no_core{};
+    ::setrlimit(RLIMIT_CORE, &no_core);
+    ::dup2(output, STDOUT_FILENO);
+    ::dup2(output, STDERR_FILENO);
+}
+
+// In the child. Ends it without exit handlers, which belong to the parent.
+[[noreturn]] void run_child(const std::filesystem::path& file, const std::string& node, const std::string& config,
+                            int output, int report) {
+    reset_process_state(output);
+    char step = loading;
+    const auto begin_step = [&](char next) {
+        step = next;
+        write_all(report, {&step, 1});
+    };
+    try {
+        begin_step(loading);
+        // Never unloaded, as in the daemon.
+        const auto* library = new boost::dll::shared_library{open_library("", file)};
+        begin_step(describing);
+        const auto& described = describe_plugin("", *library);
+        begin_step(checking);
+        plugin_jobs jobs;
+        stop_notifier notifier;
+        loaded_plugin plugin{detail::known_part(&described), node, jobs, notifier, {}};
+        if (const auto why = plugin.check(config)) {
+            throw plugin_error("", why->why, why->setting);
+        }
+        ::_exit(usable);
+    } catch (const plugin_error& e) {
+        const std::string why{std::string_view{e.what()}.substr(2)}; // without the path, which the parent adds
+        write_all(report, (e.setting() ? blames_setting + *e.setting() : std::string{blames_plugin}) + "\n" + why);
+    } catch (const std::exception& failed) {
+        const std::string what{step_name(step)};
+        write_all(report, blames_plugin + ("\n" + what) + " threw: " + failed.what());
+    }
+    ::_exit(refused);
+}
+
+// Keeps the last `max_output` bytes, from the beginning of a character.
+void trim_output(std::string& output) {
+    if (output.size() <= max_output) {
+        return;
+    }
+    auto begin = output.size() - max_output;
+    while (begin < output.size() && (static_cast<unsigned char>(output[begin]) & 0xC0U) == 0x80U) {
+        ++begin;
+    }
+    output.erase(0, begin);
+}
+
+// Reads what is available, but no more than a pipe holds, because the child may write faster. False at the end of the
+// stream.
+bool read_ready(int from, std::string& output) {
+    std::array<char, 4096> some{};
+    for (std::size_t taken = 0; taken < max_read; taken += some.size()) {
+        const auto size = ::read(from, some.data(), some.size());
+        if (size == 0) {
+            return false;
+        }
+        if (size < 0) {
+            return errno == EAGAIN || errno == EINTR;
+        }
+        output.append(some.data(), static_cast<std::size_t>(size));
+        trim_output(output);
+    }
+    return true;
+}
+
+int open_process(pid_t process) {
+    const auto fd = static_cast<int>(::syscall(SYS_pidfd_open, process, 0));
+    if (fd < 0) {
+        throw std::system_error(errno, std::generic_category(), "cannot watch a process");
+    }
+    return fd;
+}
+
+// Reads the child's output until the child ends or the time is up. Returns whether it ended. The end of the stream is
+// not the end of the child: it may close its output and continue, and a process that it started may keep the output
+// open.
+bool read_output(int from, int process, std::string& output, std::chrono::steady_clock::time_point end) {
+    std::array<pollfd, 2> watched{
+        {{.fd = process, .events = POLLIN, .revents = 0}, {.fd = from, .events = POLLIN, .revents = 0}}};
+    auto& [ended, readable] = watched;
+    for (;;) {
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+        const auto ready = ::poll(watched.data(), watched.size(), static_cast<int>(std::max<long>(left.count(), 0)));
+        if (ready < 0 && errno == EINTR) {
+            continue;
+        }
+        if (ready > 0 && ended.revents == 0) {
+            readable.fd = read_ready(from, output) ? from : -1;
+        }
+        const bool over = left.count() <= 0 && ended.revents == 0;
+        if (ready <= 0 || ended.revents != 0 || over) {
+            read_ready(from, output);
+            return ready > 0 && ended.revents != 0;
+        }
+    }
+}
+
+// On one line, for a log.
+std::string single_line(std::string text) {
+    while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) {
+        text.pop_back();
+    }
+    std::replace_if(
+        text.begin(), text.end(), [](char c) { return c >= 0 && c < ' '; }, ' ');
+    return text;
+}
+
+std::string with_output(std::string text, const std::string& output) {
+    return output.empty() ? text : text + ": " + output;
+}
+
+// Waits for the child. When the time is up, kills it and returns false.
+bool wait_for_end(pid_t child, int from, std::string& output, std::chrono::steady_clock::time_point end, int& status) {
+    bool ended = false;
+    try {
+        const descriptor process{open_process(child)};
+        ended = read_output(from, process.get(), output, end);
+    } catch (...) {
+        ::kill(child, SIGKILL);
+        ::waitpid(child, &status, 0);
+        throw;
+    }
+    if (!ended) {
+        ::kill(child, SIGKILL);
+    }
+    while (::waitpid(child, &status, 0) < 0) {
+        if (errno != EINTR) {
+            throw std::system_error(errno, std::generic_category(), "cannot wait for a process");
+        }
+    }
+    return ended;
+}
+
+// The report is complete when the child has ended.
+std::string read_report(int from) {
+    std::array<char, 2 * max_report> all{};
+    const auto size = ::read(from, all.data(), all.size());
+    return {all.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
+}
+
+[[noreturn]] void refuse(const std::string& path, std::string_view report) {
+    const auto begin = report.find_first_of(verdict_marks);
+    const auto end = report.find('\n');
+    if (begin == std::string_view::npos || end == std::string_view::npos || end < begin) {
+        throw plugin_error(path, "its trial failed without a message");
+    }
+    const auto why = single_line(std::string{report.substr(end + 1)});
+    if (report[begin] == blames_setting) {
+        throw plugin_error(path, why, single_line(std::string{report.substr(begin + 1, end - begin - 1)}));
+    }
+    throw plugin_error(path, why);
+}
+
+std::array<int, 2> make_pipe() {
+    std::array<int, 2> ends{};
+    // Only the reader's end is non-blocking, so that no output of the child is lost.
+    if (::pipe2(ends.data(), O_CLOEXEC) != 0 || ::fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) {
+        throw std::system_error(errno, std::generic_category(), "cannot create a pipe");
+    }
+    return ends;
+}
+
+} // namespace
+
+void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
+                const std::string& config, std::chrono::milliseconds limit) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    const auto output_ends = make_pipe();
+    descriptor from{output_ends[0]};
+    descriptor into{output_ends[1]};
+    const auto report_ends = make_pipe();
+    const descriptor report_from{report_ends[0]};
+    descriptor report_into{report_ends[1]};
+    const auto child = ::fork();
+    if (child < 0) {
+        throw std::system_error(errno, std::generic_category(), "cannot start a process");
+    }
+    if (child == 0) {
+        run_child(file, node, config, into.get(), report_into.get());
+    }
+    into.close();
+    report_into.close();
+    std::string output;
+    int status = 0;
+    const bool ended = wait_for_end(child, from.get(), output, end, status);
+    output = single_line(std::move(output));
+    const auto report = read_report(report_from.get());
+    const auto steps = report.substr(0, report.find_first_of(verdict_marks));
+    const std::string what{step_name(steps.empty() ? loading : steps.back())};
+    if (!ended) {
+        throw plugin_error(path, with_output(what + " does not end", output));
+    }
+    if (WIFSIGNALED(status)) {
+        throw plugin_error(
+            path, with_output(what + " ends the process by signal " + std::to_string(WTERMSIG(status)), output));
+    }
+    if (WEXITSTATUS(status) == refused) {
+        refuse(path, report);
+    }
+    if (WEXITSTATUS(status) != usable) {
+        throw plugin_error(path, with_output(what + " ends the process", output));
+    }
+}
+
+std::string plugin_error_message(const config& setup, std::size_t plugin, const plugin_error& why) {
+    const auto of = "plugins[" + std::to_string(plugin) + "]";
+    const auto& setting = why.setting();
+    const auto key = !setting ? of + ".path" : setting->empty() ? of + ".config" : of + ".config." + *setting;
+    return setup.location_of(key) + ": " + why.what();
+}
+
+void try_plugins(config& setup) {
+    for (std::size_t i = 0; i < setup.plugins.size(); ++i) {
+        auto& wanted = setup.plugins[i];
+        try {
+            const auto path = resolve_plugin_path(setup, wanted);
+            try_plugin(path, find_plugin(path, plugin_search_path(setup)), setup.node, wanted.config, trial_limit);
+        } catch (const plugin_error& e) {
+            wanted.trial_error = plugin_error_message(setup, i, e);
+            if (wanted.required) {
+                throw config_error(wanted.trial_error);
+            }
+        }
+    }
+}
+
+} // namespace cles::runtime

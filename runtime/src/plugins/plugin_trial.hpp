@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "config/config.hpp"
+#include "plugins/plugin_search.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <string>
+
+namespace cles::runtime {
+
+/// Loads a plugin in a child process, calls its entry point, and lets it check its settings. Its tasks are not
+/// registered.
+///
+/// The code that a library runs then cannot be guarded against in the same process: an exception from the constructor
+/// of a global object ends the process, as does a crash, and a function that never returns blocks it. The last output
+/// of the child is part of the exception. A trial takes a few milliseconds. It has to be made before the process starts
+/// threads: the child is a copy of this thread only, in which a lock of another thread is never released.
+///
+/// \param path as written in the configuration \param file its file \param config its settings, a JSON object
+/// \throws plugin_error if it cannot be used; std::system_error if it cannot be tried, for example because the process
+/// ignores SIGCHLD
+void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
+                const std::string& config, std::chrono::milliseconds limit);
+
+/// The message about a plugin that cannot be used: the location in the configuration, of its `path` or of the invalid
+/// setting, and the reason.
+std::string plugin_error_message(const config& setup, std::size_t plugin, const plugin_error& why);
+
+/// Tries all plugins, each in a child process, and stores why any cannot be used in its `trial_error`. To be called
+/// before the process starts threads. \throws config_error if a required plugin cannot be used
+void try_plugins(config& setup);
+
+} // namespace cles::runtime

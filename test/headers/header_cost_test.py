@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Checks what the public headers make their users compile.
+
+    header_cost_test.py --compiler CXX --headers DIR --define NAME... --scratch DIR
+
+`registrar.hpp` and the headers for plugins include no Asio. `service.hpp` has few lines beyond those of the standard
+library and of Asio that its interface needs, as the preprocessor counts them on this machine.
+"""
+
+import argparse
+import subprocess
+import sys
+from pathlib import Path
+
+# What the types in the interface of `service.hpp` need: containers and functions, executors, and coroutines.
+NEEDED = ("any", "chrono", "functional", "map", "memory", "optional", "span", "string", "string_view", "unordered_map",
+          "variant", "vector", "boost/asio/any_io_executor.hpp", "boost/asio/use_awaitable.hpp")
+MOST_BEYOND = 0.05  # of the lines that these have
+
+
+class Compiler:
+    def __init__(self, options: argparse.Namespace):
+        self.command = [options.compiler, "-std=c++20", f"-I{options.headers.resolve()}",
+                        *(f"-D{name}" for name in options.define)]
+        self.source = options.scratch / "includes.cpp"
+
+    def run(self, headers: tuple[str, ...], *flags: str) -> str:
+        self.source.write_text("".join(f"#include <{header}>\n" for header in headers), encoding="utf-8")
+        return subprocess.run([*self.command, *flags, str(self.source)], check=True, capture_output=True, text=True).stdout
+
+    def asio_in(self, header: str) -> list[str]:
+        """The files of Asio that a header includes."""
+        return [name for name in self.run((header,), "-M").split() if "/boost/asio" in name]
+
+    def lines_of(self, *headers: str) -> int:
+        """Lines of code after preprocessing: without empty ones and those that name the file."""
+        lines = self.run(headers, "-E").splitlines()
+        return sum(1 for line in lines if line.strip() and not line.startswith("#"))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--compiler", required=True)
+    parser.add_argument("--headers", required=True, type=Path)
+    parser.add_argument("--define", action="append", default=[])
+    parser.add_argument("--scratch", required=True, type=Path)
+    options = parser.parse_args()
+    options.scratch.mkdir(parents=True, exist_ok=True)
+    compiler = Compiler(options)
+
+    failures = []
+    if not compiler.asio_in("cles/service.hpp"):
+        failures.append("no Asio found in service.hpp, which includes it: this test does not recognise it")
+    light = ["registrar.hpp", *sorted(path.name for path in (options.headers / "cles").glob("plugin*.hpp"))]
+    for header in light:
+        if asio := compiler.asio_in(f"cles/{header}"):
+            failures.append(f"{header} includes {len(asio)} files of Asio, first {asio[0]}")
+
+    needed, all_lines = compiler.lines_of(*NEEDED), compiler.lines_of("cles/service.hpp", *NEEDED)
+    beyond = all_lines / needed - 1
+    if beyond > MOST_BEYOND:
+        failures.append(f"service.hpp has {all_lines} lines, {beyond:.1%} more than the {needed} that it needs; at most "
+                        f"{MOST_BEYOND:.1%} more")
+    print("\n".join([*failures, f"{len(light)} headers without Asio; service.hpp: {all_lines} lines, {needed} of them of the "
+                                f"standard library and of Asio"]))
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "config/config.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+
+using namespace cles::runtime;
+
+namespace {
+
+std::string refusal(const config& whole) {
+    try {
+        check(whole);
+    } catch (const config_error& e) {
+        return e.what();
+    }
+    return "accepted";
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_SUITE(config)
+
+BOOST_AUTO_TEST_CASE(the_defaults_are_valid) {
+    const auto c = default_config("host", 0);
+    BOOST_TEST(refusal(c) == "accepted");
+    BOOST_TEST(c.workers == 1U);
+    BOOST_TEST(c.multicast.interface == "lo");
+    BOOST_TEST(!c.multicast.required);
+}
+
+BOOST_AUTO_TEST_CASE(the_node_name_defaults_to_the_host_name) {
+    BOOST_TEST(default_config("sat1.example.org", 1).node == "sat1");
+    BOOST_TEST(default_config("my host", 1).node == "my-host");
+    BOOST_TEST(default_config("", 1).node == "node");
+    BOOST_TEST(default_config("any", 1).node == "node");
+    BOOST_TEST(default_config(std::string(100, 'x'), 1).node.size() == 64U);
+}
+
+BOOST_AUTO_TEST_CASE(listening_for_other_hosts_requires_insecure) {
+    auto c = default_config("host", 1);
+    c.listen = {"tcp://127.0.0.1", "tcp://0.0.0.0"};
+    c.origins["listen[1]"] = "clesd.yaml:3";
+    BOOST_TEST(refusal(c) == "clesd.yaml:3: listen[1]: 'tcp://0.0.0.0' can be reached from other hosts, which requires "
+                             "'insecure: true'");
+    c.insecure = true;
+    BOOST_TEST(refusal(c) == "accepted");
+}
+
+BOOST_AUTO_TEST_CASE(multicast_to_other_hosts_requires_insecure) {
+    auto c = default_config("host", 1);
+    c.multicast.interface = "eth0";
+    c.origins["multicast"] = "CLES_MULTICAST";
+    BOOST_TEST(refusal(c).starts_with("CLES_MULTICAST: multicast: 'eth0' can be reached from other hosts"));
+    for (const auto* several : {"lo,eth0", "auto"}) {
+        c.multicast.interface = several;
+        BOOST_TEST(refusal(c).find("can be reached from other hosts") != std::string::npos);
+    }
+    c.insecure = true;
+    BOOST_TEST(refusal(c) == "accepted");
+}
+
+BOOST_AUTO_TEST_CASE(a_peer_may_not_have_the_nodes_name) {
+    auto c = default_config("host", 1);
+    c.peers["host"] = "tcp://127.0.0.1:1";
+    c.origins["peers.host"] = "clesd.yaml:4";
+    BOOST_TEST(refusal(c) == "clesd.yaml:4: peers.host: is this node's own name");
+}
+
+BOOST_AUTO_TEST_CASE(a_plugin_is_listed_once) {
+    auto c = default_config("host", 1);
+    c.plugins = {{.path = "a.so"}, {.path = "b.so"}, {.path = "a.so"}};
+    c.origins["plugins[2]"] = "clesd.yaml:9";
+    BOOST_TEST(refusal(c) == "clesd.yaml:9: plugins[2].path: 'a.so' is listed twice");
+}
+
+BOOST_AUTO_TEST_CASE(a_location_falls_back_to_the_containing_value) {
+    auto c = default_config("host", 1);
+    c.origins["listen"] = "clesd.yaml:3";
+    BOOST_TEST(c.location_of("listen[1]") == "clesd.yaml:3: listen[1]");
+    BOOST_TEST(c.location_of("listen") == "clesd.yaml:3: listen");
+    BOOST_TEST(c.location_of("log.level") == "log.level");
+    BOOST_TEST(c.location_of("queue") == "queue");
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/version.hpp>
+
+#include "daemon/command_line.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <string>
+#include <variant>
+#include <vector>
+
+using namespace cles::runtime;
+
+namespace command_line {
+namespace {
+
+std::variant<cles::runtime::command_line_options, std::string> parse(std::vector<const char*> words) {
+    words.insert(words.begin(), "clesd");
+    return parse_command_line(static_cast<int>(words.size()), words.data());
+}
+
+} // namespace
+} // namespace command_line
+
+BOOST_AUTO_TEST_SUITE(command_line)
+
+BOOST_AUTO_TEST_CASE(without_flags_nothing_is_set) {
+    const auto wanted = std::get<cles::runtime::command_line_options>(parse({}));
+    BOOST_TEST(!wanted.config);
+    BOOST_TEST(!wanted.check);
+    BOOST_TEST(!wanted.print_config);
+    BOOST_TEST(!wanted.flags.node);
+    BOOST_TEST(!wanted.flags.listen);
+}
+
+BOOST_AUTO_TEST_CASE(every_flag) {
+    const auto wanted = std::get<cles::runtime::command_line_options>(
+        parse({"--config", "a.yaml", "--check", "--print-config", "--node", "sat1", "--listen", "tcp://127.0.0.1:1",
+               "-l", "udp://127.0.0.1:1", "--seed", "tcp://127.0.0.1:2", "--multicast", "off", "--log", "debug,json"}));
+    BOOST_TEST(wanted.config.value() == "a.yaml");
+    BOOST_TEST(wanted.check);
+    BOOST_TEST(wanted.print_config);
+    BOOST_TEST(wanted.flags.node->value == "sat1");
+    BOOST_TEST(wanted.flags.node->source == "--node");
+    BOOST_TEST(wanted.flags.listen->value == (std::vector<std::string>{"tcp://127.0.0.1:1", "udp://127.0.0.1:1"}),
+               boost::test_tools::per_element());
+    BOOST_TEST(wanted.flags.seeds->source == "--seed");
+    BOOST_TEST(wanted.flags.multicast->value == "off");
+    BOOST_TEST(wanted.flags.log->value == "debug,json");
+}
+
+BOOST_AUTO_TEST_CASE(help_and_version_are_printed) {
+    BOOST_TEST(std::get<std::string>(parse({"--version"})) == "clesd " + std::string{cles::version} + "\n");
+    BOOST_TEST(std::get<std::string>(parse({"--help"})).find("--print-config") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(invalid_command_lines_are_refused) {
+    BOOST_CHECK_THROW(parse({"--verbose"}), usage_error);
+    BOOST_CHECK_THROW(parse({"start"}), usage_error);
+    BOOST_CHECK_THROW(parse({"--node"}), usage_error);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

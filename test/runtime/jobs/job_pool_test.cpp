@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: BSL-1.0
+// Jobs on real threads, and how they end.
+
+#include "jobs/job_pool.hpp"
+#include "pooled_node.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <atomic>
+#include <future>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <thread>
+#include <utility>
+#include <vector>
+
+BOOST_AUTO_TEST_SUITE(job_pool)
+
+using namespace cles::test;
+using namespace std::chrono_literals;
+using cles::errc;
+using cles::runtime::job_context;
+
+struct fixture : pooled_node {
+    fixture() : client(peer()) {}
+    void add(std::string task, cles::runtime::job_work work) {
+        tasks->add_work(cles::verb::delegate, std::move(task), {}, std::move(work));
+    }
+    std::string ask(const std::string& line) { return client.ask(line); }
+
+    scripted_peer client;
+};
+
+BOOST_FIXTURE_TEST_CASE(a_job_runs_on_a_worker_with_its_request, fixture) {
+    notes seen;
+    std::atomic<std::thread::id> where{};
+    add("route", [&](const job_context& job) {
+        where = std::this_thread::get_id();
+        const auto& r = job.request();
+        seen.add(std::string{r.node()} + " " + std::string{r.task()} + " " + std::string{r.parameter(0)} + " " +
+                 std::string{r.body()} + " " + r.peer().transport);
+        seen.add(job.deadline() > cles::time_point::clock::now() ? "in time" : "late");
+        job.done(R"({"km":3})");
+    });
+    BOOST_TEST(ask(R"(DELEGATE self:route/fast {"to":"x"})") == R"({"km":3})");
+    BOOST_TEST(seen.joined() == R"(car1 route fast {"to":"x"} tcp in time)");
+    BOOST_TEST((where.load() != std::this_thread::get_id()));
+    BOOST_TEST(pool->figures().admitted == 1U);
+    BOOST_TEST(pool->figures().answered == 1U);
+}
+
+BOOST_FIXTURE_TEST_CASE(results_are_the_same_as_inline, fixture) {
+    add("nothing", [](const job_context& job) { job.done(); });
+    add("scalar", [](const job_context& job) { job.done("42"); });
+    add("spaced", [](const job_context& job) { job.done("{ \"a\" : [ 1,\n2 ] }"); });
+    add("broken", [](const job_context& job) { job.done("{\"a\":"); });
+    add("error", [](const job_context& job) { job.done(R"({"error":"mine"})"); });
+    add("refusing", [](const job_context& job) { job.fail(errc::denied, "not you"); });
+    BOOST_TEST(ask("DELEGATE self:nothing") == "{}");
+    BOOST_TEST(ask("DELEGATE self:scalar") == R"({"value":42})");
+    BOOST_TEST(ask("DELEGATE self:spaced") == R"({"a":[1,2]})");
+    BOOST_TEST(ask("DELEGATE self:broken").starts_with(R"({"error":"failed")"));
+    BOOST_TEST(ask("DELEGATE self:error").starts_with(R"({"error":"failed")"));
+    BOOST_TEST(ask("DELEGATE self:refusing") == R"({"error":"denied","message":"car1: not you"})");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_with_a_retry_delay, fixture) {
+    add("full", [](const job_context& job) { job.refuse("no room in the dock", 250ms); });
+    tasks->on_delegate("full_too", [](const cles::request&, const cles::responder& answer) {
+        answer.refuse("no room here either", 7s);
+    });
+    BOOST_TEST(ask("DELEGATE self:full") == R"({"error":"busy","message":"car1: no room in the dock","retry_ms":250})");
+    BOOST_TEST(ask("DELEGATE self:full_too") ==
+               R"({"error":"busy","message":"car1: no room here either","retry_ms":7000})");
+    add("good", [](const job_context& job) { job.fail(errc::busy, "in its own words"); });
+    BOOST_TEST(ask("DELEGATE self:good").find("retry_ms\":7000") ==
+               std::string::npos); // nothing is left of the earlier one
+}
+
+BOOST_FIXTURE_TEST_CASE(an_exception_from_a_job_becomes_the_answer, fixture) {
+    add("own", [](const job_context&) { throw cles::error(errc::bad_request, "no such place"); });
+    add("standard", [](const job_context&) { throw std::runtime_error("cannot open /etc/secret/key.pem"); });
+    add("number", [](const job_context&) { throw 7; });
+    add("good", [](const job_context& job) { job.done("1"); });
+    BOOST_TEST(ask("DELEGATE self:own") == R"({"error":"bad_request","message":"car1: no such place"})");
+    const auto standard = ask("DELEGATE self:standard");
+    BOOST_TEST(standard.starts_with(R"({"error":"failed")"), standard);
+    BOOST_TEST(standard.find("secret") == std::string::npos, standard);
+    BOOST_TEST(ask("DELEGATE self:number").starts_with(R"({"error":"failed")"));
+    BOOST_TEST(ask("DELEGATE self:good") == R"({"value":1})");
+    BOOST_TEST(pool->figures().threw == 3U);
+}
+
+BOOST_FIXTURE_TEST_CASE(the_first_answer_is_sent_and_others_are_counted, fixture) {
+    add("twice", [](const job_context& job) {
+        job.done("1");
+        job.done("2");
+        job.fail(errc::failed, "three");
+        throw std::runtime_error("four");
+    });
+    BOOST_TEST(ask("DELEGATE self:twice") == R"({"value":1})");
+    wait_for([&] { return pool->figures().answered_twice == 3; });
+}
+
+BOOST_FIXTURE_TEST_CASE(concurrent_answers_send_one, fixture) {
+    add("race", [](const job_context& job) {
+        std::vector<std::thread> racers;
+        for (int i = 0; i < 4; ++i) {
+            racers.emplace_back([job, i] { job.done(std::to_string(i)); });
+        }
+        for (auto& each : racers) {
+            each.join();
+        }
+    });
+    for (int i = 0; i < 20; ++i) {
+        BOOST_TEST(ask("DELEGATE self:race").starts_with(R"({"value":)"));
+    }
+    wait_for([&] { return pool->figures().answered_twice == 60; }); // the last ones may not have arrived
+}
+
+BOOST_FIXTURE_TEST_CASE(a_released_job_without_an_answer_fails, fixture) {
+    add("forgotten", [](const job_context&) {});
+    BOOST_TEST(ask("DELEGATE self:forgotten") ==
+               R"({"error":"failed","message":"car1: the job ended without an answer"})");
+    BOOST_TEST(pool->figures().answerless == 1U);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_job_may_be_answered_later_by_a_thread_of_its_own, fixture) {
+    std::vector<std::thread> own;
+    std::mutex guard;
+    add("later", [&](const job_context& job) {
+        const std::lock_guard lock{guard};
+        own.emplace_back([job] { job.done("[5]"); });
+    });
+    BOOST_TEST(ask("DELEGATE self:later") == "[5]");
+    wait_for([&] { return pool->load().running == 0; }); // its worker has released it
+    const std::lock_guard lock{guard};
+    own.front().join();
+}
+
+BOOST_FIXTURE_TEST_CASE(a_job_that_waits_holds_no_worker, fixture) {
+    notes order;
+    std::mutex guard;
+    std::vector<job_context> kept;
+    add("waiting", [&](const job_context& job) {
+        const std::lock_guard lock{guard};
+        kept.push_back(job);
+    });
+    add("quick", [](const job_context& job) { job.done(); });
+    client.send("DELEGATE self:waiting id=1\nDELEGATE self:waiting id=2\nDELEGATE self:waiting id=3\n");
+    BOOST_TEST(ask("DELEGATE self:quick id=9") == "id=9 {}");
+    wait_for([&] { return pool->figures().waiting == 3; });
+    BOOST_TEST(pool->load().running == 3U);
+    const std::lock_guard lock{guard};
+    for (const auto& each : kept) {
+        each.done();
+    }
+    client.line();
+    client.line();
+    client.line();
+    kept.clear();
+    wait_for([&] { return pool->load().running == 0; });
+}
+
+BOOST_FIXTURE_TEST_CASE(a_job_may_answer_after_the_pool_is_destroyed, fixture) {
+    std::optional<job_context> kept;
+    std::promise<void> handed_over;
+    add("later", [&](const job_context& job) {
+        kept = job;
+        handed_over.set_value();
+    });
+    client.send("DELEGATE self:later\n");
+    wait_for([&, ready = handed_over.get_future()] { return ready.wait_for(0s) == std::future_status::ready; });
+    tasks.reset();
+    pool.reset();
+    BOOST_TEST(client.line().starts_with(R"({"error":"unavailable")"));
+    BOOST_TEST(ask("DELEGATE self:later").starts_with(R"({"error":"unavailable")"));
+    BOOST_TEST(kept->stopped());
+    notes told;
+    std::thread{[&told, job = *std::exchange(kept, std::nullopt)] {
+        told.add(job.progress(0.5) ? "heard" : "unheard");
+        job.log(cles::log_level::info, "still here");
+        job.done("1");
+        job.done("2");
+        told.add(std::string{job.request().task()});
+    }}.join();
+    BOOST_TEST(told.joined() == "unheard later");
+    run_ready(io);
+}
+
+BOOST_AUTO_TEST_CASE(a_job_may_answer_after_the_service_is_destroyed) {
+    std::optional<job_context> kept;
+    {
+        fixture node;
+        node.add("later", [&](const job_context& job) { kept = job; });
+        node.client.send("DELEGATE self:later\n");
+        node.wait_for([&] { return node.pool->figures().waiting == 1; });
+    }
+    BOOST_TEST_REQUIRE(kept.has_value());
+    std::thread{[job = *std::exchange(kept, std::nullopt)] { job.done("1"); }}.join();
+}
+
+BOOST_FIXTURE_TEST_CASE(progress_comes_in_order_before_the_result, fixture) {
+    add("slow", [](const job_context& job) {
+        job.progress(0.25, R"({"at":1})");
+        job.progress(0.5);
+        job.progress(0.1); // progress does not decrease
+        job.done("[]");
+    });
+    client.send("DELEGATE self:slow id=7 progress=yes\n");
+    BOOST_TEST(client.line() == R"(id=7 progress=0.25 {"at":1})");
+    BOOST_TEST(client.line() == "id=7 progress=0.5 {}");
+    BOOST_TEST(client.line() == "id=7 progress=0.5 {}");
+    BOOST_TEST(client.line() == "id=7 []");
+}
+
+BOOST_FIXTURE_TEST_CASE(progress_reports_whether_it_is_wanted, fixture) {
+    add("slow", [](const job_context& job) {
+        while (job.progress(0.5)) {
+            std::this_thread::yield();
+        }
+        job.done();
+    });
+    BOOST_TEST(ask("DELEGATE self:slow id=7") == "id=7 {}");
+}
+
+BOOST_FIXTURE_TEST_CASE(memory_of_progress_reports_is_bounded, fixture) {
+    add("talkative", [](const job_context& job) {
+        for (int i = 0; i < 10'000; ++i) {
+            job.progress(i / 10'000.0);
+        }
+        job.done();
+    });
+    client.send("DELEGATE self:talkative id=7 progress=yes\n");
+    std::string line;
+    int reports = 0;
+    for (line = client.line(); line.find("progress=") != std::string::npos; line = client.line()) {
+        ++reports;
+    }
+    BOOST_TEST(line == "id=7 {}");
+    BOOST_TEST(reports >= 1);
+    BOOST_TEST(reports <= 10'000);
+}
+
+BOOST_FIXTURE_TEST_CASE(a_job_writes_to_the_log, fixture) {
+    add("chatty", [](const job_context& job) {
+        job.log(cles::log_level::info, "on my way");
+        job.done();
+    });
+    BOOST_TEST(ask("DELEGATE self:chatty") == "{}");
+    wait_for([&] { return log.has("on my way"); });
+}
+
+BOOST_FIXTURE_TEST_CASE(a_hung_pull_delays_no_other, fixture) {
+    tasks->on_pull("hung", [&] {
+        hold.pass();
+        return 0;
+    });
+    tasks->on_pull("quick", [] { return 1; });
+    client.send("PULL self:hung id=1\n");
+    wait_for([&] { return hold.arrived() == 1; });
+    for (int i = 0; i < 100; ++i) {
+        BOOST_TEST_REQUIRE(ask("PULL self:quick id=2") == R"(id=2 {"value":1})");
+    }
+    BOOST_TEST(hold.passed() == 0);
+    hold.open();
+    BOOST_TEST(client.line() == R"(id=1 {"value":0})");
+}
+
+BOOST_FIXTURE_TEST_CASE(many_jobs_of_many_links_are_all_answered, fixture) {
+    std::atomic<int> ran{0};
+    add("echo", [&](const job_context& job) {
+        ++ran;
+        job.done(job.request().body());
+    });
+    tasks->on_delegate("plain", [&](const cles::request& r) {
+        ++ran;
+        return cles::json_text{std::string{r.body()}};
+    });
+    std::vector<scripted_peer> clients;
+    constexpr int links = 5;
+    constexpr int each = 200;
+    for (int i = 0; i < links; ++i) {
+        clients.push_back(peer());
+        std::string lines;
+        for (int n = 1; n <= each; ++n) {
+            const std::string task = n % 2 == 0 ? "echo" : "plain";
+            lines += "DELEGATE self:" + task + " id=" + std::to_string(n) + " [" + std::to_string(i * each + n) + "]\n";
+        }
+        clients.back().send(lines);
+    }
+    for (int i = 0; i < links; ++i) {
+        std::vector<bool> seen(each + 1);
+        for (int n = 0; n < each; ++n) {
+            const auto line = clients[static_cast<std::size_t>(i)].line();
+            const auto id = std::stoi(line.substr(3));
+            BOOST_TEST_REQUIRE(line == "id=" + std::to_string(id) + " [" + std::to_string(i * each + id) + "]");
+            BOOST_TEST_REQUIRE(!seen[static_cast<std::size_t>(id)]);
+            seen[static_cast<std::size_t>(id)] = true;
+        }
+    }
+    BOOST_TEST(ran == links * each);
+    BOOST_TEST(pool->figures().answered == static_cast<std::uint64_t>(links * each));
+    wait_for([&] { return pool->load().running == 0; });
+    BOOST_TEST(pool->load().queued == 0U);
+    BOOST_TEST(pool->load().workers == 2U);
+}
+
+BOOST_FIXTURE_TEST_CASE(load_contains_the_service_time, fixture) {
+    add("slow", [](const job_context& job) {
+        std::this_thread::sleep_for(5ms);
+        job.done("1");
+    });
+    BOOST_TEST(pool->load().service_us == 0U); // not known yet
+    BOOST_TEST(ask("DELEGATE self:slow") == R"({"value":1})");
+    wait_for([&] { return pool->load().running == 0; });
+    BOOST_TEST(pool->load().service_us >= 5'000U);
+}
+
+BOOST_FIXTURE_TEST_CASE(load_grows_while_no_worker_is_free, fixture) {
+    cles::test::gate open;
+    add("quick", [](const job_context& job) { job.done("1"); });
+    add("waits", [&open](const job_context& job) {
+        open.pass();
+        job.done("1");
+    });
+    ask("DELEGATE self:quick");
+    auto one = peer();
+    one.send("DELEGATE self:waits id=1\n");
+    wait_for([&] { return pool->figures().running == 1; });
+    std::this_thread::sleep_for(30ms);
+    BOOST_TEST(pool->load().service_us < 30'000U); // the other worker is free
+    one.send("DELEGATE self:waits id=2\n");
+    wait_for([&] { return pool->figures().running == 2; });
+    wait_for([&] { return pool->load().service_us >= 30'000U; });
+    BOOST_TEST(pool->load().workers == 2U);
+    open.open();
+    one.line();
+    one.line();
+    for (int i = 0; i < 50; ++i) { // so that the average falls
+        ask("DELEGATE self:quick");
+    }
+    BOOST_TEST(pool->load().service_us < 30'000U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()

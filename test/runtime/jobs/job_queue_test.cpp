@@ -1,0 +1,193 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "jobs/job_queue.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+BOOST_AUTO_TEST_SUITE(job_queue)
+
+using cles::runtime::job_queue;
+
+struct named final : job_queue::item {
+    named(std::string what, std::uint64_t from) : name(std::move(what)) { requester = from; }
+    std::string name;
+};
+
+struct fixture {
+    named& make(const std::string& name, std::uint64_t from) { return made.emplace_back(name, from); }
+    bool push(const std::string& name, std::uint64_t from) { return queue.push(make(name, from)); }
+    std::string pop() {
+        const auto* next = static_cast<named*>(queue.pop());
+        return next == nullptr ? "" : next->name;
+    }
+    std::string pop_all() {
+        std::string order;
+        for (auto next = pop(); !next.empty(); next = pop()) {
+            order += order.empty() ? next : " " + next;
+        }
+        return order;
+    }
+
+    job_queue queue{8};
+    std::deque<named> made;
+};
+
+BOOST_FIXTURE_TEST_CASE(an_empty_queue_has_no_next_job, fixture) {
+    BOOST_TEST(queue.empty());
+    BOOST_TEST(queue.pop() == nullptr);
+}
+
+BOOST_FIXTURE_TEST_CASE(the_jobs_of_one_requester_keep_their_order, fixture) {
+    for (const auto* name : {"a1", "a2", "a3"}) {
+        BOOST_TEST(push(name, 1));
+    }
+    BOOST_TEST(queue.size() == 3U);
+    BOOST_TEST(pop_all() == "a1 a2 a3");
+    BOOST_TEST(queue.empty());
+}
+
+BOOST_FIXTURE_TEST_CASE(requesters_take_turns, fixture) {
+    for (const auto* name : {"a1", "a2", "a3", "a4"}) {
+        push(name, 1);
+    }
+    push("b1", 2);
+    push("b2", 2);
+    push("c1", 3);
+    BOOST_TEST(pop_all() == "a1 b1 c1 a2 b2 a3 a4");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_later_requester_waits_for_one_turn_of_each, fixture) {
+    for (const auto* name : {"a1", "a2", "a3"}) {
+        push(name, 1);
+    }
+    BOOST_TEST(pop() == "a1");
+    push("b1", 2);
+    BOOST_TEST(pop_all() == "a2 b1 a3");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_full_queue_refuses, fixture) {
+    for (int i = 0; i < 8; ++i) {
+        BOOST_TEST(push("a", 1));
+    }
+    BOOST_TEST(!push("late", 1));
+    BOOST_TEST(!push("late", 2));
+    BOOST_TEST(!made.back().queued());
+    pop();
+    BOOST_TEST(push("b", 2));
+}
+
+BOOST_FIXTURE_TEST_CASE(a_resumed_job_goes_first_and_ignores_the_capacity, fixture) {
+    for (int i = 0; i < 8; ++i) {
+        push("a" + std::to_string(i), 1);
+    }
+    queue.push_resumed(make("begun", 1));
+    queue.push_resumed(make("other", 2));
+    BOOST_TEST(queue.size() == 10U);
+    BOOST_TEST(!push("late", 1));
+    BOOST_TEST(pop() == "begun");
+    BOOST_TEST(pop() == "other");
+    BOOST_TEST(pop() == "a0");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_removed_job_is_not_popped, fixture) {
+    auto& first = make("a1", 1);
+    auto& middle = make("a2", 1);
+    auto& last = make("a3", 1);
+    auto& only = make("b1", 2);
+    for (auto* job : {&first, &middle, &last, &only}) {
+        BOOST_TEST(queue.push(*job));
+    }
+    queue.remove(middle);
+    queue.remove(only);
+    queue.remove(only); // has been removed already
+    BOOST_TEST(!middle.queued());
+    BOOST_TEST(queue.size() == 2U);
+    queue.remove(first);
+    BOOST_TEST(pop_all() == "a3");
+    BOOST_TEST(queue.push(middle));
+    queue.remove(middle);
+    BOOST_TEST(queue.empty());
+    BOOST_TEST(queue.pop() == nullptr);
+}
+
+BOOST_FIXTURE_TEST_CASE(many_requesters_are_served_alike, fixture) {
+    for (std::uint64_t who = 0; who < 10'000; ++who) {
+        named job{"x", who};
+        BOOST_TEST_REQUIRE(queue.push(job));
+        BOOST_TEST_REQUIRE(pop() == "x");
+    }
+    push("a1", 1);
+    push("a2", 1);
+    push("b1", 2);
+    BOOST_TEST(pop_all() == "a1 b1 a2");
+}
+
+// Compares it with a simple model: a list of requesters, each with a list of jobs.
+BOOST_AUTO_TEST_CASE(it_behaves_like_a_simple_model) {
+    std::mt19937 chance{7};
+    for (int round = 0; round < 50; ++round) {
+        constexpr std::size_t capacity = 20;
+        job_queue queue{capacity};
+        std::deque<named> jobs;
+        std::deque<std::uint64_t> turns;
+        std::map<std::uint64_t, std::deque<named*>> of;
+        std::size_t size = 0;
+        const auto leave = [&](named& job) {
+            auto& own = of[job.requester];
+            std::erase(own, &job);
+            if (own.empty()) {
+                std::erase(turns, job.requester);
+            }
+            --size;
+        };
+        for (int step = 0; step < 2000; ++step) {
+            const auto what = chance() % 10;
+            if (what < 5) {
+                auto& job = jobs.emplace_back("x", chance() % (round % 2 == 0 ? 4 : 200));
+                const bool begun = chance() % 8 == 0;
+                if (!begun) {
+                    BOOST_TEST_REQUIRE(queue.push(job) == (size < capacity));
+                    if (size >= capacity) {
+                        continue;
+                    }
+                } else {
+                    queue.push_resumed(job);
+                }
+                auto& own = of[job.requester];
+                if (own.empty()) {
+                    turns.push_back(job.requester);
+                }
+                begun ? own.push_front(&job) : own.push_back(&job);
+                ++size;
+            } else if (what < 9) {
+                const auto* next = static_cast<named*>(queue.pop());
+                if (turns.empty()) {
+                    BOOST_TEST_REQUIRE(next == nullptr);
+                    continue;
+                }
+                const auto who = turns.front();
+                auto* expected = of[who].front();
+                BOOST_TEST_REQUIRE(next == expected);
+                turns.pop_front();
+                turns.push_back(who);
+                leave(*expected);
+            } else if (!jobs.empty()) {
+                auto& job = jobs[chance() % jobs.size()];
+                if (job.queued()) {
+                    leave(job);
+                }
+                queue.remove(job);
+                BOOST_TEST_REQUIRE(!job.queued());
+            }
+            BOOST_TEST_REQUIRE(queue.size() == size);
+        }
+    }
+}
+
+BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: BSL-1.0
+// Jobs that do not stop: they are reported, their workers are replaced, and they do not prevent shutdown.
+
+#include "jobs/job_pool.hpp"
+#include "pooled_node.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <thread>
+
+BOOST_AUTO_TEST_SUITE(stuck_workers)
+
+using namespace cles::test;
+using namespace std::chrono_literals;
+using cles::runtime::drain_report;
+using cles::runtime::job_context;
+using cles::runtime::pool_options;
+
+struct fixture : pooled_node {
+    explicit fixture(pool_options options = {.workers = 1, .replacements = 1, .grace = 20ms, .close_timeout = 20ms})
+        : pooled_node(std::move(options)), client(peer()) {
+        add_held();
+        tasks->on_delegate("quick", [] { return 1; });
+    }
+    void get_stuck(int id) {
+        const auto before = hold.arrived();
+        client.send("DELEGATE self:held id=" + std::to_string(id) + "\n");
+        wait_for([&] { return hold.arrived() == before + 1; });
+        // Only now, because a job whose deadline passes before it starts does not get stuck.
+        client.send("PUSH self:cles/cancel/" + std::to_string(id) + " id=99\n");
+        BOOST_TEST(client.line().find(R"({"error":"cancelled")") != std::string::npos);
+        BOOST_TEST(client.line() == "id=99 {}");
+        const auto stuck = static_cast<std::uint64_t>(before) + 1;
+        wait_for([&] { return pool->figures().stuck == stuck; });
+    }
+    drain_report drain(std::chrono::milliseconds limit) {
+        std::optional<drain_report> report;
+        pool->drain(limit, [&](const drain_report& told) { report = told; });
+        wait_for([&] { return report.has_value(); });
+        return *report;
+    }
+
+    scripted_peer client;
+};
+
+BOOST_FIXTURE_TEST_CASE(a_stuck_worker_is_reported_and_replaced, fixture) {
+    get_stuck(1);
+    BOOST_TEST(client.ask("DELEGATE self:quick id=2") == R"(id=2 {"value":1})");
+    BOOST_TEST(log.has("worker 1 is stuck in DELEGATE 'held'"));
+    BOOST_TEST(log.has("replaced by another"));
+    const auto figures = pool->figures();
+    BOOST_TEST(figures.stuck == 1U);
+    BOOST_TEST(figures.replaced == 1U);
+    BOOST_TEST(figures.stuck_now == 1U);
+    BOOST_TEST(pool->load().workers == 1U);
+    hold.open();
+    wait_for([&] { return pool->figures().revived == 1; });
+    BOOST_TEST(pool->figures().stuck_now == 0U);
+    BOOST_TEST(pool->load().workers == 1U);
+    BOOST_TEST(client.ask("DELEGATE self:quick id=3") == R"(id=3 {"value":1})");
+}
+
+BOOST_FIXTURE_TEST_CASE(without_replacements_new_jobs_are_refused, fixture) {
+    get_stuck(1);
+    get_stuck(2);
+    wait_for([&] { return pool->load().workers == 0; });
+    BOOST_TEST(log.has("no replacement is left"));
+    const auto reply = client.ask("DELEGATE self:quick id=3");
+    BOOST_TEST(reply.starts_with(R"(id=3 {"error":"busy","message":"car1: all its workers are stuck")"), reply);
+    hold.open();
+    wait_for([&] { return pool->figures().revived == 2; });
+    BOOST_TEST(client.ask("DELEGATE self:quick id=4") == R"(id=4 {"value":1})");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_stuck_job_does_not_delay_shutdown, fixture) {
+    get_stuck(1);
+    const auto report = drain(30ms);
+    BOOST_TEST(report.refused == 0U);
+    BOOST_TEST(report.stuck == 1U);
+    const auto before = std::chrono::steady_clock::now();
+    tasks.reset();
+    pool.reset();
+    BOOST_TEST((std::chrono::steady_clock::now() - before < patience));
+    BOOST_TEST(log.has("workers abandoned in jobs that do not end: 1"));
+    BOOST_TEST(hold.passed() == 0);
+    hold.open();
+    while (hold.passed() == 0) { // its state still exists
+        std::this_thread::yield();
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_drain_waits_for_running_and_queued_jobs) {
+    fixture node{{.workers = 1}};
+    node.client.send("DELEGATE self:held id=1\nDELEGATE self:quick id=2\n");
+    node.wait_for([&] { return node.hold.arrived() == 1 && node.pool->load().queued == 1; });
+    std::optional<drain_report> report;
+    node.pool->drain(patience, [&](const drain_report& told) { report = told; });
+    BOOST_TEST(node.client.ask("DELEGATE self:quick id=3") ==
+               R"(id=3 {"error":"busy","message":"car1: it is shutting down","retry_ms":1000})");
+    BOOST_TEST(!report.has_value());
+    node.hold.open();
+    BOOST_TEST(node.client.line() == R"(id=1 {"value":1})");
+    BOOST_TEST(node.client.line() == R"(id=2 {"value":1})");
+    node.wait_for([&] { return report.has_value(); });
+    BOOST_TEST(report->refused + report->abandoned + report->stuck == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_drain_of_nothing_ends_at_once) {
+    fixture node{{.workers = 1}};
+    const auto report = node.drain(patience);
+    BOOST_TEST(report.refused + report.abandoned + report.stuck == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_open_jobs_are_answered) {
+    fixture node{{.workers = 1, .close_timeout = 20ms}};
+    node.client.send("DELEGATE self:held id=1\nDELEGATE self:quick id=2\n");
+    node.wait_for([&] { return node.hold.arrived() == 1 && node.pool->load().queued == 1; });
+    const auto report = node.drain(10ms);
+    BOOST_TEST(report.refused == 1U);
+    BOOST_TEST(report.abandoned == 1U);
+    BOOST_TEST(report.stuck == 1U);
+    const auto first = node.client.line();
+    const auto second = node.client.line();
+    BOOST_TEST((first + second).find(R"(id=1 {"error":"unavailable")") != std::string::npos);
+    BOOST_TEST((first + second).find(R"(id=2 {"error":"busy")") != std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(a_job_that_stops_when_told_ends_with_the_pool) {
+    notes told;
+    {
+        fixture node{{.workers = 1, .close_timeout = patience}};
+        node.tasks->add_work(cles::verb::delegate, "polite", {}, [&](const job_context& job) {
+            told.add("begun");
+            while (!job.stopped()) {
+                std::this_thread::sleep_for(1ms);
+            }
+            told.add("ended");
+        });
+        node.client.send("DELEGATE self:polite id=1\n");
+        node.wait_for([&] { return told.size() == 1; });
+    }
+    BOOST_TEST(told.joined() == "begun ended");
+}
+
+BOOST_AUTO_TEST_SUITE_END()
