@@ -138,8 +138,7 @@ bool neighbouring::could_answer(node_run& at, std::string_view node, std::uint32
 
 void neighbouring::record_begin(node_run& n) { began_[*protocol::parse_epoch(n.node()->epoch)] = n.now(); }
 
-// Of two runs of one name the earlier one keeps it, and whoever heard the later one first finds that out by asking
-// both.
+// Of two runs of one name the earlier one keeps it. A node that heard the later one first learns this by asking both.
 bool neighbouring::has_precedence(std::uint32_t epoch, std::uint32_t over) const {
     const auto later = began_.at(epoch) - began_.at(over);
     return later <= seconds{0} || (later <= presence::together && epoch < over);
