@@ -6,7 +6,6 @@
 #include <boost/asio/buffer.hpp>
 
 #include <algorithm>
-#include <csignal>
 #include <cstdlib>
 #include <utility>
 
@@ -45,9 +44,9 @@ class screen::key_reader {
         : before_(before), input_(io, ::dup(STDIN_FILENO)), on_quit_(std::move(on_quit)) {
         auto quiet = before;
         quiet.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);
-        // Linux echoes the interrupt key only after it has sent the signal. The terminal may be restored by then, and
-        // would show ^C.
-        quiet.c_cc[VINTR] = _POSIX_VDISABLE;
+        // Linux sends the signal of ^C and then decides whether to echo it. Unless it flushes in between, the terminal
+        // cannot be restored before that.
+        quiet.c_lflag |= NOFLSH;
         ::tcsetattr(STDIN_FILENO, TCSANOW, &quiet);
         read_key();
     }
@@ -61,15 +60,11 @@ class screen::key_reader {
             if (code) { // this may be destroyed
                 return;
             }
-            const std::string_view keys{typed_.data(), size};
-            if (keys.find('q') != std::string_view::npos) {
+            if (std::string_view{typed_.data(), size}.find('q') != std::string_view::npos) {
                 on_quit_();
-                return; // this may be destroyed
+            } else {
+                read_key();
             }
-            if (keys.find(static_cast<char>(before_.c_cc[VINTR])) != std::string_view::npos) {
-                ::kill(0, SIGINT); // as the terminal does: the whole foreground process group
-            }
-            read_key();
         });
     }
 
