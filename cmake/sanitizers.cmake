@@ -38,7 +38,7 @@ function(cles_target_tests_only target)
     endif()
 endfunction()
 
-# CLES_TEST_LAUNCHER: what has to stand before a test's command. g++ 12's thread sanitizer cannot start where the kernel
+# CLES_TEST_LAUNCHER: the prefix of a test's command. g++ 12's thread sanitizer cannot start where the kernel
 # spreads addresses over more than 28 bits, so there the tests run with that turned off.
 set(CLES_TEST_LAUNCHER)
 if("thread" IN_LIST CLES_SANITIZE AND EXISTS /proc/sys/vm/mmap_rnd_bits)

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Shows four daemons that are one pool: they find each other, share jobs, and lose one of them in the middle of it.
+"""Demonstrates a pool of four daemons: they find each other and share jobs, and one of them is killed meanwhile.
 
     demo_cluster.py [FOLDER]
 
-FOLDER is where `clesd` and `cles` are, build/release/apps unless said. Nothing is left behind, neither process nor file.
+FOLDER contains `clesd` and `cles`; default build/release/apps. No processes or files are left behind.
 """
 
 import collections
@@ -22,22 +22,22 @@ import time
 
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 NAMES = ["sat1", "sat2", "sat3", "sat4"]
-FIRST, ASKED = "sat1", "sat2"  # whose address the others are given; who is asked for everything
-PATIENCE = 30  # seconds, for whatever takes far less
+FIRST, ASKED = "sat1", "sat2"  # the seed of the others; the daemon that gets all requests
+PATIENCE = 30  # seconds; everything takes far less
 SPREAD, UNDER_FIRE = 60, 80  # jobs
-JOB_SECONDS = 0.1  # what one is to take
+JOB_SECONDS = 0.1  # intended duration of a job
 BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
 
 CONFIG = """\
 node: {name}
 listen: [tcp://127.0.0.1:0]         # a free port
-multicast: off                      # with it they need no seeds
-seeds: [{seeds}]{padding}# who is asked for the others
+multicast: off                      # with multicast, no seeds are needed
+seeds: [{seeds}]{padding}# nodes that are asked for the others
 workers: 2
 plugins: [libcles-primes.so]
 """
 
-# A job is done, or was refused before it began, or has failed, or nobody knows.
+# The outcome of a job, by error code; any other code is `failed`, no error is `done`.
 FATES = {"busy": "refused", "no_target": "refused", "no_task": "refused", "unavailable": "unknown",
          "deadline": "unknown"}
 
@@ -60,17 +60,17 @@ def show(text):
 
 
 def patient(question, what):
-    """The first answer to the question that is not nothing."""
+    """Repeats the question until its answer is not empty, and returns it."""
     until = time.monotonic() + PATIENCE
     while not (answer := question()):
         if time.monotonic() > until:
-            raise Trouble(f"waited in vain: {what}")
+            raise Trouble(f"timed out: {what}")
         time.sleep(0.01)
     return answer
 
 
 class Link:
-    """A client of one socket: lines out, lines in."""
+    """A client with one socket, which sends and receives lines."""
 
     def __init__(self, url):
         host, _, port = url.removeprefix("tcp://").rpartition(":")
@@ -84,7 +84,7 @@ class Link:
         try:
             line = self.lines.readline().rstrip("\n")
         except TimeoutError:
-            raise Trouble(f"no answer came within {PATIENCE} s") from None
+            raise Trouble(f"no reply within {PATIENCE} s") from None
         if not line:
             raise Trouble("a node has closed the link")
         return line
@@ -110,7 +110,7 @@ class Cluster:
         self.started = []  # every process
         self.daemons = {}
         self.urls = {}
-        # Free of what the user's own may say.
+        # Without the user's settings for CLES.
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith("CLES_") and k != "NOTIFY_SOCKET"}
 
     def start(self, name):
@@ -128,7 +128,7 @@ class Cluster:
         show(said)
 
     def begin(self, program, *arguments, **streams):
-        """Starts a program. Who interrupts it has to wait until it is known what was started."""
+        """Starts a program. Signals are blocked until the process is recorded, so that it is always ended."""
         before = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
         try:
             self.started.append(subprocess.Popen(
@@ -188,13 +188,13 @@ class Cluster:
 
 
 def jobs_done(link):
-    """How many jobs each has answered since its start, of those that say."""
+    """The number of jobs that each daemon has answered since its start, for those that reply."""
     tables = link.ask("PULL all:cles/metrics")["results"]
     return {name: tables[name]["pool"]["answered"] for name in sorted(tables)}
 
 
 def shares_of(before, after):
-    """How many jobs each has answered meanwhile, of those that are there afterwards."""
+    """The number of jobs that each daemon has answered in between, for those that still run."""
     return {name: after[name] - before[name] for name in after}
 
 
@@ -203,7 +203,7 @@ def show_share(name, share, remark=""):
 
 
 def run_jobs(link, count, below, after_answer=lambda answers: None):
-    """Sends the jobs, and gives their fates, the time that all took, and a line each way."""
+    """Sends the jobs. Returns their outcomes, the time for all, and one line in each direction."""
     command = "DELEGATE any:primes id={} {{\"below\":" + str(below) + "}}"
     open_ones = set(range(1, count + 1))
     begun = time.monotonic()
@@ -225,21 +225,21 @@ def show_demo(cluster):
     begun = time.monotonic()
     for name in NAMES:
         patient(lambda name=name: cluster.known_to(name) == set(NAMES) - {name}, f"{name} knows the others")
-    show(f"{time.monotonic() - begun:.1f} s later each knows the three others. This is what {ASKED} was started with "
+    show(f"After {time.monotonic() - begun:.1f} s, each knows the three others. This is the configuration of {ASKED} "
          "(clesd --config FILE):")
     for line in cluster.config_of(ASKED).splitlines():
         show(f"    {line}")
 
-    heading("Who is there, what they have to do and what they offer: cles ls --tasks")
+    heading("The nodes, their load and their tasks: cles ls --tasks")
     show(cluster.command("ls", "--tasks", "--output", "table"))
 
-    heading("A job for any of them: cles delegate any:primes -d '{\"below\":5000000}'")
+    heading("A job for any node: cles delegate any:primes -d '{\"below\":5000000}'")
     begun = time.monotonic()
     show(cluster.command("delegate", "any:primes", "-d", '{"below":5000000}', "-o", "json"))
     below = int(5_000_000 * min(4, JOB_SECONDS / (time.monotonic() - begun)))
 
     with Link(cluster.urls[ASKED]) as link, Link(cluster.urls[ASKED]) as observer:
-        heading(f"{SPREAD} jobs at once, on one connection to {ASKED}: it chooses by load who does what")
+        heading(f"{SPREAD} jobs at once, on one connection to {ASKED}, which selects a node for each by load")
         before = jobs_done(observer)
         fates, seconds, sent, received = run_jobs(link, SPREAD, below)
         show(f"> {sent}\n  ... and {SPREAD - 1} more\n< {received}\n  ... and {SPREAD - 1} more, in {seconds:.1f} s")
@@ -248,36 +248,36 @@ def show_demo(cluster):
         for name, share in shares.items():
             show_share(name, share)
         if fates["done"] != SPREAD or sum(shares.values()) != SPREAD or min(shares.values()) == 0:
-            raise Trouble(f"{SPREAD} jobs were to be done by all: {dict(fates)}, {shares}")
+            raise Trouble(f"expected {SPREAD} jobs to be done, some by each node: {dict(fates)}, {shares}")
 
-        heading(f"{UNDER_FIRE} more, and in the middle of it kill -9 for {FIRST}, whose address the others were given")
+        heading(f"{UNDER_FIRE} more, and meanwhile kill -9 for {FIRST}, the seed of the others")
 
         def fire(answers):
             if answers == UNDER_FIRE // 4:
                 cluster.kill(FIRST)
-                show(f"{FIRST} is dead; {answers} of {UNDER_FIRE} jobs have been answered by now")
+                show(f"{FIRST} is dead; {answers} of {UNDER_FIRE} jobs have been answered so far")
 
         before = after
         fates, seconds, _, _ = run_jobs(link, UNDER_FIRE, below, fire)
         show(f"{UNDER_FIRE} sent: " + ", ".join(f"{fates[fate]} {fate}" for fate in ("done", "refused", "failed", "unknown"))
              + f", in {seconds:.1f} s")
         shares = shares_of(before, jobs_done(observer))
-        show_share(FIRST, fates.total() - sum(shares.values()), " and its end")
+        show_share(FIRST, fates.total() - sum(shares.values()), " until it was killed")
         for name, share in shares.items():
             show_share(name, share)
-        show(f"What {FIRST} left unanswered others began again, since primes is registered as idempotent; of another task "
-             "it would be unknown.")
+        show(f"Other nodes repeated the jobs that {FIRST} left unanswered, since primes is registered as idempotent. For "
+             "other tasks, the outcome would be unknown.")
         if fates.total() != UNDER_FIRE or fates["done"] != UNDER_FIRE:
-            raise Trouble(f"{UNDER_FIRE} jobs were to be done: {dict(fates)}")
+            raise Trouble(f"expected {UNDER_FIRE} jobs to be done: {dict(fates)}")
 
-        heading("Who answers, and who does not: all")
+        heading("Which nodes reply, and which do not: all")
         question = "PULL all:prime/97"
         link.send(question)
         answer = link.receive()
         show(f"> {question}\n< {answer}")
         answer = json.loads(answer)
         if set(answer["results"]) != set(NAMES) - {FIRST} or set(answer["errors"]) != {FIRST}:
-            raise Trouble(f"all but {FIRST} were to answer")
+            raise Trouble(f"expected a reply of each node except {FIRST}")
 
 
 def interrupt(number, _):

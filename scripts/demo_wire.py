@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Talks to two nodes over bare sockets and prints every line that crosses them: `>` as sent, `<` as received.
+"""Sends requests to two nodes over plain sockets, and prints each line that is sent (`>`) or received (`<`).
 
     demo_wire.py URL_OF_CAR1 URL_OF_CAR2
 """
@@ -54,25 +54,25 @@ class Wire:
 def show(url1: str, url2: str) -> None:
     car1, car2 = Wire(url1), Wire(url2)
 
-    heading("PULL: get data once (car1 by TCP, then car2 by its Unix socket)")
+    heading("PULL: get data once (car1 over TCP, then car2 over its Unix socket)")
     car1.ask("PULL car1:localization", '{"utc":')
     car2.ask("PULL car2:localization", '{"utc":')
 
     heading("PUSH: send parameters and data")
     car1.ask('PUSH car1:echo {"text":"road works ahead"}', '{"text":')
 
-    heading("DELEGATE: have a task done, with progress")
+    heading("DELEGATE: delegate a task, with progress")
     car1.send("DELEGATE car1:sleep/600 id=7 progress=yes")
     while car1.receive().startswith("id=7 progress="):
         pass
 
-    heading("BIND: get updates from now on (here on one link), and UPDATE: publish (on another)")
-    binder, asker = Wire(url2, "binder "), Wire(url2, "asker  ")
-    binder.ask("BIND car2:notice", "{}")
-    asker.ask('UPDATE car2:notice {"text":"bridge closed"}', "{")
-    binder.expect("UPDATE car2:notice seq=1 ")
+    heading("BIND: subscribe to updates (on one link), and UPDATE: publish (on another)")
+    subscriber, requester = Wire(url2, "subscriber "), Wire(url2, "requester  ")
+    subscriber.ask("BIND car2:notice", "{}")
+    requester.ask('UPDATE car2:notice {"text":"bridge closed"}', "{")
+    subscriber.expect("UPDATE car2:notice seq=1 ")
 
-    heading("And when something is wrong")
+    heading("Errors")
     car1.ask("PULL car1:speed", '{"error":"no_task"')
     car1.ask('PUSH car1:echo {"text":', '{"error":"bad_request"')
 

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""The four roles of joint command as processes, and the only ways that are between them (section 2.2 of the paper): the
-satellite and the reconnaissance aircraft, that and the mission centre, the mission centre and the strike aircraft."""
+"""The four roles of joint command as processes, and the only links between them (section 2.2 of the paper): satellite to
+reconnaissance aircraft, reconnaissance aircraft to mission centre, mission centre to strike aircraft."""
 
 import json
 import os
@@ -35,7 +35,7 @@ class Trouble(Exception):
 
 
 class Loopback:
-    """All on this host: who talks to whom is what each is told."""
+    """All roles on this host: their arguments determine which of them are connected."""
 
     insecure = False
 
@@ -50,10 +50,10 @@ class Loopback:
 
 
 class Namespaces:
-    """A host for each role, with a cable where there is a link, and no way where there is none. It takes root."""
+    """A host for each role. Two hosts are connected only if there is a link between them. Requires root."""
 
     insecure = True
-    # Each cable: the one that is listened to, and the one that asks.
+    # Each cable: the role that listens, and the role that connects.
     CABLES = [("satellite", "recon"), ("spare", "recon"), ("recon", "mission"), ("strike", "mission")]
 
     def __init__(self):
@@ -74,11 +74,11 @@ class Namespaces:
             if not isinstance(failure, (OSError, subprocess.CalledProcessError, Trouble)):
                 raise
             words = getattr(failure, "stderr", None) or b""
-            raise Trouble(f"no network namespaces here, which take root: {failure} "
+            raise Trouble(f"cannot create network namespaces, which requires root: {failure} "
                           f"{words.decode(errors='replace').strip()}") from None
 
     def _keep(self, role):
-        """A process that keeps a namespace until its input ends, and so no longer than this one lives."""
+        """Starts a process that keeps a namespace until its input ends, at the latest when this process ends."""
         with DeferredSignals():
             keeper = subprocess.Popen(["unshare", "--net", "sh", "-c", "echo up; exec cat"], stdin=subprocess.PIPE,
                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
@@ -103,7 +103,7 @@ class Namespaces:
 
 
 class Process:
-    """The fleet has it from the first moment, so that it ends with the fleet even where it is never ready."""
+    """A process of the fleet. It is added before it is ready, so that it ends with the fleet in any case."""
 
     def __init__(self, fleet, name, command, stdin=subprocess.DEVNULL):
         self.name = name
@@ -145,7 +145,7 @@ class Process:
 
 
 class Daemon(Process):
-    """A clesd with plugins. `url` is where it listens."""
+    """A clesd with plugins, which listens at `url`."""
 
     def __init__(self, fleet, role, name, plugins, towards, port=0, more=""):
         config = os.path.join(fleet.folder, name + ".yaml")
@@ -162,12 +162,12 @@ class Daemon(Process):
         self.url, self.port = found[1], int(found[2])
 
     def pull(self, noun):
-        """Asked on its own host, so that no way is needed that is not there."""
+        """Sends a PULL from the daemon's own host, so that no additional link is needed."""
         done = subprocess.run(self.fleet.hosts.command(self.role, self.fleet.program("cles"), "pull", noun, "--at", self.url,
                                                        "-o", "json"), stdin=subprocess.DEVNULL, capture_output=True, text=True,
                               env={**clean_environment(), "CLES_MULTICAST": "off"}, timeout=PATIENCE, check=False)
         if done.returncode != 0:
-            raise Trouble(f"{self.name} did not answer {noun}: {done.stderr}")
+            raise Trouble(f"{self.name} did not reply to {noun}: {done.stderr}")
         return json.loads(done.stdout)
 
     def peers(self):
@@ -175,7 +175,7 @@ class Daemon(Process):
 
 
 class Teller(Process):
-    """A cles-jadc2 that tells events, which are kept in their order."""
+    """A cles-jadc2, whose events are kept in order."""
 
     def __init__(self, fleet, role, *arguments, stdin=subprocess.DEVNULL, listener=None):
         self.events, self.news, self.listener = [], threading.Condition(), listener
@@ -196,7 +196,7 @@ class Teller(Process):
             self.news.notify_all()
 
     def wait_for(self, event, words="", after=0):
-        """The first such event since so many were told; `event` may be several."""
+        """The first such event after the first `after` events; `event` may name several kinds."""
         kinds = (event,) if isinstance(event, str) else event
         until = time.monotonic() + PATIENCE
         with self.news:
@@ -206,12 +206,12 @@ class Teller(Process):
                         return one
                 ended = bool(self.events) and self.events[-1]["event"] == "ended"
                 if ended or not self.news.wait(max(0, until - time.monotonic())):
-                    raise Trouble(f"{self.name} did not tell '{' or '.join(kinds)} {words}', but {self.events}; "
+                    raise Trouble(f"{self.name} did not report '{' or '.join(kinds)} {words}', but {self.events}; "
                                   f"{self.said_wrong()}")
 
     def order_by_hand(self, by=""):
-        """What an operator (--operator) does: he orders a strike on a target that he is shown, as that node saw it, and on
-        another one where it is out of sight by then. Gives the decision."""
+        """Acts as the operator (--operator): orders a strike on a target in the picture, detected by that node, and on
+        another target if that one is out of sight by then. Returns the decision."""
         after = self.told()
         while True:
             picture = self.wait_for("picture", after=after)
@@ -234,7 +234,7 @@ class Teller(Process):
             return [one for one in self.events if one["event"] == event]
 
     def end(self):
-        """Waits for its end; gives the exit code."""
+        """Waits until the process ends; returns its exit code."""
         code = self.wait()
         self.reader.join(PATIENCE)
         return code
@@ -249,7 +249,7 @@ class Teller(Process):
 
 
 class Fleet:
-    """All that was started, which goes when this does."""
+    """All processes that were started; they end with this object."""
 
     def __init__(self, programs, hosts=None, listener=None):
         self.programs, self.hosts, self.listener = programs, hosts or Loopback(), listener
@@ -267,12 +267,12 @@ class Fleet:
         return Daemon(self, role, name, plugins, "recon", port, more)
 
     def striker(self, name="strike1", plugins=None, port=0, more=""):
-        """One that takes old tracks too: a machine that has much else to do is no reason to refuse an order."""
+        """Starts a strike aircraft that also accepts old tracks, so that a busy machine does not cause refusals."""
         plugins = [f"{{path: {self.plugin('strike')}, config: {{oldest_s: 60}}}}"] if plugins is None else plugins
         return Daemon(self, "strike", name, plugins, "mission", port, more)
 
     def recon(self, satellites, *arguments, listen=None):
-        """Where it listens is its attribute `url`."""
+        """Starts a reconnaissance aircraft; its attribute `url` is the address at which it listens."""
         asked = [word for satellite in satellites for word in ("--satellite", getattr(satellite, "url", satellite))]
         at = listen or f"tcp://{self.hosts.address('recon', 'mission')}:0"
         open_to_all = ["--insecure"] if self.hosts.insecure else []
@@ -286,7 +286,7 @@ class Fleet:
                       listener=self.listener)
 
     def reaches(self, role, url):
-        """Whether a connection can be made from there."""
+        """Whether the role can connect to the URL."""
         host, _, port = url.removeprefix("tcp://").rpartition(":")
         code = f"import socket; socket.create_connection(({host!r}, {port}), 2)"
         return subprocess.run(self.hosts.command(role, "python3", "-c", code), stdin=subprocess.DEVNULL,

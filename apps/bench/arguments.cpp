@@ -12,12 +12,11 @@ namespace tool {
 namespace {
 
 constexpr const char* bench_description =
-    "Measure PULL of a localization packet against a hand-written exchange of packed structs over\n"
-    "blocking TCP sockets, both in one run, in turn, each server in a process of its own on another\n"
-    "core. With --updates or --fan-out, measure BIND and UPDATE instead; with --stress, the steadiness\n"
-    "of PULL; with --urgent, what it takes beside large answers; with --bytes, what all verbs put on the wire; with "
-    "--parse, what a message costs by its\n"
-    "length.";
+    "Compare PULL of a localization packet with a hand-written exchange of packed structs over blocking\n"
+    "TCP sockets. Both alternate in one run, each with its server in a separate process on another core.\n"
+    "Other options measure BIND and UPDATE (--updates, --fan-out), PULL on loaded cores (--stress) or\n"
+    "while large replies are in flight (--urgent), the bytes of each verb (--bytes), or the cost of a\n"
+    "message by its length (--parse).";
 
 constexpr const char* bench_examples = "Examples:\n"
                                        "  cles bench\n"
@@ -64,39 +63,39 @@ struct mode {
 
 const std::vector<mode> modes{
     {"--stress",
-     "Measure the tail of PULL's latency while other processes want all cores, with and without real-time scheduling",
+     "Measure the tail of PULL's latency while other processes use all cores, with and without real-time scheduling",
      measurement::stress,
      {"--against", "--binders", "--keep"},
      {carrier::tcp, carrier::udp, carrier::unix_socket},
-     "goes from one process to another: --transport tcp, udp or unix"},
+     "measures between processes: --transport tcp, udp or unix"},
     {"--urgent",
-     "Measure PULL beside large answers of the same node, in its turn and urgently",
+     "Measure PULL while large replies of the same node are in flight, with and without urgent requests",
      measurement::urgent,
      {"--against", "--binders", "--keep"},
      {carrier::tcp, carrier::unix_socket},
-     "is for streams, on which large answers go: --transport tcp or unix"},
+     "needs a stream, because the replies are large: --transport tcp or unix"},
     {"--fan-out",
-     "Measure the way of an UPDATE to many binders, paced and as fast as possible, against the same by hand",
+     "Measure the one-way time of an UPDATE to many subscribers, paced and as fast as possible, against the "
+     "hand-written exchange",
      measurement::fan_out,
      {"--in-flight", "--against", "--duration"},
      {carrier::tcp, carrier::unix_socket, carrier::multicast},
      "has a baseline for --transport tcp, unix and multicast only"},
     {"--updates",
-     "Measure UPDATE to binders that miss nothing instead of PULL",
+     "Measure UPDATE to subscribers that miss no update, instead of PULL",
      measurement::updates,
      {"--in-flight", "--against", "--duration"},
      {carrier::tcp, carrier::unix_socket},
-     "goes from one process to another, and every update must come: --transport tcp or unix"},
+     "measures between processes, without losses: --transport tcp or unix"},
     {"--bytes",
-     "Count what each verb puts on the wire, over TCP and UDP, against the packed struct",
+     "Count the bytes that each verb sends over TCP and UDP, against the packed struct",
      measurement::bytes,
      {"--transport", "--in-flight", "--against", "--duration", "--rounds", "--style", "--busy-poll", "--wake-within",
       "--one-core", "--binders", "--keep"},
      {carrier::tcp},
      ""},
     {"--parse",
-     "Measure what requests and replies from 64 bytes to 1 MiB cost by their length, without sockets, beside the "
-     "packed struct",
+     "Measure the cost of requests and replies of 64 bytes to 1 MiB, without sockets, against the packed struct",
      measurement::parse,
      {"--transport", "--in-flight", "--against", "--duration", "--style", "--busy-poll", "--wake-within", "--one-core",
       "--binders", "--keep"},
@@ -146,25 +145,26 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     command.description(bench_description);
     command.footer(bench_examples);
     command
-        .add_option("--transport", given.transport,
-                    "What carries the CLES exchange: tcp, udp, unix or inproc; with --fan-out tcp, unix or multicast")
+        .add_option(
+            "--transport", given.transport,
+            "The transport of the CLES exchange: tcp, udp, unix or inproc; with --fan-out tcp, unix or multicast")
         ->check(CLI::IsMember(carrier_names()).description(""))
         ->type_name("NAME");
-    command.add_option("--in-flight", given.in_flight, "PULLs in flight at once on one link (1)")
+    command.add_option("--in-flight", given.in_flight, "PULLs in flight on one link (1)")
         ->check(CLI::Range(std::size_t{1}, max_in_flight).description(""))
         ->type_name("N");
-    command.add_option("--against", given.against, "A node that runs already and offers localization")
+    command.add_option("--against", given.against, "The node to measure; it must be running and offer localization")
         ->type_name("URL");
     auto* requests =
         command.add_option("--requests", given.requests,
-                           "Requests, or with --updates and --fan-out updates, in each pass (50000; "
-                           "1000000 where many are in flight or published; the baseline at most 50000 "
-                           "then; with --fan-out 1000 paced; with --bytes 2000; with --parse 8 MiB of them)");
+                           "Requests or updates in each pass (50000; 1000000 with --updates, or if several are in "
+                           "flight: then at most 50000 of the baseline; with --fan-out 1000 paced; with --bytes "
+                           "2000; with --parse as many as fill 8 MiB)");
     requests->check(CLI::Range(std::uint64_t{1}, std::uint64_t{100'000'000}).description(""))->type_name("N");
-    command.add_option("--duration", given.duration, "How long each pass takes, instead of --requests")
+    command.add_option("--duration", given.duration, "Duration of each pass, instead of --requests")
         ->excludes(requests)
         ->type_name("TIME");
-    command.add_option("--rounds", given.rounds, "Passes of each exchange, of which the medians are taken (5)")
+    command.add_option("--rounds", given.rounds, "Passes of each exchange; figures are medians over them (5)")
         ->check(CLI::Range(std::size_t{1}, std::size_t{1000}).description(""))
         ->type_name("N");
     command.add_option("--style", given.style, "How results reach the caller's code: coroutine or callback")
@@ -172,13 +172,14 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
         ->type_name("NAME");
     command
         .add_option("--busy-poll", given.busy_poll_us,
-                    "Let both ends of CLES look for work so long before they sleep, in microseconds (0)")
+                    "Microseconds for which both ends of CLES poll for work before they sleep (0)")
         ->check(CLI::Range(0, max_wait_us).description(""))
         ->type_name("US");
     command
-        .add_option("--wake-within", given.wake_within_us,
-                    "Let this host's cores, in all that is measured, sleep no deeper than they wake from in so many "
-                    "microseconds; 0: not at all (it takes /dev/cpu_dma_latency)")
+        .add_option(
+            "--wake-within", given.wake_within_us,
+            "Limit the wake-up latency of this host's cores to this many microseconds, in all measurements; 0: they "
+            "do not sleep (needs /dev/cpu_dma_latency)")
         ->check(CLI::Range(0, max_wait_us).description(""))
         ->type_name("US");
     command.add_flag("--one-core", given.one_core, "Put both ends on one core");
@@ -187,11 +188,11 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
     }
     command
         .add_option("--binders", given.binders,
-                    "Bindings, each on a link of its own (1); with --fan-out several numbers (1,8,64)")
+                    "Subscribers, each with a separate link (1); with --fan-out several numbers (1,8,64)")
         ->delimiter(',')
         ->check(CLI::Range(std::size_t{1}, max_binders).description(""))
         ->type_name("N");
-    command.add_option("--keep", given.keep, "Updates that the publisher queues for each binder (64)")
+    command.add_option("--keep", given.keep, "Updates that the publisher queues for each subscriber (64)")
         ->check(CLI::Range(std::uint32_t{1}, std::uint32_t{65536}).description(""))
         ->type_name("N");
     command.add_option("-o,--output", given.form, "table or json (table)")
@@ -209,7 +210,7 @@ measurement selected_measurement(const CLI::App& command, const bench_arguments&
         refuse("--updates", "takes one number of --binders");
     }
     if (!given.against.empty() && is_given(command, "--transport")) {
-        refuse("--transport", "is told by the URL of --against");
+        refuse("--transport", "cannot be combined with --against, whose URL contains the transport");
     }
     return what;
 }

@@ -68,8 +68,8 @@ fan_out_ratio ratio_of(const fan_out_figures& cles, const fan_out_figures& icd) 
 }
 
 std::string table_of(const fan_out_report& report) {
-    rows out{{"UPDATE localization", "binders", "p50 us", "p99 us", "p99.9 us", "max us", "CPU us", "lost",
-              "flat out/s", "CPU us (flat)", "lost (flat)"}};
+    rows out{{"UPDATE localization", "subscribers", "p50 us", "p99 us", "p99.9 us", "max us", "CPU us", "lost",
+              "max. rate/s", "CPU us (max.)", "lost (max.)"}};
     for (const auto& row : report.rows) {
         const auto binders = std::to_string(row.binders);
         const auto& ratio = row.ratio;
@@ -80,9 +80,9 @@ std::string table_of(const fan_out_report& report) {
     }
     return out.text() + "one way, at " + std::to_string(report.rate_hz) +
            " updates/s and as fast as possible; medians of " + std::to_string(report.rounds) + " rounds over " +
-           report.transport + ", binders in one process, each with a socket of its own" +
-           (report.transport == "multicast" ? " by hand, and with one for all in CLES, " : ", ") + report.style + "s" +
-           waiting(report.busy_poll_us, report.wake_within_us) + ", CPU per delivery; " +
+           report.transport + ", subscribers in one process, each with its own socket" +
+           (report.transport == "multicast" ? " in the hand-written exchange, in CLES with one for all, " : ", ") +
+           report.style + "s" + waiting(report.busy_poll_us, report.wake_within_us) + ", CPU per delivery; " +
            cores(report.client_core, report.server_core) + "\n";
 }
 

@@ -60,7 +60,7 @@ std::string table_of(const parse_report& report) {
     }
     return out.text() + "ns (ns per byte), medians of " + std::to_string(report.rounds) + " rounds on core " +
            std::to_string(report.core) +
-           ", without sockets: from the line to the handler and its reply; from a reply to the caller;\n"
+           ", without sockets: from the request line to the reply; from the reply line to the caller;\n"
            "from a struct in network order to the same numbers\n";
 }
 

@@ -23,7 +23,7 @@ std::string cores(int client, std::optional<int> server) {
         return "client on core " + std::to_string(client);
     }
     if (*server == client) {
-        return "both ends on core " + std::to_string(client) + ": they wait for each other's turn";
+        return "both ends on core " + std::to_string(client) + ", alternating";
     }
     return "client on core " + std::to_string(client) + ", server on core " + std::to_string(*server);
 }

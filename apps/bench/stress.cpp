@@ -149,7 +149,7 @@ std::string measure_stress(const bench_options& options) {
     for (std::size_t round = 0; round < options.rounds; ++round) {
         progress.step("on idle cores");
         measure(idle, idle_fifo);
-        progress.step("on cores that others want");
+        progress.step("on loaded cores");
         const perf::core_load others{all_cores, busy_processes_per_core};
         measure(loaded, loaded_fifo);
     }

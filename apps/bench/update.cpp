@@ -86,11 +86,11 @@ update_figures median_of(const std::vector<update_figures>& passes) {
 }
 
 std::string table_of(const update_report& report) {
-    rows out{{"UPDATE localization", "deliveries/s", "updates/s", "binder CPU us", "publisher CPU us", "missed"}};
+    rows out{{"UPDATE localization", "deliveries/s", "updates/s", "subscriber CPU us", "publisher CPU us", "missed"}};
     out.add(cells_of("raw (json_text)", report.raw));
     out.add(cells_of("typed (struct)", report.typed));
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds of " + std::to_string(report.updates) +
-           " updates over " + report.transport + " to " + std::to_string(report.binders) + " binder" +
+           " updates over " + report.transport + " to " + std::to_string(report.binders) + " subscriber" +
            (report.binders == 1 ? "" : "s") + ", " + report.style + "s" +
            waiting(report.busy_poll_us, report.wake_within_us) + ", " + fixed(report.update_bytes, 1) +
            " bytes per update, CPU per delivery; " + cores(report.client_core, report.server_core) + "\n";

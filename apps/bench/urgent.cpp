@@ -49,12 +49,12 @@ BOOST_DESCRIBE_STRUCT(urgent_report, (),
 std::string table_of(const urgent_report& report) {
     rows out{{"PULL localization", "p50 us", "p99 us", "p99.9 us", "max us"}};
     out.add("alone", report.idle);
-    out.add("beside large answers", report.in_turn);
-    out.add("beside large answers, urgent", report.urgent);
+    out.add("beside large replies", report.in_turn);
+    out.add("beside large replies, urgent", report.urgent);
     out.add_ratio("urgent / alone", report.urgent, report.idle);
     return out.text() + "medians of " + std::to_string(report.rounds) + " rounds over " + report.transport + ", " +
            report.style + "s" + waiting(report.busy_poll_us, report.wake_within_us) + "; beside them " +
-           std::to_string(report.large_in_flight) + " answers of " + std::to_string(report.large_bytes) +
+           std::to_string(report.large_in_flight) + " replies of " + std::to_string(report.large_bytes) +
            " bytes in flight; " + cores(report.client_core, report.server_core) + "\n";
 }
 
@@ -103,8 +103,8 @@ std::string measure_urgent(const bench_options& options) {
     std::vector<latency_figures> urgent;
     for (std::size_t round = 0; round < options.rounds; ++round) {
         pass("alone", 0, true, idle);
-        pass("beside large answers", large_in_flight, false, in_turn);
-        pass("beside large answers, urgent", large_in_flight, true, urgent);
+        pass("beside large replies", large_in_flight, false, in_turn);
+        pass("beside large replies, urgent", large_in_flight, true, urgent);
     }
     const urgent_report report{.transport = to_string(options.transport),
                                .style = to_string(options.style),

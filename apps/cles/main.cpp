@@ -17,11 +17,11 @@
 
 namespace {
 
-constexpr auto about = "Talks to the nodes of a CLES network: the five verbs, and commands to inspect nodes.";
+constexpr auto about = "Sends requests to the nodes of a CLES network, and inspects them.";
 
 constexpr auto footer =
     "Data goes to stdout, everything else to stderr. CLES_AT is the default of --at, CLES_MULTICAST that of "
-    "--multicast; NO_COLOR turns colours off.\n\n"
+    "--multicast; NO_COLOR disables colours.\n\n"
     "Exit codes: 0 ok, 1 local failure, 2 usage, 3 no such target or task, 4 deadline,\n"
     "5 remote error, 6 busy, 130 interrupted.\n\n"
     "Examples:\n"

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 // What it costs to choose a node for `any` among a hundred others and this one, which all offer the task. Prints the
 // median in nanoseconds over some passes; fails if it is more than a microsecond.
-#include "core/chooser.hpp"
-#include "core/routing.hpp"
+#include "node/routing/load_balancer.hpp"
+#include "node/routing/next_hop.hpp"
+#include "node/routing/request_router.hpp"
+#include "protocol/request_line.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -22,12 +24,13 @@ struct system_time final : core::clock {
 };
 
 /// Other nodes, which report what they offer, and receive no requests.
-struct telling final : core::onward {
-    std::uint64_t send(const request& r, cles::detail::pending_ptr reply, core::outbound::progress_function) override {
-        asked.emplace_back(r.node, std::move(reply));
+struct telling final : core::next_hop {
+    std::uint64_t send(const cles::protocol::outgoing_request& r, cles::time_point, cles::detail::pending_ptr reply,
+                       core::outbound::progress_function) override {
+        asked.emplace_back(r.target(), std::move(reply));
         return asked.size();
     }
-    void withdraw(std::uint64_t) override {}
+    void cancel(std::uint64_t) override {}
     std::uint64_t bind(std::string_view, std::string_view, std::string_view, core::feed_events&) override { return 0; }
     void unbind(std::uint64_t) override {}
     void answer() {
@@ -42,7 +45,7 @@ constexpr int nodes = 100;
 constexpr int choices = 100'000;
 constexpr int passes = 9;
 
-double pass(core::routing& routing, const core::node& host) {
+double pass(core::request_router& routing, const core::node_state& host) {
     cles::protocol::request_line request;
     cles::protocol::malformed_request wrong;
     cles::protocol::parse_request("DELEGATE any:plan id=7 {}", request, wrong);
@@ -63,19 +66,19 @@ double pass(core::routing& routing, const core::node& host) {
 
 int main() {
     const system_time clock;
-    const auto host = std::make_shared<core::node>(core::node_setup{.name = "hub", .epoch = 1}, clock, [] {});
+    const auto host = std::make_shared<core::node_state>(core::node_options{.name = "hub", .epoch = 1}, clock, [] {});
     host->tasks.add(cles::verb::delegate, "plan", {.plain = [](const cles::request&, cles::json_writer&) {}});
     telling others;
-    const auto routing = std::make_shared<core::routing>(host, others, 7, [] {});
+    const auto routing = std::make_shared<core::request_router>(host, others, 7, [] {});
     for (std::uint32_t i = 1; i <= nodes; ++i) {
         core::group_source from;
         from.address = 0x7f000001;
         from.port = static_cast<std::uint16_t>(i);
-        host->others.hear({.node = "car" + std::to_string(i),
-                           .endpoints = {"tcp://127.0.0.1:" + std::to_string(i)},
-                           .load = {.queued = i % 7, .running = i % 3, .workers = 4},
-                           .tasks = "same"},
-                          i, 1, from, clock.now());
+        host->peers.apply_announcement({.node = "car" + std::to_string(i),
+                                        .endpoints = {"tcp://127.0.0.1:" + std::to_string(i)},
+                                        .load = {.queued = i % 7, .running = i % 3, .workers = 4},
+                                        .tasks = "same"},
+                                       i, 1, from, clock.now());
         others.answer();
     }
     std::vector<double> times;

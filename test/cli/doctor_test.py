@@ -195,9 +195,9 @@ class Doctor(unittest.TestCase):
         code, found = self.examine()
         self.assertEqual(code, 0, found)
         by_tcp, by_udp = found["ports"]
-        self.assertRegex(by_tcp["text"], r"^tcp://127.0.0.1:25370: the node sat1 is there, version \d")
+        self.assertRegex(by_tcp["text"], r"^tcp://127.0.0.1:25370: the node sat1 listens here, version \d")
         # It has more to say of itself than goes into a datagram.
-        self.assertRegex(by_udp["text"], r"^udp://127.0.0.1:25370: a node is there, which answers: sat1: .* use TCP$")
+        self.assertRegex(by_udp["text"], r"^udp://127.0.0.1:25370: a node listens here, and replies: sat1: .* use TCP$")
         self.assertEqual(found["nodes"][0]["text"], "1 node found")
         self.assertFalse([each for each in found["clock"] if "sat1" in each["text"]])  # whose clock is this host's
 
@@ -215,7 +215,7 @@ class Doctor(unittest.TestCase):
         self.failure(found, "multicast", "v0")
 
     def test_what_two_machines_take(self):
-        takes = ("to reach other hosts: CLES_MULTICAST=v0 (there their own interface), nodes with --listen "
+        takes = ("to reach other hosts: CLES_MULTICAST=v0 (on each its own interface), nodes with --listen "
                  "tcp://10.77.0.1 --insecure, and UDP port 25370 open")
         on_loopback = self.examine()[1]["interfaces"][1]
         self.assertEqual(on_loopback["text"], "multicast uses lo: only nodes on this host find each other")
@@ -238,7 +238,7 @@ class Doctor(unittest.TestCase):
         code, found = self.examine()
         self.assertEqual(code, 0, found)
         for each, way in zip(found["ports"], ("tcp", "udp")):
-            self.assertRegex(each["text"], rf"^{way}://127.0.0.1:25370: the node car1 is there, version \d")
+            self.assertRegex(each["text"], rf"^{way}://127.0.0.1:25370: the node car1 listens here, version \d")
         self.assertEqual(found["nodes"][0]["text"], "1 node found")
 
     def test_a_stranger_at_the_usual_port(self):
@@ -267,7 +267,7 @@ class Doctor(unittest.TestCase):
     def test_a_node_that_does_not_answer(self):
         self.start(sys.executable, "-c", GHOST, "silent", "0", wait_for="up")
         _, found = self.examine()
-        self.failure(found, "nodes", "ghost announces itself, but does not answer at tcp://127.0.0.1:")
+        self.failure(found, "nodes", "ghost announces itself, but does not reply at tcp://127.0.0.1:")
 
     def test_another_clock(self):
         for offset, says in (("3600", "ahead of"), ("-3600", "behind")):
@@ -286,9 +286,9 @@ class Doctor(unittest.TestCase):
         self.serve("car1", "--listen", "tcp://127.0.0.1:25999")
         code, found = self.examine("--at", "tcp://127.0.0.1:25999")
         self.assertEqual(code, 0, found)
-        self.assertIn("the node car1 is there", found["ports"][0]["text"])
+        self.assertIn("the node car1 listens here", found["ports"][0]["text"])
         _, found = self.examine("--at", "tcp://127.0.0.1:25998")
-        self.failure(found, "ports", "25998 does not answer")
+        self.failure(found, "ports", "25998 does not reply")
 
     def test_few_files(self):
         done = subprocess.run([*self.hosts.inside(self.hosts.near), "sh", "-c",

@@ -189,7 +189,7 @@ class Interfaces(unittest.TestCase):
         for name in ("lo", "v0"):
             self.assertIn(("multicast", "ok", f"datagrams to 239.255.25.37:25370 on {name} are received"), found)
         advice = [e.get("advice", "") for e in json.loads(out)["findings"] if e["text"] == "multicast uses v0"]
-        self.assertIn("CLES_MULTICAST=lo,v0,x0 (there their own interface)", advice[0])
+        self.assertIn("CLES_MULTICAST=lo,v0,x0 (on each its own interface)", advice[0])
         code, out, _ = self.run_at(self.hosts.near, "auto", "doctor", "-o", "json")
         self.assertEqual([e["text"] for e in json.loads(out)["findings"] if e["check"] == "multicast"],
                          [f"datagrams to 239.255.25.37:25370 on {name} are received" for name in ("lo", "v0", "w0")])

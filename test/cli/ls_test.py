@@ -117,7 +117,7 @@ class Found(Group):
         first, second = err.splitlines()
         self.assertRegex(first, r"^cles: no_target: cles-\d+ cannot find 'car9': nobody of that name has announced "
                                 r"itself on lo; give its URL$")
-        self.assertEqual(second, "cles: cles ls lists the nodes; --at URL or --peer NAME=URL gives the address of another one")
+        self.assertEqual(second, "cles: cles ls lists the nodes; --at URL or --peer NAME=URL sets the address of another one")
 
     def test_self_is_who_listens_at_the_default_address(self):
         code, _, err = by_name("pull", "self:cles", "--at", self.nodes[1].url)

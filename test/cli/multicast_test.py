@@ -75,7 +75,7 @@ class Loopback(Processes):
     def test_off(self):
         code, out, err = cles("bind", "all:localization", "--multicast", "off")
         self.assertEqual((code, out), (3, ""))
-        self.assertIn("'all:localization' goes by multicast, which is off", err)
+        self.assertIn("'all:localization' needs multicast, which is off", err)
 
     def test_a_named_interface_that_is_none_is_an_error(self):
         for command in (("serve", "--listen", "tcp://127.0.0.1:0"), ("bind", "all:x")):

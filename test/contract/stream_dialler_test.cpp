@@ -2,7 +2,7 @@
 // A host of several addresses: each is tried, in their order.
 
 #include "support/run_until.hpp"
-#include "transport/stream_dialler.hpp"
+#include "transport/stream_endpoint.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>

@@ -18,6 +18,7 @@ FOLDER, PROGRAMS = sys.argv[1], sys.argv[2]
 sys.path[:0] = [FOLDER, str(Path(__file__).parents[1] / "perf")]
 import interval  # noqa: E402
 import latency  # noqa: E402
+import reported  # noqa: E402
 from run_within import run_within  # noqa: E402
 
 LIMIT_S = 500  # less than it has, so that what was started is ended
@@ -52,6 +53,9 @@ class Latency(unittest.TestCase):
             self.assertEqual(set(figure), {"name", "what", "value", "low", "high", "unit", "paper", "target", "reached"})
             self.assertLessEqual(figure["low"], figure["high"], figure)
             self.assertEqual(figure["target"] is None, figure["reached"] is None, figure)
+
+    def test_the_report_shows_it(self):
+        reported.check(self, "latency", self.result)
 
     def test_loopback_is_measured(self):
         for kind in KINDS:

@@ -15,7 +15,10 @@
 #include <boost/test/unit_test.hpp>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -34,8 +37,8 @@ constexpr std::array seeds{1U, 2U, 3U};
 constexpr impairment bad{.loss = 0.2, .twice = 0.2, .least_delay = 0ms, .most_delay = 30ms};
 
 struct network {
-    explicit network(impairment how, std::uint32_t seed, const cles::limits& bounds = {})
-        : car(io, listening("car1", carrier::udp4)), path(io, car.endpoints().front(), how, seed),
+    network(asio::io_context& context, impairment how, std::uint32_t seed, const cles::limits& bounds = {})
+        : io(context), car(io, listening("car1", carrier::udp4)), path(io, car.endpoints().front(), how, seed),
           tower(io, {.name = "tower", .peers = {{"car1", path.url()}}, .limits = bounds}) {
         car.on_pull("echo", [](const cles::request& r) { return std::string{r.parameter(0)}; });
         car.on_push("effect", [this](const cles::request& r) { ++effects[std::string{r.parameter(0)}]; });
@@ -47,60 +50,85 @@ struct network {
         car.on_bind("place");
     }
 
-    asio::io_context io;
+    asio::io_context& io;
     std::map<std::string, int> effects; // how often each request's handler ran
     cles::service car;
     impaired_path path;
     cles::service tower;
 };
 
-BOOST_DATA_TEST_CASE(all_requests_end_and_have_their_effect_at_most_once, seeds, seed) {
-    network n{bad, seed};
-    constexpr int count = 60;
-    std::vector<std::unique_ptr<answer<>>> answers;
-    const auto ask = [&](const std::string& command) {
-        answers.push_back(std::make_unique<answer<>>());
-        n.tower.async_request(command, answers.back()->options().deadline(15s), answers.back()->take());
-    };
-    for (int i = 0; i < count; ++i) {
-        ask("PULL car1:echo/" + std::to_string(i));
-        ask("PUSH car1:effect/" + std::to_string(i));
-        ask("DELEGATE car1:work/" + std::to_string(i));
-    }
-    run_until(n.io,
-              [&] { return std::all_of(answers.begin(), answers.end(), [](const auto& a) { return a->done(); }); });
-    // Each copy and its reply may be lost: now and then all of a request's are, and then it ends with its deadline.
-    int answered = 0;
-    for (int i = 0; i < 3 * count; ++i) {
-        const auto& a = *answers[static_cast<std::size_t>(i)];
-        BOOST_TEST(a.calls == 1);
-        BOOST_TEST((!a.code || a.code == errc::deadline), "request " << i << ": " << a.code.message());
-        answered += a.code ? 0 : 1;
-        const auto what = (i % 3 == 2 ? "work " : "") + std::to_string(i / 3);
-        if (i % 3 != 0 && !a.code) {
-            BOOST_TEST(n.effects[what] == 1, what << " was answered and ran " << n.effects[what] << " times");
+/// The networks of all seeds at the same time, so that a test waits only for the slowest.
+struct networks {
+    explicit networks(impairment how, const cles::limits& bounds = {}) {
+        for (const auto seed : seeds) {
+            each.push_back(std::make_unique<network>(io, how, seed, bounds));
         }
     }
-    BOOST_TEST(answered >= 3 * count - 5);
-    for (const auto& [what, times] : n.effects) {
-        BOOST_TEST(times <= 1, what << " ran " << times << " times");
-    }
-    // The network did what it was to do.
-    BOOST_TEST(n.path.lost() > 20U);
-    BOOST_TEST(n.path.doubled() > 20U);
-    BOOST_TEST(n.path.to_node() > 3U * count);
+
+    asio::io_context io;
+    std::vector<std::unique_ptr<network>> each; // one per seed, in their order
+};
+
+using answers = std::vector<std::unique_ptr<answer<>>>;
+
+bool all_done(const answers& some) {
+    return std::all_of(some.begin(), some.end(), [](const auto& a) { return a->done(); });
 }
 
-BOOST_DATA_TEST_CASE(a_network_that_loses_everything_ends_requests_with_their_deadline, seeds, seed) {
-    network n{{.loss = 1}, seed};
-    std::vector<std::unique_ptr<answer<>>> answers;
-    for (int i = 0; i < 20; ++i) {
-        answers.push_back(std::make_unique<answer<>>());
-        n.tower.async_request("PUSH car1:effect/1", answers.back()->options().deadline(500ms), answers.back()->take());
+BOOST_AUTO_TEST_CASE(all_requests_end_and_have_their_effect_at_most_once) {
+    networks all{bad};
+    constexpr int count = 60;
+    std::array<answers, seeds.size()> asked;
+    for (std::size_t which = 0; which < seeds.size(); ++which) {
+        const auto ask = [&](const std::string& command) {
+            auto& made = asked[which].emplace_back(std::make_unique<answer<>>());
+            all.each[which]->tower.async_request(command, made->options().deadline(15s), made->take());
+        };
+        for (int i = 0; i < count; ++i) {
+            ask("PULL car1:echo/" + std::to_string(i));
+            ask("PUSH car1:effect/" + std::to_string(i));
+            ask("DELEGATE car1:work/" + std::to_string(i));
+        }
     }
-    run_until(n.io,
-              [&] { return std::all_of(answers.begin(), answers.end(), [](const auto& a) { return a->done(); }); });
-    for (const auto& a : answers) {
+    run_until(all.io, [&] { return std::all_of(asked.begin(), asked.end(), all_done); });
+    for (std::size_t which = 0; which < seeds.size(); ++which) {
+        BOOST_TEST_CONTEXT("seed " << seeds[which]) {
+            auto& n = *all.each[which];
+            // Each copy and its reply may be lost: now and then all of a request's are, and then it ends with its
+            // deadline.
+            int answered = 0;
+            for (int i = 0; i < 3 * count; ++i) {
+                const auto& a = *asked[which][static_cast<std::size_t>(i)];
+                BOOST_TEST(a.calls == 1);
+                BOOST_TEST((!a.code || a.code == errc::deadline), "request " << i << ": " << a.code.message());
+                answered += a.code ? 0 : 1;
+                const auto what = (i % 3 == 2 ? "work " : "") + std::to_string(i / 3);
+                if (i % 3 != 0 && !a.code) {
+                    BOOST_TEST(n.effects[what] == 1, what << " was answered and ran " << n.effects[what] << " times");
+                }
+            }
+            BOOST_TEST(answered >= 3 * count - 5);
+            for (const auto& [what, times] : n.effects) {
+                BOOST_TEST(times <= 1, what << " ran " << times << " times");
+            }
+            // The network did what it was to do.
+            BOOST_TEST(n.path.lost() > 20U);
+            BOOST_TEST(n.path.doubled() > 20U);
+            BOOST_TEST(n.path.to_node() > 3U * count);
+        }
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_network_that_loses_everything_ends_requests_with_their_deadline) {
+    asio::io_context io;
+    network n{io, {.loss = 1}, 1}; // the same with every seed
+    answers asked;
+    for (int i = 0; i < 20; ++i) {
+        auto& made = asked.emplace_back(std::make_unique<answer<>>());
+        n.tower.async_request("PUSH car1:effect/1", made->options().deadline(500ms), made->take());
+    }
+    run_until(io, [&] { return all_done(asked); });
+    for (const auto& a : asked) {
         BOOST_TEST(a->code == errc::deadline);
     }
     BOOST_TEST(n.path.to_node() == 40U); // the first copies, and each once more: after 200 ms, and not after 600
@@ -109,7 +137,8 @@ BOOST_DATA_TEST_CASE(a_network_that_loses_everything_ends_requests_with_their_de
 
 // The reply is lost, and so the request comes again.
 BOOST_AUTO_TEST_CASE(a_lost_reply_does_not_repeat_the_effect) {
-    network n{{}, 1};
+    asio::io_context io;
+    network n{io, {}, 1};
     int replies = 0;
     n.path.filter([&](std::string_view, bool to_node) { return !to_node && ++replies <= 2; });
     answer<> result;
@@ -121,7 +150,8 @@ BOOST_AUTO_TEST_CASE(a_lost_reply_does_not_repeat_the_effect) {
 }
 
 BOOST_AUTO_TEST_CASE(copies_are_byte_by_byte_the_same) {
-    network n{{}, 1};
+    asio::io_context io;
+    network n{io, {}, 1};
     std::vector<std::string> seen;
     n.path.filter([&](std::string_view datagram, bool to_node) {
         if (to_node) {
@@ -145,7 +175,8 @@ BOOST_AUTO_TEST_CASE(copies_are_byte_by_byte_the_same) {
 }
 
 BOOST_DATA_TEST_CASE(feeds_report_what_was_lost_as_gaps, seeds, seed) {
-    network n{{}, seed};
+    asio::io_context io;
+    network n{io, {}, seed};
     feed_log feed;
     feed.bind(n.tower, "car1:place");
     run_until(n.io, [&] { return feed.bound; });
@@ -168,7 +199,8 @@ BOOST_DATA_TEST_CASE(feeds_report_what_was_lost_as_gaps, seeds, seed) {
 }
 
 BOOST_DATA_TEST_CASE(updates_that_overtake_others_are_in_order_or_gaps, seeds, seed) {
-    network n{{.least_delay = 0ms, .most_delay = 20ms}, seed};
+    asio::io_context io;
+    network n{io, {.least_delay = 0ms, .most_delay = 20ms}, seed};
     feed_log feed;
     feed.bind(n.tower, "car1:place", cles::bind_options{}.keep(1000));
     run_until(n.io, [&] { return feed.bound; });
@@ -193,16 +225,24 @@ BOOST_DATA_TEST_CASE(updates_that_overtake_others_are_in_order_or_gaps, seeds, s
     BOOST_TEST(feed.count(feed_event::gap) > 0U);
 }
 
-BOOST_DATA_TEST_CASE(feeds_stay_bound_through_losses, seeds, seed) {
-    network n{{.loss = 0.05, .twice = 0.1, .least_delay = 0ms, .most_delay = 10ms}, seed, {.lease = 2s}};
-    feed_log feed;
-    feed.bind(n.tower, "car1:place");
-    run_until(n.io, [&] { return feed.binds != 0; });
-    BOOST_REQUIRE(feed.bound);
+BOOST_AUTO_TEST_CASE(feeds_stay_bound_through_losses) {
+    networks all{{.loss = 0.05, .twice = 0.1, .least_delay = 0ms, .most_delay = 10ms}, {.lease = 2s}};
+    std::array<feed_log, seeds.size()> feeds;
+    for (std::size_t which = 0; which < seeds.size(); ++which) {
+        feeds[which].bind(all.each[which]->tower, "car1:place");
+    }
+    run_until(all.io,
+              [&] { return std::all_of(feeds.begin(), feeds.end(), [](const auto& f) { return f.binds != 0; }); });
+    for (const auto& feed : feeds) {
+        BOOST_REQUIRE(feed.bound);
+    }
     int published = 0;
-    asio::steady_timer pace{n.io};
+    asio::steady_timer pace{all.io};
     std::function<void()> publish = [&] {
-        n.car.update("place", ++published);
+        ++published;
+        for (const auto& n : all.each) {
+            n->car.update("place", published);
+        }
         pace.expires_after(20ms);
         pace.async_wait([&](boost::system::error_code code) {
             if (!code) {
@@ -211,12 +251,13 @@ BOOST_DATA_TEST_CASE(feeds_stay_bound_through_losses, seeds, seed) {
         });
     };
     publish();
-    run_until(n.io, [&] { return published >= 150; }); // longer than a lease
-    const auto updates = feed.count(feed_event::update);
-    BOOST_TEST(updates > 50U);
-    BOOST_TEST(feed.count(feed_event::lost) == 0U);
+    run_until(all.io, [&] { return published >= 150; }); // longer than a lease
+    for (const auto& feed : feeds) {
+        BOOST_TEST(feed.count(feed_event::update) > 50U);
+        BOOST_TEST(feed.count(feed_event::lost) == 0U);
+    }
     pace.cancel();
-    run_ready(n.io);
+    run_ready(all.io);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

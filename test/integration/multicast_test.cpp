@@ -88,7 +88,6 @@ struct stranger final : cles::core::group_listener {
     }
     ~stranger() { port->close(); }
     void on_datagram(const cles::core::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
-    void on_batch() override {}
     void on_room() override {}
     void say(std::string_view line) { port->send(line); }
     [[nodiscard]] std::size_t count(std::string_view head) const {
@@ -377,7 +376,7 @@ BOOST_FIXTURE_TEST_CASE(where_it_is_off_there_is_no_way_to_all, network) {
         run_until(io, [&] { return feed.binds != 0; });
         BOOST_TEST((feed.code == errc::no_target));
         BOOST_TEST(feed.words == "'" + std::string{noun} +
-                                     "' goes by multicast, which is off: give service_options::multicast an interface");
+                                     "' needs multicast, which is off: set an interface in service_options::multicast");
     }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // Every kind of code of the user's that the library calls, what it may do, and where it may be called: nobody else is
-// harmed (CONTRIBUTING.md, "User code").
+// harmed (CONTRIBUTING.md, "User code"). Completion handlers of requests: user_code_completions_test.cpp.
 
 #include <cles/service.hpp>
 
@@ -8,6 +8,7 @@
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
+#include "support/user_code_fixture.hpp"
 
 #include <boost/asio/bind_cancellation_slot.hpp>
 #include <boost/asio/cancellation_signal.hpp>
@@ -20,6 +21,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <utility>
@@ -28,247 +30,9 @@
 namespace user_code_test {
 
 using namespace cles::test;
+using namespace cles::test::user_code_fixture;
 using namespace std::chrono_literals;
-using cles::errc;
 namespace asio = boost::asio;
-
-/// What user code does.
-enum class deed : std::uint8_t { nothing, throws, cancels, stops_service, destroys_service, destroys_feed, begins };
-constexpr std::array every_deed{deed::nothing,          deed::throws,        deed::cancels, deed::stops_service,
-                                deed::destroys_service, deed::destroys_feed, deed::begins};
-constexpr std::array<const char*, 7> deed_names{"nothing",          "throws",        "cancels", "stops_service",
-                                                "destroys_service", "destroys_feed", "begins"};
-
-/// Where a completion comes from.
-enum class place : std::uint8_t { reply, refusal, deadline, lost, not_connected, cancelled, stop };
-constexpr std::array every_place{place::reply,         place::refusal,   place::deadline, place::lost,
-                                 place::not_connected, place::cancelled, place::stop};
-constexpr std::array<const char*, 7> place_names{"reply",         "refusal",   "deadline", "lost",
-                                                 "not_connected", "cancelled", "stop"};
-
-enum class asking : std::uint8_t { push, pull, delegate, bind };
-constexpr std::array every_asking{asking::push, asking::pull, asking::delegate, asking::bind};
-constexpr std::array<const char*, 4> asking_names{"push", "pull", "delegate", "bind"};
-
-std::ostream& operator<<(std::ostream& out, deed d) { return out << deed_names[static_cast<std::size_t>(d)]; }
-std::ostream& operator<<(std::ostream& out, place p) { return out << place_names[static_cast<std::size_t>(p)]; }
-std::ostream& operator<<(std::ostream& out, asking a) { return out << asking_names[static_cast<std::size_t>(a)]; }
-
-struct thrown_by_test {};
-
-/// A service whose user code misbehaves, with others to talk to.
-struct world {
-    explicit world(cles::service_options own = {}) {
-        own.name = "tower";
-        own.listen = {fresh_address(carrier::tcp4)};
-        own.peers = {{"car1", silent.url()},
-                     {"car2", car->endpoints().front()},
-                     {"car3", friendly->endpoints().front()},
-                     {"nowhere", "tcp://127.0.0.1:1"}};
-        tower = std::make_unique<cles::service>(io, std::move(own));
-        for (auto* each : {car.get(), friendly.get()}) {
-            each->on_pull("speed", [] { return 42; });
-            each->on_push("note", [] {});
-            each->on_delegate("work", [] { return 42; });
-            each->on_delegate("long",
-                              [this](const cles::request&, cles::responder r) { jobs.push_back(std::move(r)); });
-            for (const auto* noun : {"place", "place1", "place2", "victim"}) {
-                each->on_bind(noun);
-            }
-        }
-        tower->async_bind("car3:victim", [this](boost::system::error_code, cles::feed<cles::json_text> made) {
-            victim = std::make_unique<cles::feed<cles::json_text>>(std::move(made));
-            victim->async_next(
-                [this](boost::system::error_code, const cles::feed_item<cles::json_text>&) { ++victim_ended; });
-        });
-        tower->async_delegate("car3:long", cles::json_text{},
-                              asio::bind_cancellation_slot(patient_signal.slot(), patient.take()));
-        until([&] { return victim && jobs.size() == 1; });
-        endless = std::exchange(jobs, {});
-    }
-    ~world() {
-        jobs.clear();
-        endless.clear();
-        victim.reset();
-        tower.reset();
-    }
-
-    void act(deed d) {
-        ++acted;
-        switch (d) {
-        case deed::nothing: break;
-        case deed::throws: throw thrown_by_test{};
-        case deed::cancels:
-            for (auto* each : {&patient_signal, &first, &third}) {
-                each->emit(asio::cancellation_type::terminal);
-            }
-            break;
-        case deed::stops_service:
-            if (tower) {
-                tower->stop();
-            }
-            break;
-        case deed::destroys_service: tower.reset(); break;
-        case deed::destroys_feed: victim.reset(); break;
-        case deed::begins:
-            if (tower) {
-                tower->async_pull("car3:speed", begun.take());
-                tower->async_pull("car1:speed", cles::call_options{}.deadline(1s), [](auto, const auto&) {});
-                tower->async_bind("nowhere:place", [](auto, const auto&) {});
-                tower->async_update("own", 1, [](auto) {});
-                tower->update("own", 2);
-            }
-            break;
-        }
-    }
-
-    /// Runs, and calls again what was thrown out of.
-    template <class Condition>
-    void until(Condition holds, const std::source_location& where = std::source_location::current()) {
-        for (;;) {
-            try {
-                run_until(io, holds, patience, where);
-                return;
-            } catch (const thrown_by_test&) {
-                ++thrown;
-            }
-        }
-    }
-    void run_what_is_ready() {
-        for (;;) {
-            try {
-                run_ready(io);
-                return;
-            } catch (const thrown_by_test&) {
-                ++thrown;
-            }
-        }
-    }
-
-    /// The service lives on: it is answered, and its timer is armed.
-    void check_that_it_lives(deed d) {
-        run_what_is_ready();
-        BOOST_TEST(thrown == (d == deed::throws ? acted : 0));
-        if (tower) {
-            answer<int> alive;
-            answer<> late;
-            tower->async_pull<int>("car3:speed", alive.take());
-            tower->async_pull("car1:silence", cles::call_options{}.deadline(20ms), late.take());
-            until([&] { return alive.done() && late.done(); });
-            if (alive.code != errc::stopped) {
-                BOOST_TEST(alive.value == 42);
-                BOOST_TEST(late.code == errc::deadline);
-            }
-        }
-        if (d == deed::destroys_service || d == deed::stops_service) {
-            until([&] { return patient.done(); });
-            BOOST_TEST(patient.code == errc::stopped);
-        } else if (d == deed::cancels && acted != 0 && patient.code != errc::stopped) {
-            until([&] { return patient.done(); });
-            BOOST_TEST(patient.code == errc::cancelled);
-        } else if (d == deed::destroys_feed && acted != 0) {
-            until([&] { return victim_ended == 1; });
-        } else if (d == deed::begins && acted != 0 && tower) {
-            until([&] { return begun.done(); });
-        }
-    }
-
-    asio::io_context io;
-    scripted_listener silent{io};
-    std::unique_ptr<cles::service> car = std::make_unique<cles::service>(io, listening("car2"));
-    std::unique_ptr<cles::service> friendly = std::make_unique<cles::service>(io, listening("car3"));
-    std::vector<cles::responder> jobs;
-    std::vector<cles::responder> endless;
-    asio::cancellation_signal patient_signal; // of what waits all the time
-    asio::cancellation_signal first;          // of what ends beside the one that acts
-    asio::cancellation_signal second;
-    asio::cancellation_signal third;
-    answer<> patient;
-    answer<> begun;
-    std::unique_ptr<cles::feed<cles::json_text>> victim;
-    int victim_ended = 0;
-    int acted = 0;
-    int thrown = 0;
-    std::unique_ptr<cles::service> tower;
-};
-
-/// A completion handler that does something.
-struct handler {
-    world* in;
-    int* calls;
-    deed does;
-
-    template <class... T>
-    void operator()(boost::system::error_code, const T&...) const {
-        ++*calls;
-        in->act(does);
-    }
-};
-
-/// Does something when it is destroyed.
-struct doer {
-    doer(world& w, deed d) noexcept : in(w), does(d) {}
-    doer(const doer&) = delete;
-    doer& operator=(const doer&) = delete;
-    ~doer() { in.act(does); }
-    world& in;
-    deed does;
-};
-
-template <class Handler>
-void ask(cles::service& by, asking how, const std::string& node, int which, const cles::call_options& options,
-         Handler on_end) {
-    switch (how) {
-    case asking::push: by.async_push(node + ":note", cles::json_text{}, options, std::move(on_end)); break;
-    case asking::pull: by.async_pull(node + ":speed", options, std::move(on_end)); break;
-    case asking::delegate: by.async_delegate(node + ":work", cles::json_text{}, options, std::move(on_end)); break;
-    case asking::bind: {
-        cles::bind_options bound;
-        bound.deadline(options.deadline_);
-        by.async_bind(node + ":place" + (which == 0 ? "" : std::to_string(which)), bound, std::move(on_end));
-        break;
-    }
-    }
-}
-
-/// Begins three requests, of which the second acts, and has them end there. Whoever is asked is silent, or answers.
-/// `reports`: of the second.
-template <class Act>
-void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>& calls,
-               std::function<void(double, std::string_view)> reports = {}) {
-    const std::string node = where == place::not_connected                      ? "nowhere"
-                             : where == place::reply || where == place::refusal ? "car2"
-                                                                                : "car1";
-    cles::call_options options;
-    options.deadline(where == place::deadline ? 30ms : 20s);
-    if (where == place::refusal) {
-        w.car = std::make_unique<cles::service>(w.io, listening("car2"));
-        w.tower->set_peer("car2", w.car->endpoints().front());
-    }
-    const auto bystander = [&](std::size_t i) { return handler{&w, &calls[i], deed::nothing}; };
-    ask(*w.tower, how, node, 0, options, asio::bind_cancellation_slot(w.first.slot(), bystander(0)));
-    {
-        auto second = options;
-        if (reports) {
-            second.on_progress(std::exchange(reports, {}));
-        }
-        ask(*w.tower, how, node, 1, second, asio::bind_cancellation_slot(w.second.slot(), std::move(acting)));
-    }
-    ask(*w.tower, how, node, 2, options, asio::bind_cancellation_slot(w.third.slot(), bystander(2)));
-    if (where == place::lost) {
-        auto peer = w.silent.accept();
-        peer.line();
-        peer.reset();
-    } else if (where == place::cancelled) {
-        w.second.emit(asio::cancellation_type::terminal);
-        w.first.emit(asio::cancellation_type::partial);
-        w.third.emit(asio::cancellation_type::total);
-    } else if (where == place::stop) {
-        w.tower->stop();
-    }
-    BOOST_TEST(calls[1] == 0); // never from inside the call
-    BOOST_TEST(w.acted == 0);
-}
 
 /// Tasks whose handlers act, one of each form, and "quick", which counts.
 void offer_acting(world& w, deed does, int& quick) {
@@ -321,14 +85,6 @@ void cancel_three(world& w, asio::cancellation_type how) {
     }
 }
 
-/// Runs until all three have been called, and checks that each was called once and that the service lives on.
-void check_that_three_are_called(world& w, deed does, const std::array<int, 3>& calls) {
-    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
-    w.acted = 1; // the bystanders did nothing
-    w.check_that_it_lives(does);
-    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
-}
-
 } // namespace user_code_test
 
 BOOST_AUTO_TEST_SUITE(user_code)
@@ -336,45 +92,6 @@ BOOST_AUTO_TEST_SUITE(user_code)
 using namespace user_code_test;
 
 namespace data = boost::unit_test::data;
-
-BOOST_DATA_TEST_CASE(a_completion_handler_may_do_anything, data::make(every_asking) * every_place * every_deed, how,
-                     where, does) {
-    world w;
-    std::array<int, 3> calls{};
-    end_three(w, how, where, handler{&w, &calls[1], does}, calls);
-    check_that_three_are_called(w, does, calls);
-}
-
-BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_asking) * every_place * every_deed, how,
-                     where, does) {
-    if (does == deed::throws) { // no destructor does
-        return;
-    }
-    world w;
-    std::array<int, 3> calls{};
-    end_three(
-        w, how, where,
-        [doing = std::make_shared<doer>(w, does), n = &calls[1]](boost::system::error_code, const auto&) { ++*n; },
-        calls);
-    check_that_three_are_called(w, does, calls);
-}
-
-// A function for progress goes with its request.
-BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
-                     does) {
-    if (does == deed::throws) { // no destructor does
-        return;
-    }
-    world w;
-    std::array<int, 3> calls{};
-    end_three(w, asking::delegate, where, handler{&w, &calls[1], deed::nothing}, calls,
-              [doing = std::make_shared<doer>(w, does)](double, std::string_view) {});
-    w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
-    w.run_what_is_ready();
-    w.acted = 1;
-    w.check_that_it_lives(does);
-    BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
-}
 
 // Those of one noun share a binding.
 BOOST_DATA_TEST_CASE(who_waits_for_an_event_may_do_anything, data::make(every_deed) * data::make({false, true}), does,
@@ -495,11 +212,12 @@ BOOST_DATA_TEST_CASE(what_hears_of_progress_may_do_it_when_it_is_destroyed, data
                 asio::bind_cancellation_slot(w.second.slot(),
                                              [&](boost::system::error_code, const cles::json_text&) { ++calls; }));
         }
+        std::optional<scripted_peer> peer; // keeps its link to the end: the last request waits on it
         if (where == place::lost || sent) {
-            auto peer = w.silent.accept();
-            peer.line();
+            peer.emplace(w.silent.accept());
+            peer->line();
             if (where == place::lost) {
-                peer.reset();
+                peer->reset();
             } else if (where == place::stop) {
                 w.tower->stop();
             } else {

@@ -18,6 +18,8 @@ import unittest
 from pathlib import Path
 
 FOLDER, PROGRAMS = sys.argv[1], sys.argv[2]
+sys.path.insert(0, str(Path(__file__).parents[1] / "perf"))
+import reported  # noqa: E402
 
 
 class Latency(unittest.TestCase):
@@ -28,6 +30,7 @@ class Latency(unittest.TestCase):
                                    "-o", str(output)], capture_output=True, text=True, check=False)
             self.assertEqual(done.returncode, 0, done.stderr)
             result = json.loads(output.read_text(encoding="utf-8"))
+        reported.check(self, "strike_latency", result)
         for state in ("idle", "loaded"):
             for round_ in result["rounds"][state]:
                 self.assertEqual(round_["count"], 200)

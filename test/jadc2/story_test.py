@@ -113,13 +113,13 @@ class Story(unittest.TestCase):
             done = subprocess.run([sys.executable, "-B", SCRIPT, "--programs", PROGRAMS, *more], stdin=subprocess.DEVNULL,
                                   capture_output=True, text=True, timeout=120, check=False)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
-            self.assertIn("each frame and each order is accounted for", done.stdout)
+            self.assertIn("each frame and each order has an outcome", done.stdout)
             if "--spare" in more or not more:
                 self.assertRegex(done.stdout, r"data to decision +\d+\.\d{3} ms")
             if "--spare" in more:
                 self.assertRegex(done.stdout, r"sat\d processes the video(?s:.*)sat\d is killed(?s:.*)sat\d processes the video")
             elif more:
-                self.assertIn("nobody else offers it", done.stdout)
+                self.assertIn("no other node offers it", done.stdout)
                 self.assertNotIn("data to decision", done.stdout)
 
     def test_the_script_says_what_it_lacks(self):

@@ -14,8 +14,9 @@ import xml.etree.ElementTree
 from pathlib import Path
 
 SCRIPTS, PROGRAMS = Path(sys.argv[1]), sys.argv[2]
-sys.path.insert(0, str(SCRIPTS))
+sys.path[:0] = [str(SCRIPTS), str(Path(__file__).parents[1] / "perf")]
 import platoon  # noqa: E402
+import reported  # noqa: E402
 
 
 class Evaluation(unittest.TestCase):
@@ -30,6 +31,7 @@ class Evaluation(unittest.TestCase):
                 drawn = xml.etree.ElementTree.parse(plot).getroot()
                 self.assertGreaterEqual(len(drawn.findall(".//{http://www.w3.org/2000/svg}polyline")), 1, plot)
         self.assertEqual({plot.name for plot in plots}, {"speed.svg", "error.svg", "latency.svg"})
+        reported.check(self, "platoon", result)
         self.assertEqual(len(result["simulated"]), 12)
         figures = {figure["name"]: figure for figure in result["figures"]}
         self.assertEqual(figures["string_ratio_leader_50"]["value"], result["checks"]["string_ratio"]["50 Hz"])

@@ -27,7 +27,7 @@ BOOST_FIXTURE_TEST_SUITE(primes, fixture)
 BOOST_AUTO_TEST_CASE(they_are_told_and_counted) {
     BOOST_TEST(ask("PULL self:prime/97") == R"({"value":true})");
     BOOST_TEST(ask("PULL self:prime/98") == R"({"value":false})");
-    BOOST_TEST(ask("PULL self:prime/x") == "bad_request: node: parameter 1 is no number that fits");
+    BOOST_TEST(ask("PULL self:prime/x") == "bad_request: node: parameter 1 is not a number that fits");
     BOOST_TEST(ask(R"(DELEGATE self:primes {"below":1000000})") == R"({"count":78498,"largest":999983})");
     BOOST_TEST(ask(R"(DELEGATE self:primes {"from":90,"below":100})") == R"({"count":1,"largest":97})");
 }

@@ -3,7 +3,9 @@
 
 #include <cles/routing.hpp>
 
-#include "protocol/message.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
 
 #include <array>
 #include <utility>
@@ -79,7 +81,7 @@ void cluster::live(seconds trouble) {
     pass(seconds{20});
     judge_requests();
     for (const auto& [host, n] : nodes_) {
-        n->local().neighbours().leave();
+        n->local().discovery().leave();
     }
     pass(seconds{200});
     judge_rest();
@@ -265,9 +267,9 @@ void cluster::judge_requests() {
 }
 
 void cluster::judge_neighbours() {
-    const auto& others = nodes_[hub_host]->node()->others;
+    const auto& others = nodes_[hub_host]->node()->peers;
     for (const auto host : workers) {
-        const auto known = others.look(name_of(host));
+        const auto known = others.find_member(name_of(host));
         if (!known || known->suspect || protocol::epoch_text(known->epoch) != nodes_[host]->node()->epoch) {
             watcher_.broken(rule::others_known, "the router does not know " + name_of(host) + " as it is");
         }

@@ -3,9 +3,9 @@
 
 #include <cles/error.hpp>
 
-#include "simulation/network.hpp"
-#include "simulation/node_run.hpp"
-#include "simulation/work_pool.hpp"
+#include "simulation/network/network.hpp"
+#include "simulation/world/node_run.hpp"
+#include "simulation/world/work_pool.hpp"
 
 #include <chrono>
 #include <cstddef>

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/gossip_network.hpp"
 
-#include "core/absence.hpp"
-#include "core/peer_table.hpp"
-#include "protocol/message.hpp"
+#include "node/base/deadline_schedule.hpp"
+#include "node/membership/peer_table.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -26,7 +28,7 @@ std::uint32_t scattered(std::uint32_t n) { return n * 2654435761U; }
 } // namespace
 
 struct gossip_network::message {
-    enum class kind : std::uint8_t { ask, table, tell, failure };
+    enum class kind : std::uint8_t { ask, table, push, failure };
     kind what = kind::ask;
     std::size_t from = 0;
     std::uint32_t to_run = 0; // of the receiver, for what answers; 0: whichever
@@ -37,9 +39,9 @@ struct gossip_network::message {
 };
 
 /// One node, from its start to its end.
-class gossip_network::member final : public core::announcer::voice,
-                                     public core::gossip::caller,
-                                     public core::presence::watcher {
+class gossip_network::member final : public core::announcer::sender,
+                                     public core::gossip::client,
+                                     public core::membership::watcher {
   public:
     member(gossip_network& owner, std::size_t number, std::string name, std::uint32_t epoch)
         : net(owner), place(number), run_number(epoch),
@@ -47,8 +49,8 @@ class gossip_network::member final : public core::announcer::voice,
               std::to_string(number % 250 + 1) + ":25370"),
           said{.node = std::move(name), .endpoints = {"tcp://0.0.0.0:25370"}, .tasks = "85944171f73967e8"},
           others_known(said.node, epoch, deadlines, most_known),
-          talk({said.node, protocol::epoch_text(epoch)}, *this, others_known, counts, deadlines, most_known,
-               static_cast<std::uint32_t>(owner.dice_.next())),
+          gossip({said.node, protocol::epoch_text(epoch)}, *this, others_known, counts, deadlines, most_known,
+                 static_cast<std::uint32_t>(owner.dice_.next())),
           mouth(*this, deadlines, static_cast<std::uint32_t>(owner.dice_.next())) {
         said.load.workers = 4;
         others_known.watch(this);
@@ -59,14 +61,14 @@ class gossip_network::member final : public core::announcer::voice,
     void begin() {
         mouth.start(local());
         deadlines.expire(local()); // it speaks before it asks
-        talk.set_seeds(net.seeds_, local());
-        talk.start(local());
+        gossip.set_seeds(net.seeds_, local());
+        gossip.start(local());
     }
 
     void announce(milliseconds interval) override {
         said.interval = interval;
         said.load.running = static_cast<std::uint32_t>(net.dice_.below(4));
-        others_known.speak(said, ++seq, local());
+        others_known.announce_self(said, ++seq, local());
     }
     [[nodiscard]] std::size_t others() const override { return others_known.size(); }
 
@@ -80,21 +82,21 @@ class gossip_network::member final : public core::announcer::voice,
             net.now_ + core::gossip::limit, place,
             std::make_shared<message>(message{.what = message::kind::failure, .to_run = run_number, .ticket = ticket}));
     }
-    void ask_who(std::uint64_t, std::string_view) override {} // all here know `since`
-    void tell(std::string_view at, std::string_view table) override {
-        post(at, {.what = message::kind::tell, .text = std::string{table}});
+    void ask_description(std::uint64_t, std::string_view) override {} // all here know `since`
+    void push(std::string_view at, std::string_view table) override {
+        post(at, {.what = message::kind::push, .text = std::string{table}});
     }
     void release(std::string_view) override {}
 
-    void on_peer(std::string_view node, core::presence::change what, std::string_view where) override {
+    void on_peer(std::string_view node, core::membership::change what, std::string_view where) override {
         const auto about = net.by_url_.find(where);
         const bool lives = about != net.by_url_.end() && net.members_[about->second]->alive;
-        if (what == core::presence::change::gone) {
-            talk.on_gone(node, where, local());
+        if (what == core::membership::change::gone) {
+            gossip.on_gone(node, where, local());
             net.false_deaths_ += lives ? 1 : 0;
-        } else if (what == core::presence::change::silent) {
+        } else if (what == core::membership::change::silent) {
             net.false_suspicions_ += lives && net.members_[about->second]->stopped_until <= net.now_ ? 1 : 0;
-        } else if (what == core::presence::change::clash) {
+        } else if (what == core::membership::change::clash) {
             ++net.clashes_;
         }
     }
@@ -119,11 +121,11 @@ class gossip_network::member final : public core::announcer::voice,
     std::deque<std::shared_ptr<message>> unread;
     time_point woken_at = time_point::max();
     std::size_t bytes = 0;
-    core::absence away;
+    core::suspend_detector away;
     core::counters counts;
     core::deadline_queue deadlines;
-    core::presence others_known;
-    core::gossip talk;
+    core::membership others_known;
+    core::gossip gossip;
     core::announcer mouth;
 };
 
@@ -205,7 +207,7 @@ void gossip_network::pass(milliseconds span) {
 void gossip_network::run(member& m) {
     const auto now = m.local();
     if (m.away.ended(now) && fault_ != planted::excuse_forgotten) {
-        m.others_known.excuse(now);
+        m.others_known.note_suspension(now);
     }
     m.deadlines.expire(now);
     while (!m.unread.empty()) {
@@ -276,19 +278,19 @@ void gossip_network::handle(member& m, message& what) {
         message answer{
             .what = message::kind::table, .to_run = what.from_run, .from_run = m.run_number, .ticket = what.ticket};
         json_writer w{answer.text};
-        m.talk.write_news(w, {what.text, what.describe}, 1U << 20U, now);
+        m.gossip.write_delta(w, {what.text, what.describe}, 1U << 20U, now);
         send(m.place, what.from, std::move(answer));
         break;
     }
     case message::kind::table:
         m.bytes += on_the_wire(reply_head + what.text.size());
-        m.talk.on_answer(what.ticket, what.text, now);
+        m.gossip.on_answer(what.ticket, what.text, now);
         break;
-    case message::kind::tell:
+    case message::kind::push:
         m.bytes += on_the_wire(request_head + what.text.size());
-        m.talk.on_told(what.text, core::teller::at(members_[what.from]->url), now);
+        m.gossip.on_pushed_table(what.text, core::observed_source::at(members_[what.from]->url), now);
         break;
-    case message::kind::failure: m.talk.on_failure(what.ticket, now); break;
+    case message::kind::failure: m.gossip.on_failure(what.ticket, now); break;
     }
 }
 
@@ -300,7 +302,7 @@ void gossip_network::kill(std::size_t node) {
 }
 
 void gossip_network::leave(std::size_t node) {
-    members_[node]->talk.stop(members_[node]->local());
+    members_[node]->gossip.stop(members_[node]->local());
     kill(node);
 }
 
@@ -331,10 +333,10 @@ void gossip_network::plan_pause(std::size_t node) {
         return;
     }
     const auto& w = weather_;
-    const auto mean = (w.shortest_pause + w.longest_pause) / 2;
+    const auto mean = (w.shortest_pause + w.max_pause) / 2;
     const auto apart = mean * (1000 - w.paused) / w.paused;
     const auto begins = now_ + dice_.within(apart * 2);
-    const auto lasts = w.shortest_pause + dice_.within(w.longest_pause - w.shortest_pause);
+    const auto lasts = w.shortest_pause + dice_.within(w.max_pause - w.shortest_pause);
     pauses_.push({begins, lasts, node});
 }
 
@@ -369,7 +371,7 @@ std::size_t gossip_network::missing() const {
             continue;
         }
         std::size_t known = 0;
-        m->others_known.each([&](const core::presence::known& k) {
+        m->others_known.for_each([&](const core::membership::member& k) {
             const auto at = by_url_.find(k.where);
             if (at != by_url_.end()) {
                 const auto& other = *members_[at->second];
@@ -387,7 +389,7 @@ std::size_t gossip_network::holding(std::size_t node) const {
     std::size_t count = 0;
     for (const auto& m : members_) {
         if (m->alive && m->place != node) {
-            const auto k = m->others_known.look(members_[node]->said.node);
+            const auto k = m->others_known.find_member(members_[node]->said.node);
             count += k && !k->suspect ? 1 : 0;
         }
     }
@@ -398,7 +400,7 @@ std::size_t gossip_network::suspecting(std::size_t node) const {
     std::size_t count = 0;
     for (const auto& m : members_) {
         if (m->alive && m->place != node) {
-            const auto k = m->others_known.look(members_[node]->said.node);
+            const auto k = m->others_known.find_member(members_[node]->said.node);
             count += k && k->suspect ? 1 : 0;
         }
     }

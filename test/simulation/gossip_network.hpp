@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/announcer.hpp"
-#include "core/counters.hpp"
-#include "core/deadlines.hpp"
-#include "core/gossip.hpp"
-#include "core/presence.hpp"
-#include "simulation/dice.hpp"
-#include "simulation/planted.hpp"
+#include "node/base/deadlines.hpp"
+#include "node/base/metrics.hpp"
+#include "node/membership/announcer.hpp"
+#include "node/membership/gossip.hpp"
+#include "node/membership/membership.hpp"
+#include "simulation/network/dice.hpp"
+#include "simulation/network/planted.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -30,7 +30,7 @@ struct gossip_weather {
     std::chrono::microseconds slowest{5'000};
     unsigned paused = 0; ///< of each node's time, per mille
     std::chrono::milliseconds shortest_pause{200};
-    std::chrono::milliseconds longest_pause{10'000};
+    std::chrono::milliseconds max_pause{10'000};
 };
 
 /// Nodes by the hundred or thousand that find each other by seeds and gossip, in virtual time. What decides is the

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "simulation/plan.hpp"
-#include "simulation/simulate.hpp"
+#include "simulation/world/plan.hpp"
+#include "simulation/world/simulate.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 // That the simulation sees what it is there to see: a fault is planted in the harness for each rule, and has to be
 // found in few seeds, as a breach of that rule and of no other.
-#include "simulation/planted.hpp"
+#include "simulation/network/planted.hpp"
 #include "simulation/seeds.hpp"
-#include "simulation/simulate.hpp"
+#include "simulation/world/simulate.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -76,6 +76,8 @@ BOOST_AUTO_TEST_CASE(an_update_that_is_sent_twice) { finds(sim::planted::group_s
 BOOST_AUTO_TEST_CASE(a_last_update_that_is_not_repeated) {
     finds(sim::planted::repeat_swallowed, sim::rule::first_soon);
 }
+BOOST_AUTO_TEST_CASE(a_stream_that_loses_what_is_urgent) { finds(sim::planted::urgent_lost, sim::rule::asks_succeed); }
+BOOST_AUTO_TEST_CASE(a_departure_that_loses_answers) { finds(sim::planted::finish_resets, sim::rule::replies_match); }
 BOOST_AUTO_TEST_CASE(chance_from_elsewhere) { finds(sim::planted::chance_leaks, sim::rule::same_trace); }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -17,15 +17,15 @@ inline std::ostream& operator<<(std::ostream& out, errc code) { return out << ma
 
 namespace cles::test {
 
-/// What a request came to. It has to outlive the request.
+/// The outcome of a request. Must outlive the request.
 template <class T = json_text>
 struct answer {
     int calls = 0;
     boost::system::error_code code{};
     T value{};
-    std::string words{}; ///< the peer's own
+    std::string words{}; ///< the peer's message
 
-    /// The completion handler; one type for all tests, which spares the compiler.
+    /// The completion handler; one type for all tests, which saves compile time.
     struct taker {
         answer* to;
         void operator()(boost::system::error_code failed, T result) const {
@@ -35,7 +35,7 @@ struct answer {
         }
     };
     taker take() { return {this}; }
-    /// Options that bring the peer's words here.
+    /// Options that store the peer's message here.
     call_options options() { return call_options{}.diagnostics(words); }
 
     [[nodiscard]] bool done() const noexcept { return calls != 0; }

@@ -9,9 +9,9 @@
 
 namespace cles::test {
 
-/// A node whose own tasks are asked, each as somebody types it.
+/// A node to whose own tasks a test sends requests as text.
 struct asked_node {
-    /// The reply, or what the failure says.
+    /// The reply, or the message of the failure.
     std::string ask(const std::string& command) {
         try {
             return node.request(command);

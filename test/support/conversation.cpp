@@ -5,7 +5,6 @@
 #include <cles/json_reader.hpp>
 
 #include "protocol/grammar.hpp"
-#include "protocol/parts.hpp"
 
 #include <algorithm>
 #include <array>
@@ -21,7 +20,7 @@ namespace {
 constexpr std::size_t longest_text = 1'000'000;
 constexpr std::uint64_t longest_pass = 100'000'000; // milliseconds
 
-/// Takes the first word off.
+/// Removes and returns the first word.
 std::string_view word(std::string_view& rest) {
     const auto end = std::min(rest.find(' '), rest.size());
     const auto first = rest.substr(0, end);
@@ -37,7 +36,7 @@ std::uint64_t number(std::string_view text, std::uint64_t most) {
     return *n;
 }
 
-/// JSON as handlers and programs give it: valid, without white space. Nothing is nothing.
+/// JSON as handlers and programs pass it: valid, without white space. Empty text stays empty.
 std::string json(std::string_view text) {
     std::string compact;
     if (!text.empty() && !is_valid_json(text)) {
@@ -64,7 +63,7 @@ protocol::noun_view noun(std::string_view text) {
     return parts;
 }
 
-/// What stands behind `>>`: text with \t, \r, \\ and \xHH.
+/// The text after `>>`, with \t, \r, \\ and \xHH decoded.
 std::string unescaped(std::string_view text) {
     std::string out;
     for (std::size_t i = 0; i < text.size(); ++i) {
@@ -92,7 +91,7 @@ std::string name_on(char link) { return link == 'a' ? std::string{} : std::strin
 conversation::conversation() = default;
 
 conversation::~conversation() {
-    links_.clear(); // they know the node and the feeds
+    links_.clear(); // they refer to the node and the feeds
     if (node_) {
         node_->started.clear();
     }
@@ -107,7 +106,7 @@ bool conversation::is_step(std::string_view line) {
 
 std::vector<std::string> conversation::take() { return std::exchange(told_, {}); }
 
-// -- the node and what it offers -----------------------------------------------------------------------------------
+// -- the node and its tasks ----------------------------------------------------------------------------------------
 
 void conversation::make_node() {
     if (node_) {
@@ -136,7 +135,7 @@ void conversation::add_quick_tasks() {
         w.end_array();
         w.end_object();
     });
-    // Long enough to be too long.
+    // Long enough to exceed the limit.
     node.on(verb::pull, "text", [longest = std::min(bounds.line * 2, longest_text)](const request& r, json_writer& w) {
         w.value(std::string(std::min(r.parameter<std::size_t>(0), longest), 'x'));
     });
@@ -295,7 +294,7 @@ void conversation::on_link(char name, std::string_view what, std::string_view re
 /// `@ ask ID VERB NOUN [deadline=MS] [progress=yes] [JSON]`
 void conversation::ask(char name, std::string_view rest) {
     const auto id = number(word(rest), protocol::max_id);
-    protocol::request_text request{.verb = verb_named(word(rest)), .noun = word(rest), .id = id};
+    protocol::outgoing_request request{.verb = verb_named(word(rest)), .noun = word(rest), .id = id};
     noun(request.noun);
     auto limit = std::uint64_t{protocol::default_deadline(request.verb)};
     if (rest.starts_with("deadline=")) {
@@ -343,7 +342,7 @@ void conversation::follow(char name, std::string_view rest) {
     feeds_.push_back(std::move(feed));
 }
 
-// -- what comes of them --------------------------------------------------------------------------------------------
+// -- results -------------------------------------------------------------------------------------------------------
 
 void conversation::collect() {
     for (auto& [name, at] : links_) {

@@ -16,14 +16,14 @@
 
 namespace cles::test {
 
-/// A step that a script cannot mean.
+/// A step that is not valid in a script.
 class script_error : public std::runtime_error {
   public:
     using std::runtime_error::runtime_error;
 };
 
-/// A node without a network that talks as a script says, one line of it being one step (test/golden/README.md). What
-/// comes of a step is told in the script's own words, so that it can be compared with what the script expects.
+/// A node without a network that runs a script, one line per step (test/golden/README.md). The results of a step are
+/// reported in the script's own syntax, so that they can be compared with what the script expects.
 class conversation {
   public:
     conversation();
@@ -31,14 +31,14 @@ class conversation {
     conversation& operator=(const conversation&) = delete;
     ~conversation();
 
-    /// Whether a line of a script is a step, as opposed to a comment or something expected.
+    /// Whether a line of a script is a step, not a comment or an expectation.
     static bool is_step(std::string_view line);
     /// \throws script_error
     void perform(std::string_view step);
-    /// What has come of it, in order: "< {...}", "= finish", "b< {...}".
+    /// The results since the last call, in order: "< {...}", "= finish", "b< {...}".
     std::vector<std::string> take();
 
-    /// The limits that `@ limits` sets; to be changed before the first other step.
+    /// The limits that `@ limits` sets; change them only before the first other step.
     cles::limits bounds{};
     [[nodiscard]] test_node* node() noexcept { return node_.get(); }
     [[nodiscard]] std::map<char, std::unique_ptr<test_link>>& links() noexcept { return links_; }

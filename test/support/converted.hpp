@@ -8,7 +8,7 @@
 
 namespace cles::test {
 
-/// Why a text is not read as that type, without the position; "(read)" where it is.
+/// Why a text cannot be read as that type, without the position; "(read)" if it can.
 template <class T>
 std::string why(std::string_view text) {
     T value{};
@@ -16,7 +16,7 @@ std::string why(std::string_view text) {
     return from_json(text, value, &message) ? "(read)" : message.substr(0, message.find(" (at byte"));
 }
 
-/// What is read from what is written.
+/// Writes a value and reads it back.
 template <class T>
 T round_trip(const T& value) {
     return from_json<T>(to_json(value));

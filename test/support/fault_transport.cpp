@@ -41,7 +41,7 @@ bool fault_plan::strikes() {
     return now;
 }
 
-/// An end of a link that may fail; passes all else on to the link inside.
+/// An end of a link that may fail; forwards everything else to the link inside.
 class faulty_link final : public link, public link_events, public std::enable_shared_from_this<faulty_link> {
   public:
     faulty_link(asio::any_io_executor executor, link_ptr inside)
@@ -67,7 +67,7 @@ class faulty_link final : public link, public link_events, public std::enable_sh
             inside_->flush();
             return;
         }
-        if (plan_.how() == fault::cut) { // whole lines, since that is what crosses this kind of link
+        if (plan_.how() == fault::cut) { // whole lines, as on this kind of link
             auto& text = inside_->output();
             text.erase(text.rfind('\n', text.size() / 2) + 1);
             inside_->flush();
@@ -144,8 +144,8 @@ class faulty_link final : public link, public link_events, public std::enable_sh
             self->on_lost(asio::error::connection_reset);
         });
     }
-    // What this end says to the end of stream still arrives. But the other end has not ended its side, so that what it
-    // writes from then on would reset the link, as what it wrote just now does.
+    // What this end sends before the end of stream still arrives. But the other end has not ended its side, so what it
+    // writes from then on would reset the link, as would what it has just written.
     void lose_if_kept() {
         asio::post(executor_, [self = shared_from_this()] {
             if (!self->finished_ && !self->silent_) {
@@ -158,7 +158,7 @@ class faulty_link final : public link, public link_events, public std::enable_sh
     asio::any_io_executor executor_;
     link_ptr inside_;
     std::shared_ptr<link_events> owner_{};
-    bool silent_ = false; // nothing passes any more
+    bool silent_ = false; // nothing gets through any more
     bool ended_ = false;
     bool finished_ = false; // by this end
 };

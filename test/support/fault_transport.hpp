@@ -6,31 +6,31 @@
 
 namespace cles::test {
 
-/// How the step that is to fail fails.
+/// How the chosen step fails.
 enum class fault : std::uint8_t {
     lost,  ///< the link is lost there; a dial is refused
-    cut,   ///< of what is written there, the first half arrives, and then the link is lost
-    ended, ///< the peer seems to end its side there; since it goes on writing, a link that is kept is lost soon after
+    cut,   ///< the first half of what is written there arrives, and then the link is lost
+    ended, ///< the peer seems to end its side; it goes on writing, so a link that is kept is lost soon after
 };
 
 std::ostream& operator<<(std::ostream& out, fault kind);
 
-/// Which step of all links `fault://name` fails. These are like `inproc`, on one thread; steps are: a dial, a link that
-/// comes in, the start of an end, a flush, and a line that is handed over.
+/// Selects the step that fails, of all links `fault://name`. These are like `inproc`, on one thread. Steps are: a dial,
+/// an accepted link, the start of an end, a flush, and the delivery of a line.
 class fault_plan {
   public:
     static fault_plan& instance();
 
-    /// Counts from now on, and lets the step with this number (from 0) fail.
+    /// Starts to count, and lets the step with this number (from 0) fail.
     void arm(fault how, int step);
     void disarm() { arm(fault::lost, -1); }
-    /// Whether the step that comes now fails.
+    /// Whether the current step fails.
     bool strikes();
 
     [[nodiscard]] fault how() const noexcept { return how_; }
-    /// Whether the step has come.
+    /// Whether the step has been reached.
     [[nodiscard]] bool struck() const noexcept { return struck_; }
-    /// Ends of links that exist.
+    /// The number of existing link ends.
     [[nodiscard]] int links() const noexcept { return links_; }
 
   private:
@@ -43,7 +43,7 @@ class fault_plan {
     int links_ = 0;
 };
 
-/// Makes `fault` a scheme. Repeating it does nothing.
+/// Registers the scheme `fault`. Idempotent.
 void register_fault_transport();
 
 } // namespace cles::test

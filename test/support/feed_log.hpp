@@ -14,7 +14,7 @@
 
 namespace cles::test {
 
-/// A feed that is fetched from all the time, and all that it told.
+/// A feed from which events are fetched continuously, and all its events.
 class feed_log {
   public:
     using item = feed_item<json_text>;
@@ -31,7 +31,7 @@ class feed_log {
         feed<json_text> closing = std::move(feed_);
         closing.close();
     }
-    /// Stops fetching, or goes on.
+    /// Stops or resumes fetching.
     void hold(bool still) {
         held_ = still;
         fetch();
@@ -70,7 +70,7 @@ class feed_log {
   private:
     struct taker {
         feed_log* log;
-        std::weak_ptr<bool> alive; // what is told after the log is gone
+        std::weak_ptr<bool> alive; // expired: the log has been destroyed
         void operator()(boost::system::error_code failed, feed<json_text> made) const {
             if (alive.expired()) {
                 return;

@@ -6,7 +6,7 @@
 
 namespace cles::test {
 
-/// Where jobs on other threads wait until the test lets them go on.
+/// Blocks jobs on other threads until the test opens it.
 class gate {
   public:
     gate() = default;
@@ -26,7 +26,7 @@ class gate {
         open_ = true;
         changed_.notify_all();
     }
-    /// How many have come to it so far.
+    /// How many have arrived so far.
     [[nodiscard]] int arrived() const {
         const std::lock_guard lock{mutex_};
         return arrived_;

@@ -8,7 +8,7 @@
 
 namespace cles::test {
 
-/// A group of a test's own, on loopback: tests that run beside it use other ports.
+/// A group on loopback for one test: tests that run at the same time use other ports.
 inline multicast_options fresh_group() {
     boost::asio::io_context io;
     const boost::asio::ip::udp::socket free{io, {boost::asio::ip::udp::v4(), 0}};

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/group_output.hpp"
+#include "node/publish/group_output.hpp"
 #include "port/group_source.hpp"
 
 #include <string>
@@ -14,7 +14,7 @@ namespace cles::test {
 /// A source in the group that is not the node under test.
 constexpr core::group_source source_at(std::uint16_t port) { return {.address = 0x7f000001, .port = port}; }
 
-/// What a node sends to its group, as far as a test lets it.
+/// Records what a node sends to its group, as far as the test lets it.
 class group_recorder final : public core::group_output {
   public:
     bool send(std::string_view line) override {

@@ -15,18 +15,18 @@
 
 namespace cles::test {
 
-/// What happens to datagrams on their way, each way for itself.
+/// The impairments of a path, applied to each direction separately.
 struct impairment {
-    double loss = 0;  ///< how many of all never arrive
-    double twice = 0; ///< how many of the others arrive twice
-    /// Each is delayed by something between these, so that those which are far apart enough overtake each other.
+    double loss = 0;  ///< share of all datagrams that never arrive
+    double twice = 0; ///< share of the others that arrive twice
+    /// Each is delayed by a time between these, so that datagrams that are close together may be reordered.
     std::chrono::milliseconds least_delay{0};
     std::chrono::milliseconds most_delay{0};
 };
 
-/// A network between clients and a node's UDP port that treats datagrams badly, always alike for one seed.
+/// A network between clients and a node's UDP port that impairs datagrams, always in the same way for one seed.
 ///
-/// It listens on a free port of loopback; the node sees each client as a source of its own.
+/// It listens on a free port of loopback; the node sees each client as a separate source.
 class impaired_path {
   public:
     impaired_path(boost::asio::io_context& io, std::string_view node, impairment how, std::uint32_t seed);
@@ -34,11 +34,11 @@ class impaired_path {
     impaired_path(const impaired_path&) = delete;
     impaired_path& operator=(const impaired_path&) = delete;
 
-    /// Where clients send to.
+    /// The URL to which clients send.
     [[nodiscard]] std::string url() const;
     /// From now on.
     void set(impairment how);
-    /// Told of every datagram that comes in, before anything happens to it. True: it is dropped.
+    /// `drop` is called with every datagram before anything happens to it; true drops it.
     void filter(std::function<bool(std::string_view datagram, bool to_node)> drop);
 
     [[nodiscard]] std::uint64_t to_node() const;

@@ -20,38 +20,38 @@
 
 namespace cles::test {
 
-/// All ways to make a link.
+/// All kinds of links.
 enum class carrier { tcp4, tcp6, unix_file, unix_abstract, inproc, inproc_threads, udp4, udp6 };
 
-/// The streams, each of which keeps the one contract.
+/// The streams, all of which meet the same contract.
 inline constexpr std::array every_carrier{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
                                           carrier::unix_abstract, carrier::inproc, carrier::inproc_threads};
 inline constexpr std::array every_socket{carrier::tcp4, carrier::tcp6, carrier::unix_file, carrier::unix_abstract};
 
-/// What carries each line as a datagram of its own.
+/// Those that carry each line as one datagram.
 inline constexpr std::array every_datagram{carrier::udp4, carrier::udp6};
-/// What holds for listening and dialling, whatever is carried.
+/// All of them, for tests of listening and dialling.
 inline constexpr std::array every_door{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
                                        carrier::unix_abstract, carrier::inproc, carrier::inproc_threads,
                                        carrier::udp4,          carrier::udp6};
 
 std::ostream& operator<<(std::ostream& out, carrier kind);
 
-/// An address to listen on that nobody else uses.
+/// An address to listen on that is not in use.
 std::string fresh_address(carrier kind);
 
 /// One end of a link, with its owner.
 struct link_end {
     std::shared_ptr<link_recorder> events = std::make_shared<link_recorder>();
     link_ptr link{};
-    side_thread* home = nullptr; ///< where it lives, if not on the test's thread
+    side_thread* home = nullptr; ///< the thread on which it lives, if not the test's
 
-    /// Does something with the link or its owner, where they live.
+    /// Uses the link or its owner on their thread.
     template <class F>
     auto run(F f) -> std::invoke_result_t<F&> {
         return home != nullptr ? home->run(std::move(f)) : f();
     }
-    /// Hands the owner to the link.
+    /// Passes the owner to the link.
     void start();
     /// Writes the lines and flushes.
     void say(std::string_view lines);
@@ -67,11 +67,11 @@ struct link_end {
     [[nodiscard]] bool over() {
         return run([this] { return events->over(); });
     }
-    /// Ends it and lets go of it.
+    /// Ends the link and releases it.
     void drop();
 };
 
-/// A listener and links of one kind. `near` is the end that dials, on the test's thread; `far` the one that came in.
+/// A listener and links of one kind. `near` is the end that dials, on the test's thread; `far` is the accepted one.
 class link_pair {
   public:
     explicit link_pair(carrier kind, const limits& bounds = {});
@@ -89,11 +89,12 @@ class link_pair {
     /// The other end's context.
     [[nodiscard]] boost::asio::io_context& far_io() { return thread_ ? thread_->io() : io; }
 
-    /// Makes the link; its ends are not started. By datagram the near end says "hello", without which nobody comes in.
+    /// Makes the link without starting its ends. Over datagrams, the near end sends "hello", since only that makes a
+    /// link.
     void connect();
     /// Makes the link and starts both ends.
     void open();
-    /// Waits for somebody to come in, who was not dialled by `connect`.
+    /// Waits for a link that `connect` did not make.
     void accept();
     void stop_listening();
 

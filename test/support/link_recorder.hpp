@@ -12,16 +12,16 @@
 
 namespace cles::test {
 
-/// An owner of a link that writes down what it is told.
+/// An owner of a link that records its calls.
 class link_recorder final : public link_events {
   public:
-    // A letter per call, in their order: (l)ine, (b)atch, (o)verlong, (e)nd, lo(x)st, (r)oom.
+    // A letter per call, in order: (l)ine, (b)atch, (o)verlong, (e)nd, lo(x)st, (r)oom.
     std::string calls{};
     std::vector<std::string> lines{};
     std::string head{};
     std::string rest{}; ///< of a line that was cut off
     boost::system::error_code why{};
-    /// Called at each call with its letter.
+    /// Called on each call, with its letter.
     std::function<void(char)> hook{};
 
     [[nodiscard]] std::size_t count(char call) const {
@@ -31,7 +31,7 @@ class link_recorder final : public link_events {
     [[nodiscard]] bool lost() const { return has('x'); }
     [[nodiscard]] bool over() const { return has('e') || lost(); }
 
-    /// Whether the calls came in the order that `link_events` promises.
+    /// Whether the calls had the order that `link_events` promises.
     [[nodiscard]] bool in_order() const {
         const auto last_word = calls.find_first_of("oe");
         const auto lines_end = calls.rfind('l');

@@ -5,7 +5,7 @@
 
 namespace cles::test {
 
-/// The paper's example of what vehicles tell each other.
+/// The paper's example of the data that vehicles exchange.
 struct localization {
     double utc = 0;
     double lat = 0;

@@ -9,7 +9,7 @@
 
 namespace cles::test {
 
-/// Time that stands still until a test moves it.
+/// Time that only a test advances.
 class manual_clock final : public core::clock {
   public:
     [[nodiscard]] time_point now() const override { return now_; }

@@ -10,7 +10,7 @@
 
 namespace cles::test {
 
-/// A service's options: it listens where nobody else does.
+/// Options of a service that listens at an unused address.
 inline service_options listening(std::string name, carrier kind = carrier::tcp4, const limits& bounds = {}) {
     service_options options{.name = std::move(name)};
     options.listen.push_back(fresh_address(kind));
@@ -18,7 +18,7 @@ inline service_options listening(std::string name, carrier kind = carrier::tcp4,
     return options;
 }
 
-/// A service's options: it listens nowhere, and knows one other.
+/// Options of a service that does not listen, and knows one other.
 inline service_options knowing(std::string name, const service& other, const limits& bounds = {}) {
     service_options options{.name = std::move(name)};
     options.peers.emplace(other.name(), other.endpoints().front());

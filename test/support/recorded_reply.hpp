@@ -14,12 +14,12 @@ namespace cles::test {
 /// How an operation ended, if it did.
 struct outcome {
     bool ended = false;
-    bool discarded = false; ///< it went without a word
+    bool discarded = false; ///< it was destroyed without completing
     boost::system::error_code code{};
     std::string text{}; ///< the result, or the failure's message
 };
 
-/// An operation whose end is recorded. It refuses results that are not JSON, as the real ones do.
+/// An operation whose outcome is recorded. Like the real ones, it refuses results that are not JSON.
 class recorded_reply final : public detail::pending {
   public:
     explicit recorded_reply(std::shared_ptr<outcome> to) : to_(std::move(to)) {}

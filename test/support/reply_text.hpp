@@ -12,10 +12,10 @@
 
 namespace cles::test {
 
-/// A reply, taken apart for a test.
+/// A parsed reply.
 struct reply_parts {
     std::uint64_t id = 0;
-    std::string error{}; ///< the code as it stands on the wire; empty for a success
+    std::string error{}; ///< the code on the wire; empty for a success
     std::string message{};
     std::optional<std::uint64_t> retry_ms{};
     bool ran = false;
@@ -42,8 +42,8 @@ inline reply_parts read_reply(std::string_view line) {
     return parts;
 }
 
-/// "id=7 no_task", "busy", "id=7 ok": what kind of answer a line is, and to which request. A line that is no reply is
-/// given back as it is.
+/// "id=7 no_task", "busy", "id=7 ok": the kind of a reply, and its request. A line that is not a reply is returned
+/// unchanged.
 inline std::string kind_of(std::string_view line) {
     if (!protocol::is_reply(line)) {
         return std::string{line};

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/routing.hpp"
-#include "support/recorded_ways.hpp"
+#include "node/routing/request_router.hpp"
+#include "support/recorded_next_hop.hpp"
 #include "support/session_fixture.hpp"
 
 #include <cstdint>
@@ -20,12 +20,13 @@ struct routing_fixture {
 
     /// Another node announces itself.
     void hear(const std::string& name, const std::string& digest = "d", node_load load = {}) {
-        node.host->others.hear({.node = name, .endpoints = {"tcp://127.0.0.1:1"}, .load = load, .tasks = digest},
-                               run_of(name), ++seq[name], from(name), node.clock.now());
+        node.host->peers.apply_announcement(
+            {.node = name, .endpoints = {"tcp://127.0.0.1:1"}, .load = load, .tasks = digest}, run_of(name),
+            ++seq[name], from(name), node.clock.now());
     }
     void leave(const std::string& name) {
-        node.host->others.hear({.node = name, .leaving = true}, run_of(name), ++seq[name], from(name),
-                               node.clock.now());
+        node.host->peers.apply_announcement({.node = name, .leaving = true}, run_of(name), ++seq[name], from(name),
+                                            node.clock.now());
     }
     static std::string description(const std::string& name, const std::string& tasks) {
         return R"({"node":")" + name + R"(","tasks":[)" + tasks + "]}";
@@ -33,7 +34,7 @@ struct routing_fixture {
     static std::string task(const std::string& verb, const std::string& name, bool idempotent = false) {
         return R"({"verb":")" + verb + R"(","task":")" + name + (idempotent ? R"(","idempotent":true})" : "\"}");
     }
-    /// Another node is there and has said what it offers. Each has a digest of its own.
+    /// Another node announces itself and its tasks, with a digest of its own.
     void offer(const std::string& name, const std::string& tasks, node_load load = {}) {
         hear(name, "of " + name, load);
         ways.to(name).answers(description(name, tasks));
@@ -49,19 +50,19 @@ struct routing_fixture {
         return s;
     }
 
-    /// What the shell does when it is woken.
+    /// What the service does when it is woken.
     void drain() {
         node.drain();
-        routing->drain(node.clock.now());
+        core::send_updates(node.host->unsent_relayed, node.host->published, node.clock.now());
     }
 
     void have_turn() { routing->begin_ready(node.clock.now()); }
 
     test_node node;
-    recorded_ways ways;
+    recorded_next_hop ways;
     int wakes = 0;
-    bool waits_for_turn = false; ///< what is to begin soon waits for `have_turn`; else it begins at once
-    std::shared_ptr<core::routing> routing = std::make_shared<core::routing>(node.host, ways, 7, [this] {
+    bool waits_for_turn = false; ///< scheduled requests start in `have_turn` instead of at once
+    std::shared_ptr<core::request_router> routing = std::make_shared<core::request_router>(node.host, ways, 7, [this] {
         ++wakes;
         if (!waits_for_turn) {
             have_turn();

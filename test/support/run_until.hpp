@@ -11,7 +11,7 @@
 
 namespace cles::test {
 
-/// Long enough for a sanitizer's build on a busy machine; no test that passes waits for it.
+/// Long enough for a sanitizer build on a busy machine; no test that passes waits for it.
 inline constexpr std::chrono::seconds patience{20};
 
 [[noreturn]] inline void waited_in_vain(const std::source_location& where) {
@@ -19,8 +19,8 @@ inline constexpr std::chrono::seconds patience{20};
     throw std::logic_error{"not reached"};
 }
 
-/// Runs the context until the condition holds, which is looked at after every handler and every millisecond. The test
-/// fails where it does not within `limit`.
+/// Runs the context until the condition holds, which is checked after every handler and every millisecond. The test
+/// fails if it does not hold within `limit`.
 template <class Condition>
 void run_until(boost::asio::io_context& io, Condition&& holds, std::chrono::milliseconds limit = patience,
                const std::source_location& where = std::source_location::current()) {
@@ -37,7 +37,7 @@ void run_until(boost::asio::io_context& io, Condition&& holds, std::chrono::mill
     }
 }
 
-/// Runs what is ready, and what that makes ready: for the cases that show that something does not happen.
+/// Runs everything that is ready, and what that makes ready: for tests that something does not happen.
 inline void run_ready(boost::asio::io_context& io) {
     const auto busy = boost::asio::make_work_guard(io);
     for (int quiet = 0; quiet < 5;) {

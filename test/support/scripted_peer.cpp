@@ -67,7 +67,7 @@ scripted_peer::scripted_peer(boost::asio::io_context& io, std::string_view url, 
     const auto where = address_of(parse_url(url));
     descriptor_ = ::socket(where.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
     check(descriptor_, "socket");
-    if (size == buffers::small) { // before it connects: TCP crawls when a window shrinks later
+    if (size == buffers::small) { // before connecting: TCP slows down when a window shrinks later
         const int little = 4096;
         ::setsockopt(descriptor_, SOL_SOCKET, SO_RCVBUF, &little, sizeof little);
     }
@@ -193,7 +193,7 @@ scripted_listener::scripted_listener(boost::asio::io_context& io, std::string_vi
         check(::getsockname(descriptor_, reinterpret_cast<sockaddr*>(&local.storage), &local.size), "getsockname");
         sockaddr_in in{};
         std::memcpy(&in, &local.storage, sizeof in);
-        where_.port = ntohs(in.sin_port); // stands in the same place for both families
+        where_.port = ntohs(in.sin_port); // at the same offset for both families
     }
 }
 

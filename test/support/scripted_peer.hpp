@@ -13,16 +13,16 @@
 
 namespace cles::test {
 
-/// Small ones hold little, so that it shows soon that nobody reads.
+/// Small ones hold little, so that an unread stream fills up soon.
 enum class buffers { usual, small };
 
-/// A plain socket in the hands of a test, which plays the peer of a link byte by byte. While it waits it runs the
-/// context that the link lives on; whatever it waits for has to come within `patience`.
+/// A plain socket with which a test plays the peer of a link byte by byte. While it waits, it runs the link's context;
+/// what it waits for has to arrive within `patience`.
 class scripted_peer {
   public:
     using place = std::source_location;
 
-    /// Connects to where something listens.
+    /// Connects to a listener.
     scripted_peer(boost::asio::io_context& io, std::string_view url, buffers size = buffers::usual);
     /// Takes over a connected socket.
     scripted_peer(boost::asio::io_context& io, int descriptor) noexcept : io_(&io), descriptor_(descriptor) {}
@@ -36,18 +36,18 @@ class scripted_peer {
     std::size_t send_some(std::string_view bytes);
     /// The next line, without its LF.
     std::string line(const place& where = place::current());
-    /// Sends a line and returns the one that answers it.
+    /// Sends a line and returns the reply.
     std::string ask(std::string_view line, const place& where = place::current());
-    /// All that comes until the end of the stream (or a reset).
+    /// Everything that arrives until the end of the stream (or a reset).
     std::string rest(const place& where = place::current());
-    /// Whether the stream has ended; takes in what has come so far.
+    /// Whether the stream has ended; reads what has arrived.
     bool ended();
-    /// The bytes that have come and were not asked for yet.
+    /// The bytes that have arrived and have not been returned.
     [[nodiscard]] std::string unread() const { return input_.substr(taken_); }
-    /// What was read after the script ended by a reset instead of an end.
+    /// Whether the stream ended by a reset.
     [[nodiscard]] bool was_reset() const noexcept { return reset_; }
 
-    /// Ends the sending side.
+    /// Shuts down the sending side.
     void shut();
     /// Closes with a reset.
     void reset();
@@ -59,12 +59,12 @@ class scripted_peer {
     boost::asio::io_context* io_;
     int descriptor_ = -1;
     std::string input_{};
-    std::size_t taken_ = 0; // of the input, by `line`
+    std::size_t taken_ = 0; // how much of the input `line` has returned
     bool ended_ = false;
     bool reset_ = false;
 };
 
-/// A plain listening socket; what comes in is a peer to script.
+/// A plain listening socket; each accepted connection is a scripted peer.
 class scripted_listener {
   public:
     explicit scripted_listener(boost::asio::io_context& io, std::string_view url = "tcp://127.0.0.1:0",
@@ -73,7 +73,7 @@ class scripted_listener {
     scripted_listener& operator=(const scripted_listener&) = delete;
     ~scripted_listener();
 
-    /// Where it listens, with its port.
+    /// The URL at which it listens, with its port.
     [[nodiscard]] std::string url() const { return to_string(where_); }
     scripted_peer accept(const std::source_location& where = std::source_location::current());
 

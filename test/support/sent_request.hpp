@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "core/outbound.hpp"
+#include "node/session/outbound.hpp"
 #include "support/recorded_reply.hpp"
 #include "support/session_fixture.hpp"
 
@@ -11,8 +11,9 @@
 
 namespace cles::test {
 
-/// Sends a request to the peer of a link, and records how it ends.
-inline std::shared_ptr<outcome> send_on(test_link& link, const test_node& node, const protocol::request_text& request,
+/// Sends a request to the peer of a link, and records its outcome.
+inline std::shared_ptr<outcome> send_on(test_link& link, const test_node& node,
+                                        const protocol::outgoing_request& request,
                                         std::chrono::milliseconds limit = std::chrono::seconds{5},
                                         core::outbound::progress_function progress = {}) {
     auto [operation, result] = record();

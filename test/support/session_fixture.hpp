@@ -3,12 +3,13 @@
 
 #include <cles/request.hpp>
 
-#include "core/call.hpp"
-#include "core/node.hpp"
-#include "core/session.hpp"
+#include "node/flush_scheduler.hpp"
+#include "node/node_state.hpp"
+#include "node/session/call.hpp"
+#include "node/session/session.hpp"
 #include "support/manual_clock.hpp"
 #include "support/recorded_reply.hpp"
-#include "support/recording_outlet.hpp"
+#include "support/recording_line_sink.hpp"
 #include "support/reply_text.hpp"
 
 #include <chrono>
@@ -22,21 +23,21 @@
 
 namespace cles::test {
 
-/// A node without a network, whose time a test moves.
+/// A node without a network, whose time the test advances.
 class test_node {
   public:
     explicit test_node(limits bounds = {}, authoriser rules = {}, log_sink log = {},
                        core::completion_queue::runner complete = {})
-        : host(std::make_shared<core::node>(core::node_setup{.name = "car1",
-                                                             .epoch = 0x5f3a09c1,
-                                                             .first_datagram_id = first_datagram_id,
-                                                             .bounds = bounds,
-                                                             .authorise = std::move(rules),
-                                                             .log = std::move(log),
-                                                             .complete = std::move(complete)},
-                                            clock, [this] { ++wakes; })) {}
+        : host(std::make_shared<core::node_state>(core::node_options{.name = "car1",
+                                                                     .epoch = 0x5f3a09c1,
+                                                                     .first_datagram_id = first_datagram_id,
+                                                                     .bounds = bounds,
+                                                                     .authorise = std::move(rules),
+                                                                     .log = std::move(log),
+                                                                     .complete = std::move(complete)},
+                                                  clock, [this] { ++wakes; })) {}
 
-    /// Moves time and lets what is due happen.
+    /// Advances time and runs what is due.
     void pass(std::chrono::milliseconds by) {
         clock.advance(by);
         host->deadlines.expire(clock.now());
@@ -44,19 +45,19 @@ class test_node {
 
     using plain = std::function<void(const request&, json_writer&)>;
     void on(verb v, std::string_view task, plain handler) { host->tasks.add(v, task, {.plain = std::move(handler)}); }
-    /// A task that answers with JSON that is known already.
+    /// A task that replies with fixed JSON.
     void on(verb v, std::string_view task, std::string json) {
         on(v, task, [json = std::move(json)](const request&, json_writer& w) { w.raw(json); });
     }
 
-    /// A handler that has been started and has not answered.
+    /// A handler that has started and has not replied.
     struct running {
         std::shared_ptr<core::call> call;
         std::vector<std::string> parameters;
         std::string body;
         bool stopped = false;
     };
-    /// A task whose handlers wait in `started` until the test answers for them.
+    /// A task whose handlers wait in `started` until the test replies for them.
     void on_later(verb v, std::string_view task) {
         host->tasks.add(v, task, {.start = [this](const request& r, const std::shared_ptr<core::call>& call) {
                             auto entry = std::make_shared<running>();
@@ -76,8 +77,8 @@ class test_node {
     void open(std::string_view task) { host->tasks.add(verb::bind, task, {}); }
 
     void publish(std::string_view path, std::string_view body) { host->published.publish_body(path, body); }
-    /// What the shell does when it is woken.
-    void drain() { host->published.drain(clock.now()); }
+    /// What the service does when it is woken.
+    void drain() { core::send_updates(host->unsent, host->published, clock.now()); }
     void publish_now(std::string_view path, std::string_view body) {
         publish(path, body);
         drain();
@@ -87,25 +88,25 @@ class test_node {
     manual_clock clock;
     static constexpr std::uint64_t first_datagram_id = 5'000'000'000;
     int wakes = 0;
-    std::shared_ptr<core::node> host;
+    std::shared_ptr<core::node_state> host;
     std::vector<std::shared_ptr<running>> started;
 };
 
-/// One link of a node, with the test at its other end.
-class test_link final : public recording_outlet, public core::binder {
+/// One link of a node, whose other end the test plays.
+class test_link final : public recording_line_sink, public core::subscriber {
   public:
     explicit test_link(test_node& at) : test_link(at, 0) {}
-    /// Over datagrams of so many bytes, where it is not 0.
+    /// Over datagrams of this size, unless it is 0.
     test_link(test_node& at, std::size_t datagram)
-        : recording_outlet(datagram, std::make_shared<core::memory_account>(at.host->memory)), at_(at),
+        : recording_line_sink(datagram, std::make_shared<core::memory_account>(at.host->memory)), at_(at),
           session_(at.host, *this, *this, peer_) {}
 
-    /// Feeds a line and tells what was sent meanwhile.
+    /// Receives a line and returns what was sent meanwhile.
     std::string ask(std::string_view line) {
         session_.on_line(line, at_.clock.now());
         return take();
     }
-    /// The same, for exactly one answer: "id=7 no_task", "ok", or "" for no answer.
+    /// The same, for exactly one reply: "id=7 no_task", "ok", or "" for none.
     std::string kind(std::string_view line) { return kinds(ask(line)); }
     reply_parts reply(std::string_view line) {
         session_.on_line(line, at_.clock.now());
@@ -124,9 +125,9 @@ class test_link final : public recording_outlet, public core::binder {
             serve_more();
         }
     }
-    /// The link has sent what there was.
+    /// The link has sent its output.
     void serve_more() { session_.serving().serve_more(at_.clock.now()); }
-    /// The peer has ended in the middle of a line.
+    /// The peer has ended in the middle of this line.
     void cut(std::string_view rest) { session_.on_cut(rest, at_.clock.now()); }
     /// The link has room again.
     void make_room() {

@@ -15,7 +15,7 @@
 
 namespace cles::test {
 
-/// An io_context that a thread of its own runs.
+/// An io_context with a thread that runs it.
 class side_thread {
   public:
     side_thread() : thread_([this] { io_.run(); }) {}
@@ -29,7 +29,7 @@ class side_thread {
 
     [[nodiscard]] boost::asio::io_context& io() noexcept { return io_; }
 
-    /// Runs it there and waits for its result; in line where it is called from there.
+    /// Runs `f` there and waits for its result; inline if called there.
     template <class F>
     std::invoke_result_t<F&> run(F f) {
         if (io_.get_executor().running_in_this_thread()) {

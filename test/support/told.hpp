@@ -5,7 +5,7 @@
 #include <cles/limits.hpp>
 #include <cles/pending.hpp>
 
-#include "core/subscription.hpp"
+#include "node/publish/subscription.hpp"
 
 #include <cstdint>
 #include <functional>
@@ -15,15 +15,15 @@
 
 namespace cles::test {
 
-/// Takes down, in words, what a node's own program is told.
-using teller = std::function<void(std::string)>;
+/// Records, as text, what a node reports to its own program.
+using observed_source = std::function<void(std::string)>;
 
-/// A request of the node's own whose end is told: "7 ok {...}", "7 failed busy".
+/// A request of the node itself whose outcome is reported: "7 ok {...}", "7 failed busy".
 class told_reply final : public detail::pending {
   public:
     enum class state : std::uint8_t { waiting, ended };
 
-    told_reply(std::uint64_t id, state& at, teller tell) : id_(id), at_(at), tell_(std::move(tell)) {
+    told_reply(std::uint64_t id, state& at, observed_source tell) : id_(id), at_(at), tell_(std::move(tell)) {
         at_ = state::waiting;
     }
 
@@ -48,13 +48,13 @@ class told_reply final : public detail::pending {
 
     std::uint64_t id_;
     state& at_;
-    teller tell_;
+    observed_source tell_;
 };
 
-/// A feed of the node's own whose events are told: "update car2:fix 17 {...}", "gap car2:fix 3".
+/// A feed of the node itself whose events are reported: "update car2:fix 17 {...}", "gap car2:fix 3".
 class told_feed final : public core::subscription {
   public:
-    told_feed(std::string target, std::string path, bool thinned, teller tell)
+    told_feed(std::string target, std::string path, bool thinned, observed_source tell)
         : subscription(std::move(target), std::move(path), thinned, limits{}.publishers), tell_(std::move(tell)) {}
 
   private:
@@ -71,7 +71,7 @@ class told_feed final : public core::subscription {
         return true;
     }
 
-    teller tell_;
+    observed_source tell_;
 };
 
 } // namespace cles::test

@@ -136,8 +136,8 @@ int client::run(asio::awaitable<void> work) {
         const auto node = target_of(noun_);
         hint_ += hint_.empty() ? "" : " ";
         hint_ += node == "any" || node == "all"
-                     ? "any: and all: need a node that routes, such as clesd; give its address by --at URL"
-                     : "cles ls lists the nodes; --at URL or --peer NAME=URL gives the address of another one";
+                     ? "any: and all: need a node that routes, such as clesd; set its address with --at URL"
+                     : "cles ls lists the nodes; --at URL or --peer NAME=URL sets the address of another one";
     }
     if (!hint_.empty()) {
         note(hint_);

@@ -60,11 +60,10 @@ asio::awaitable<void> follow(client& requester, const bind_arguments& args) {
 void add_bind(CLI::App& app, context& shared) {
     auto args = std::make_shared<bind_arguments>();
     auto* command = app.add_subcommand("bind", "Get updates as they are published");
-    args->feed.add_options(*command, "Number of updates, the last value that was published included; 0: until "
-                                     "interrupted (default 0)");
+    args->feed.add_options(*command, "Number of updates, including the last value; 0: until interrupted (default 0)");
     add_output_option(*command, args->format);
     refuse_body(*command, "BIND");
-    command->footer("Missed updates, and a publisher that is lost or found again, are reported on stderr.\n\n"
+    command->footer("Missed updates, and a publisher that is lost or returns, are reported on stderr.\n\n"
                     "Examples:\n"
                     "  cles bind car1:localization\n"
                     "  cles bind car1:localization --every 1s -n 10\n"

@@ -21,7 +21,7 @@ void feed_arguments::add_options(CLI::App& command, const std::string& count_hel
     add_count(command, count, count_help);
     add_duration(command, "--duration", duration, "End after this time, with success (default: never)");
     add_duration(command, "--every", every, "At most one update per interval, always the newest");
-    command.add_option("--keep", keep, "Updates that the publisher queues while this end is slow (default 64)")
+    command.add_option("--keep", keep, "Updates that the publisher queues if this subscriber is slow (default 64)")
         ->type_name("N")
         ->check(CLI::Range(1, 65536).description(""));
 }
@@ -33,7 +33,7 @@ bool feed_arguments::is_multicast() const {
 void feed_arguments::check() const {
     check_noun(noun);
     if (addresses.has_group() && addresses.has_at()) {
-        throw usage_error("--multicast and --at exclude each other");
+        throw usage_error("--multicast and --at cannot be combined");
     }
 }
 

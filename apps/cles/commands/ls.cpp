@@ -193,8 +193,8 @@ void add_ls(CLI::App& app, context& shared) {
     args->addresses.add_options(*command);
     add_timeout(*command, args->timeout, "2s");
     add_output_option(*command, args->format);
-    command->footer("LOAD is running/workers, and +N if N jobs wait.\n"
-                    "With --at it lists that node, and the nodes that it knows.\n\n"
+    command->footer("LOAD is RUNNING/WORKERS, and +N if N jobs are queued.\n"
+                    "With --at, only that node and the nodes that it knows are listed.\n\n"
                     "Examples:\n"
                     "  cles ls\n"
                     "  cles ls -l -m eth0\n"

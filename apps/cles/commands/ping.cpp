@@ -184,7 +184,7 @@ void add_ping(CLI::App& app, context& shared) {
     add_timeout(*command, args->timeout, "5s");
     add_count(*command, args->count, "Number of requests; 0: until interrupted (default 4)");
     add_duration(*command, "-i,--interval", args->interval, "Time between requests (default 1s)");
-    add_json_option(*command, args->json, "a document per answer, and one for the summary");
+    add_json_option(*command, args->json, "a document per reply, and one for the summary");
     command->footer("The first request, which opens the connection, is not timed.\n\n"
                     "Examples:\n"
                     "  cles ping tcp://10.0.0.7\n"

@@ -120,7 +120,7 @@ void add_request(CLI::App& app, context& shared, cles::verb verb, const std::str
     add_duration(*command, "-i,--interval", args->interval, "Time between requests; 0: no pause (default 1s)");
     add_output_option(*command, args->format);
     if (verb != cles::verb::update) {
-        command->add_flag("--urgent", args->urgent, "Let the answer overtake others that wait at the node");
+        command->add_flag("--urgent", args->urgent, "Have the node send the reply before others that are queued");
     }
     if (verb == cles::verb::pull) {
         refuse_body(*command, "PULL");
@@ -129,7 +129,7 @@ void add_request(CLI::App& app, context& shared, cles::verb verb, const std::str
     }
     if (verb == cles::verb::delegate) {
         command->add_flag("--progress", args->progress,
-                          "Show progress, a line per report, even if stderr is not a terminal");
+                          "Print progress, one line per report, even if stderr is not a terminal");
     }
     command->footer(examples);
     command->callback([args, &shared] { shared.exit_code = run_request(*args, shared.verbosity); });
@@ -155,7 +155,7 @@ void add_push(CLI::App& app, context& shared) {
 }
 
 void add_delegate(CLI::App& app, context& shared) {
-    add_request(app, shared, cles::verb::delegate, "delegate", "Have a task done and get its result",
+    add_request(app, shared, cles::verb::delegate, "delegate", "Delegate a task and get its result",
                 "Ctrl-C cancels the task.\n\n"
                 "Examples:\n"
                 "  cles delegate car1:sleep/3000\n"
@@ -163,7 +163,7 @@ void add_delegate(CLI::App& app, context& shared) {
 }
 
 void add_update(CLI::App& app, context& shared) {
-    add_request(app, shared, cles::verb::update, "update", "Ask a node to publish an update to all that are bound",
+    add_request(app, shared, cles::verb::update, "update", "Ask a node to publish an update to all subscribers",
                 "Examples:\n"
                 "  cles update car1:notice -d '{\"text\":\"bridge closed\"}'\n"
                 "  cles bind car1:notice          # in another terminal: receives it");

@@ -162,13 +162,13 @@ void add_top(CLI::App& app, context& shared) {
         ->add_option_function<std::string>(
             "--sort",
             [args](const std::string& name) { args->order = name == "name" ? top_order::name : top_order::load; },
-            "By load or name (default load)")
+            "The order: load or name (default load)")
         ->type_name("WORD")
         ->check(CLI::IsMember({"load", "name"}).description(""));
     args->addresses.add_options(*command);
     add_output_option(*command, args->format);
-    command->footer("The nodes are asked for their metrics; rates are shown from the second refresh on. With --at it\n"
-                    "watches that node, and those that it knows.\n\n"
+    command->footer("The nodes are asked for their metrics; rates are shown from the second refresh on.\n"
+                    "With --at, only that node and the nodes that it knows are shown.\n\n"
                     "Examples:\n"
                     "  cles top\n"
                     "  cles top --at tcp://10.0.0.7 --sort name\n"

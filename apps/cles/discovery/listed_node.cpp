@@ -68,7 +68,7 @@ void listed_node::read_tasks(std::string_view description) {
         }
     }
     if (!reader.ok() || !found.starts_with('[')) {
-        error = "its answer contains no tasks";
+        error = "its reply contains no tasks";
         return;
     }
     tasks.clear();

@@ -32,7 +32,7 @@ const network_interface* external_interface(const std::vector<network_interface>
 std::string advice_for_other_hosts(const network_interface& interface, const std::string& selection,
                                    const cles::multicast_options& group) {
     return "to reach other hosts: CLES_MULTICAST=" + selection +
-           " (there their own interface), nodes with --listen tcp://" + interface.address +
+           " (on each its own interface), nodes with --listen tcp://" + interface.address +
            " --insecure, and UDP port " + std::to_string(group.port) + " open";
 }
 
@@ -46,7 +46,7 @@ void check_interface(const std::string& name, const cles::multicast_options& gro
     } else if (!interface->up) {
         found.failure("interfaces", used + ", which is down", "ip link set " + name + " up");
     } else if (interface->address.empty()) {
-        found.failure("interfaces", used + ", which has no IPv4 address", "give it one: CLES uses IPv4 for multicast");
+        found.failure("interfaces", used + ", which has no IPv4 address", "assign one: CLES uses IPv4 for multicast");
     } else if (!interface->multicast && !interface->loopback) {
         found.warning("interfaces", name + " does not support multicast according to its flags",
                       "ip link set " + name + " multicast on, or find nodes by seeds and --at");

@@ -49,10 +49,10 @@ void check_node(const listed_node& node, const node_answer& answer, findings& fo
                       "let it listen at an address of its network: --listen tcp://0.0.0.0 --insecure");
     } else if (!answer.error.empty()) {
         found.failure("nodes",
-                      node.node + " announces itself, but does not answer at " + node.url() + ": " + answer.error,
+                      node.node + " announces itself, but does not reply at " + node.url() + ": " + answer.error,
                       "check that it runs, and that no firewall on its host blocks the port");
     } else if (node.state == "suspect") {
-        found.warning("nodes", node.node + " answers, but its announcements are no longer received",
+        found.warning("nodes", node.node + " replies, but its announcements are no longer received",
                       "multicast is lost on the way: IGMP snooping without a querier, or Wi-Fi");
     }
 }
@@ -64,7 +64,7 @@ void check_protocol(const listed_node& node, const std::string& description, fin
             found.warning("nodes", node.node + " uses version " + std::to_string(version) + " of the protocol, not 1");
         }
     } catch (const cles::error&) {
-        found.failure("nodes", "the answer of " + node.node + " is not the description of a node",
+        found.failure("nodes", "the reply of " + node.node + " does not describe a node",
                       "check that " + node.url() + " is a CLES node");
     }
 }

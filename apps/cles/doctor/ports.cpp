@@ -59,8 +59,8 @@ asio::awaitable<listener_or_error> identify(client& requester, cles::call_option
 }
 
 void report_node(const std::string& url, const listener_or_error& node, findings& found) {
-    found.ok("ports", node.node.empty() ? url + ": a node is there, which answers: " + node.error
-                                        : url + ": the node " + node.node + " is there, version " + node.version);
+    found.ok("ports", node.node.empty() ? url + ": a node listens here, and replies: " + node.error
+                                        : url + ": the node " + node.node + " listens here, version " + node.version);
 }
 
 // What a node that wants to listen there would get.
@@ -99,7 +99,7 @@ asio::awaitable<void> check_default_port(client& requester, std::string_view pro
     const auto process = process_listening_at(protocol, cles::default_port);
     found.failure("ports",
                   url + ": " + (process.empty() ? "another program" : process) +
-                      " is there, which is not a node: " + answer.error,
+                      " listens here, which is not a node: " + answer.error,
                   "stop it, or let nodes listen elsewhere: --listen of cles serve, listen in clesd.yaml");
 }
 
@@ -110,7 +110,7 @@ asio::awaitable<void> check_given_address(client& requester, const address_book&
     if (answer.is_node) {
         report_node(url, answer, found);
     } else {
-        found.failure("ports", url + " does not answer: " + answer.error,
+        found.failure("ports", url + " does not reply: " + answer.error,
                       "start a node there (clesd, or cles serve --listen URL), or list the nodes: cles ls");
     }
 }

@@ -27,7 +27,7 @@ cles::multicast_options parse_group(const std::string& text, const std::string& 
 void check_url(const std::string& text) {
     const auto scheme = cles::parse_url(text).scheme;
     if (cles::find_transport(scheme) == nullptr) {
-        throw usage_error("'" + text + "': there is no transport called " + scheme);
+        throw usage_error("'" + text + "': there is no transport " + scheme);
     }
 }
 
@@ -41,7 +41,7 @@ void multicast_option::add_to(CLI::App& command, const std::string& help) {
                 parse_group(text, "--multicast");
                 given_ = text;
             },
-            help + " (default CLES_MULTICAST, or else lo)")
+            help + " (default CLES_MULTICAST, otherwise lo)")
         ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto|off");
 }
 
@@ -71,11 +71,12 @@ std::string joined(const std::vector<std::string>& names, const char* separator)
 }
 
 void address_book::add_options(CLI::App& command, const std::string& multicast_help) {
-    auto* at = command.add_option("-a,--at", at_,
-                                  "Where the node is (default CLES_AT; else it is found by its name, and self is " +
-                                      std::string{default_url} + ")");
+    auto* at =
+        command.add_option("-a,--at", at_,
+                           "The URL of the node (default CLES_AT; otherwise it is found by its name, and self is " +
+                               std::string{default_url} + ")");
     at->type_name("URL");
-    auto* peer = command.add_option("-p,--peer", peers_, "The URL of the node of that name; may be repeated");
+    auto* peer = command.add_option("-p,--peer", peers_, "The URL of the node with this name; may be repeated");
     peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     multicast_.add_to(command, multicast_help);
 }

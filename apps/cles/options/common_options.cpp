@@ -21,7 +21,7 @@ void add_timeout(CLI::App& command, std::optional<std::chrono::milliseconds>& li
     command
         .add_option_function<std::string>(
             "-t,--timeout", [&limit](const std::string& text) { limit = parse_positive_duration(text); },
-            "How long to wait for an answer: 500ms, 2s, or seconds (default " + default_value + ")")
+            "How long to wait for a reply: 500ms, 2s, or seconds (default " + default_value + ")")
         ->type_name("TIME");
 }
 

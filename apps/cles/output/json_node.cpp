@@ -119,7 +119,7 @@ json_node parse_json(std::string_view json) {
     cles::json_reader reader{json};
     json_node node;
     if (!read(reader, node) || !reader.at_end()) {
-        throw cles::error(cles::errc::conversion, "the answer is not valid JSON: " + reader.error());
+        throw cles::error(cles::errc::conversion, "the reply is not valid JSON: " + reader.error());
     }
     return node;
 }

@@ -21,7 +21,7 @@ void add_output_option(CLI::App& command, output_format& format) {
     command
         .add_option_function<std::string>(
             "-o,--output", [&format, names](const std::string& name) { format = names.at(name); },
-            "table, json (one document per line) or raw (as it came); default: table on a terminal, else json")
+            "table, json (one document per line) or raw (as received); default: table on a terminal, otherwise json")
         ->type_name("FORMAT")
         ->check(CLI::IsMember({"table", "json", "raw"}).description(""));
 }

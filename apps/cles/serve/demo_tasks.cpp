@@ -106,7 +106,7 @@ void register_demo_tasks(cles::registrar& tasks) {
     tasks.on_delegate("fail",
                       [](const cles::request&) { throw cles::error(cles::errc::failed, "this task always fails"); },
                       {.description = "Always fails", .idempotent = true});
-    tasks.on_update("notice", [](const cles::request&) {}, {.description = "Publishes a notice to all that are bound"});
+    tasks.on_update("notice", [](const cles::request&) {}, {.description = "Publishes a notice to all subscribers"});
 }
 
 } // namespace tool

@@ -80,7 +80,7 @@ int serve(const serve_arguments& args, int verbosity) {
     if (!args.allow_clash) {
         options.on_name_taken = [&](std::string_view where) {
             log(cles::log_level::error, "stopping: the node at " + std::string{where} + " had the name '" + args.name +
-                                            "' first; --name gives another, --allow-clash goes on");
+                                            "' first; choose another name (--name), or allow it (--allow-clash)");
             code = exit_code::local_failure;
             signals.cancel();
             running->stop();
@@ -108,16 +108,15 @@ int serve(const serve_arguments& args, int verbosity) {
 
 void add_serve(CLI::App& app, context& shared) {
     auto args = std::make_shared<serve_arguments>();
-    auto* command = app.add_subcommand("serve", "Run a node to experiment with");
+    auto* command = app.add_subcommand("serve", "Run a node for experiments");
     command->add_option("--name", args->name, "The name of the node (default car1)")->type_name("NAME");
     command
-        ->add_option("--pool", args->pool,
-                     "The pool it belongs to; it does not see nodes of other pools (default CLES_POOL)")
+        ->add_option("--pool", args->pool, "The pool of the node; nodes of other pools are ignored (default CLES_POOL)")
         ->type_name("NAME");
-    command->add_flag("--allow-clash", args->allow_clash, "Keep running if another live node already has its name");
+    command->add_flag("--allow-clash", args->allow_clash, "Continue if another live node had the name first");
     command
         ->add_option("-l,--listen", args->listen,
-                     "Where it listens; port 0: any free port; may be repeated (default " + std::string{default_url} +
+                     "A URL to listen at; port 0: a free port; may be repeated (default " + std::string{default_url} +
                          ")")
         ->type_name("URL")
         ->expected(1)
@@ -127,7 +126,7 @@ void add_serve(CLI::App& app, context& shared) {
         ->check(CLI::Range(0.0, 1e6).description(""));
     command
         ->add_option("--busy-poll", args->busy_poll_us,
-                     "Microseconds to poll for work before sleeping: faster answers, more processor time (default 0)")
+                     "Microseconds to poll for work before sleeping: faster replies, more processor time (default 0)")
         ->type_name("US")
         ->check(CLI::Range(0, 1'000'000).description(""));
     command
@@ -145,14 +144,13 @@ void add_serve(CLI::App& app, context& shared) {
                       "Allow listening and multicast beyond this host, where anyone may send any request");
     command
         ->add_option("--network", args->networks,
-                     "Hosts to which UDP answers are not limited, as in 10.0.0.0/8; may be repeated")
+                     "Hosts to which UDP replies are not rate-limited, as in 10.0.0.0/8; may be repeated")
         ->type_name("NETWORK")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-    args->multicast.add_to(
-        *command, "Interfaces on which it is found by its name, and publishes to those that bind by multicast");
+    args->multicast.add_to(*command, "Interfaces on which it is found by its name, and publishes updates by multicast");
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
-                    "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop it.\n\n"
+                    "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop the node.\n\n"
                     "Examples:\n"
                     "  cles serve\n"
                     "  cles serve --name car2 --listen tcp://127.0.0.1:0 --listen unix:///tmp/car2.sock --rate 50\n"

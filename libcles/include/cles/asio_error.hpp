@@ -5,9 +5,10 @@
 
 #include <boost/asio/error.hpp>
 
-/// `code == boost::asio::error::operation_aborted`, as programs on Asio ask, holds for `cles::errc::cancelled` too; so
-/// do `timed_out` and the others that have the same error condition. Codes are otherwise equal only within one
-/// category; these comparisons see to codes of `cles::error_category()`, and leave all others to Boost.System.
+/// Comparisons of error codes with the values of Asio. `code == boost::asio::error::operation_aborted` also holds for
+/// `cles::errc::cancelled`, and likewise for `timed_out` and the others that have the same error condition. Otherwise,
+/// codes are equal only within one category. Codes of other categories than `cles::error_category()` compare as in
+/// Boost.System.
 
 namespace boost::asio::error {
 

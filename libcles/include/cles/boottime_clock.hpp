@@ -6,12 +6,12 @@
 
 namespace cles {
 
-/// The time since the machine was started. Like `std::chrono::steady_clock`, no clock of the day moves it; unlike that
-/// one, it goes on while the machine is suspended. So a deadline that passes while a laptop's lid is closed has passed
-/// when it is opened.
+/// The time since the machine was booted (`CLOCK_BOOTTIME`). Like `std::chrono::steady_clock`, it does not change when
+/// the system time is set; unlike that clock, it continues while the machine is suspended. A deadline that passes while
+/// a laptop's lid is closed has passed when it is opened.
 ///
-/// Its points in time are a type of their own: they cannot be mixed up with those of `std::chrono::steady_clock`, which
-/// differ from them once the machine has been suspended.
+/// Its points in time have their own type. They do not convert to those of `std::chrono::steady_clock`, from which they
+/// differ once the machine has been suspended.
 struct boottime_clock {
     using duration = std::chrono::nanoseconds;
     using rep = duration::rep;

@@ -10,36 +10,38 @@
 
 namespace cles {
 
-/// What a caller may say of one request. Set by chaining: `cles::call_options{}.deadline(200ms).at("tcp://10.0.0.2")`.
-/// Where a value is not what it may be, the operation fails with `invalid_option`, and its message names the option.
+/// Options of one request. Set by chaining: `cles::call_options{}.deadline(200ms).at("tcp://10.0.0.2")`. If a value is
+/// out of range, the operation fails with `invalid_option`, and the message names the option.
 class call_options {
   public:
     call_options() = default;
 
-    /// How long to wait for the answer; the peer is told. 0: the protocol's default (5 s, DELEGATE 30 s). More than a
-    /// day counts as a day; less than 0 is refused.
+    /// How long to wait for the reply; also sent to the peer. 0: the protocol's default (5 s, DELEGATE 30 s). More than
+    /// a day counts as a day; negative values are refused.
     call_options& deadline(std::chrono::milliseconds limit) {
         deadline_ = limit;
         return *this;
     }
-    /// Where to send it, instead of asking the directory for the target's name.
+    /// The URL to send it to, instead of looking up the target's name.
     call_options& at(std::string_view url) {
         at_ = url;
         return *this;
     }
-    /// A small request that must not wait behind large ones: it travels on a link of its own, and its answer goes
-    /// before others that wait at the peer. A peer that does not know the adverb `urgent` answers it in its turn.
+    /// Marks a small request that must not wait behind large ones: it uses a separate link, and its reply is sent
+    /// before others that wait at the peer. A peer that does not know the adverb `urgent` sends the reply in the normal
+    /// order.
     call_options& urgent(bool value = true) {
         urgent_ = value;
         return *this;
     }
-    /// Where the peer's own words go if the request fails; written before the request completes, which it must outlive.
+    /// Receives the peer's error message if the request fails. It is written before the request completes, and must
+    /// outlive the request.
     call_options& diagnostics(std::string& text) {
         diagnostics_ = &text;
         return *this;
     }
-    /// Called for each report of a DELEGATE's progress with a fraction from 0 to 1 and a JSON object. It runs in line,
-    /// on the service's executor; asks the peer for reports.
+    /// Called for each progress report of a DELEGATE, with a fraction from 0 to 1 and a JSON object. Runs inline on the
+    /// service's executor. Makes the request ask the peer for reports.
     call_options& on_progress(std::function<void(double, std::string_view)> callback) {
         on_progress_ = std::move(callback);
         return *this;
@@ -52,26 +54,27 @@ class call_options {
     std::function<void(double, std::string_view)> on_progress_{};
 };
 
-/// What a binder may say of one binding.
+/// Options of one binding.
 class bind_options : public call_options {
   public:
     bind_options() = default;
 
-    /// At most one update in so long, always the newest. 0: every one. More than a day counts as a day; less than 0 is
-    /// refused.
+    /// The minimum interval between updates; the newest is sent. 0: every update. More than a day counts as a day;
+    /// negative values are refused.
     bind_options& every(std::chrono::milliseconds interval) {
         every_ = interval;
         return *this;
     }
-    /// How many updates the publisher queues while this binder is slow: 1 to 65536; 0: the protocol's default, 64. More
-    /// is refused.
+    /// How many updates the publisher queues while this binder is slow: 1 to 65536; 0: the protocol's default, 64.
+    /// Larger values are refused.
     bind_options& keep(std::uint32_t updates) {
         keep_ = updates;
         return *this;
     }
-    /// Binds by the multicast group instead of a link, so that one datagram of the publisher serves all who do; `all:`
-    /// goes that way by itself. Then `every` and `keep` have no effect, and nothing is answered: the feed begins with
-    /// the publisher's last value as an update, and does not tell where there is no publisher.
+    /// Binds through the multicast group instead of a link, so that the publisher sends one datagram for all such
+    /// binders; `all:` does so by default if the service has no routing. `every` and `keep` then have no effect, and
+    /// there is no reply: the feed begins with the publisher's last value as an update, and does not report if there is
+    /// no publisher.
     bind_options& multicast(bool wanted = true) {
         multicast_ = wanted;
         return *this;

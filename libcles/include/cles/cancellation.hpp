@@ -6,12 +6,12 @@
 
 #include <utility>
 
-/// How every operation is withdrawn by its handler's cancellation slot. Not for applications.
+/// Cancellation of operations by their handler's cancellation slot. Not for applications.
 
 namespace cles::detail {
 
-/// Has `withdraw` called when the slot is emitted, whatever the type of cancellation: an operation of the library that
-/// is withdrawn leaves nothing half done. Its handler is not called from inside the emission.
+/// Connects `withdraw` to the slot. It is called for every type of cancellation, because cancelled operations of the
+/// library have no partial side effects. The operation's handler is not called from inside the emission.
 template <class Slot, class F>
 void connect_slot(Slot slot, F withdraw) {
     if (slot.is_connected()) {
@@ -23,8 +23,8 @@ void connect_slot(Slot slot, F withdraw) {
     }
 }
 
-/// To be called when the operation has ended, before its handler is called: later emissions concern neither it nor the
-/// operations that its handler starts.
+/// Disconnects the slot. Call it when the operation has ended, before its handler is called, so that later emissions
+/// affect neither the operation nor those that the handler starts.
 template <class Handler>
 void release_slot(const Handler& handler) {
     auto slot = boost::asio::get_associated_cancellation_slot(handler);

@@ -20,14 +20,14 @@
 #include <type_traits>
 #include <utility>
 
-/// How an operation's handler is kept and called. Not for applications.
+/// Storage and invocation of completion handlers. Not for applications.
 ///
-/// Every program instantiates these templates once for each operation and type of handler. So they contain only what
-/// depends on those types; what does not is compiled in the library.
+/// Every program instantiates these templates for each operation and handler type. So they contain only code that
+/// depends on those types; the rest is compiled in the library.
 
 namespace cles::detail {
 
-/// A call of a handler that waits for the handler's own executor. `call` and `discard` consume it.
+/// A handler call that is queued on the handler's own executor. `call` and `discard` destroy it.
 class remote_call {
   public:
     remote_call() = default;
@@ -45,28 +45,28 @@ using remote_call_ptr = std::unique_ptr<remote_call, discarding>;
 void dispatch_call(const boost::asio::any_io_executor& executor, remote_call_ptr call);
 void post_call(const boost::asio::any_io_executor& executor, remote_call_ptr call);
 
-/// The exception that carries a failure; null for success.
+/// The failure as an exception (`cles::error`); null on success.
 std::exception_ptr failure_of(boost::system::error_code code, std::string_view message);
 
-/// The executor that a handler is called on, where that is not the service's.
+/// The handler's executor, if it is not the service's.
 class handler_executor {
   public:
     handler_executor(const boost::asio::any_io_executor& own, const boost::asio::any_io_executor& service);
 
-    /// Whether it is none but the service's, which completions run on already.
+    /// Whether it is the service's executor, on which completions run anyway.
     [[nodiscard]] bool is_service() const noexcept { return !work_; }
-    /// Whether an operation of this handler begins and is withdrawn on another executor than the service's. The
-    /// system's, which futures name too, is not one on which anything begins.
+    /// Whether operations with this handler start, and are cancelled, on another executor than the service's. False for
+    /// the system executor (also that of futures), because no operation starts on it.
     [[nodiscard]] bool elsewhere() const noexcept { return elsewhere_; }
     void dispatch(remote_call_ptr call) &&;
 
   private:
-    // The handler's own context must not run out of work meanwhile.
+    // Keeps the handler's execution context running until the handler is called.
     std::optional<boost::asio::executor_work_guard<boost::asio::any_io_executor>> work_;
     bool elsewhere_ = false;
 };
 
-/// Makes an operation that lives in memory of its handler's allocator.
+/// Allocates an operation with the handler's associated allocator.
 template <class Operation, class Handler, class... A>
 Operation* make_operation(Handler handler, A&&... arguments) {
     using allocator_type =
@@ -76,7 +76,7 @@ Operation* make_operation(Handler handler, A&&... arguments) {
     return ::new (static_cast<void*>(memory)) Operation(std::move(handler), std::forward<A>(arguments)...);
 }
 
-/// Destroys an operation and frees its memory, which came from the allocator of this handler.
+/// Destroys an operation and frees its memory with the handler's associated allocator.
 template <class Operation, class Handler>
 void free_operation(Operation* self, const Handler& handler) noexcept {
     typename std::allocator_traits<boost::asio::associated_allocator_t<Handler>>::template rebind_alloc<Operation>
@@ -85,7 +85,7 @@ void free_operation(Operation* self, const Handler& handler) noexcept {
     std::allocator_traits<decltype(allocator)>::deallocate(allocator, self, 1);
 }
 
-/// The slot is emitted on the handler's executor too, and so is released there.
+/// Releases the slot on the handler's executor, because it is emitted there too.
 template <class Handler, class... A>
 class handler_call final : public remote_call {
   public:
@@ -116,7 +116,7 @@ remote_call_ptr make_call(Handler handler, A&&... arguments) {
         make_operation<handler_call<Handler, std::decay_t<A>...>>(std::move(handler), std::forward<A>(arguments)...)};
 }
 
-/// Completes a handler on its executor: in line where that is the service's own.
+/// Calls a handler on its executor; inline if that is the service's executor.
 template <bool Throws, class Handler>
 class completion {
   public:
@@ -150,7 +150,8 @@ class completion {
     handler_executor executor_;
 };
 
-/// Ends an operation: its memory goes before its handler is called, so that the handler's next operation finds it free.
+/// Completes an operation. Its memory is freed before its handler is called, so that the handler's next operation can
+/// reuse it.
 template <class Operation, class Completion, class... A>
 void end_operation(Operation* self, Completion& kept, boost::system::error_code code, std::string_view message,
                    A&&... values) {
@@ -166,8 +167,8 @@ void discard_operation(Operation* self, Completion& kept) noexcept {
     free_operation(self, complete.handler());
 }
 
-/// Fails an operation that cannot begin, never inside the call. Without an executor of its own the handler runs on
-/// `executor`; where that is none, on Asio's system executor.
+/// Fails an operation that cannot start; the handler is never called inside this call. A handler without an associated
+/// executor runs on `executor`, or on Asio's system executor if `executor` is empty.
 template <bool Throws, class Handler, class... T>
 void fail_later(Handler handler, const boost::asio::any_io_executor& executor, boost::system::error_code code,
                 std::string_view message, T&&... values) {

@@ -15,7 +15,7 @@
 #include <type_traits>
 #include <utility>
 
-/// What a completion token makes of a failure, however it is spelled. Not for applications.
+/// How completion tokens report failures. Not for applications.
 
 namespace boost::asio {
 template <typename Allocator>
@@ -41,12 +41,12 @@ namespace cles::detail {
 
 enum class outcome : std::uint8_t {
     code,      ///< the handler takes an error code
-    exception, ///< it takes an exception, which then carries the peer's own words
-    later,     ///< not known yet: the operation is begun later, with another token
+    exception, ///< the handler takes an exception with the peer's message
+    later,     ///< not known yet: the operation starts later, with another token
 };
 
-/// Tokens that hand on what the token inside them gets are as that one is. All others, as `as_tuple`, `redirect_error`
-/// and functions, take the code.
+/// Token adapters that pass results on unchanged have the outcome of their inner token. All others, such as `as_tuple`,
+/// `redirect_error` and functions, have `code`.
 template <class Token>
 inline constexpr outcome outcome_of = outcome::code;
 template <class E>
@@ -71,7 +71,8 @@ inline constexpr outcome outcome_of<boost::asio::consign_t<T, V...>> = outcome_o
 template <class Token>
 inline constexpr bool throws = outcome_of<Token> == outcome::exception;
 
-/// Stands where a signature has `void`, so that `deferred` gives an operation of ours.
+/// The return type of the completion signature for `deferred`. It selects the specialisation of `async_result` below,
+/// which returns a `deferred_operation`.
 struct put_off;
 
 template <outcome Outcome, class... T>
@@ -89,7 +90,7 @@ struct signature<outcome::later, T...> {
 template <class Token, class... T>
 using signature_for = typename signature<outcome_of<std::remove_cvref_t<Token>>, T...>::type;
 
-/// Whether a call with this token is awaited where it stands.
+/// Whether the result of a call with this token can be awaited directly.
 template <class Token>
 inline constexpr bool is_awaited = false;
 template <class E>
@@ -99,7 +100,8 @@ inline constexpr bool is_awaited<boost::asio::deferred_t> = true;
 template <template <class, class...> class Wrapper, class Token, class... More>
 inline constexpr bool is_awaited<Wrapper<Token, More...>> = is_awaited<Token>;
 
-/// Whether the arguments behind a body make a call that is awaited: the token that ends them, or that by default.
+/// Whether the arguments after a body make a call that is awaited: by the last one as its token, or by the default
+/// token.
 template <class... Rest>
 struct awaited_call : std::true_type {};
 template <class Last>
@@ -108,13 +110,13 @@ struct awaited_call<Last> : std::bool_constant<is_awaited<std::remove_cvref_t<La
 template <class First, class Second>
 struct awaited_call<First, Second> : awaited_call<Second> {};
 
-/// A temporary which g++ 12 destroys twice in an expression with `co_await`.
+/// A temporary that g++ 12 destroys twice in an expression with `co_await`.
 template <class T>
 concept fragile_temporary = !std::is_reference_v<T> && std::is_aggregate_v<T> && !std::is_trivially_destructible_v<T>;
 
-// -- operations that are begun later --------------------------------------------------------------------------------
+// -- operations that are started later --------------------------------------------------------------------------------
 
-/// A handler that takes an exception, where the operation was made for one that takes a code.
+/// Wraps a handler that takes an exception for an operation that was created for an error code.
 template <class Handler>
 struct throwing_handler {
     Handler handler;
@@ -145,7 +147,8 @@ struct throwing_initiation {
 template <class... T>
 struct results {};
 
-/// What a call with `asio::deferred` gives: begun with another token, it does as if it had been called with that one.
+/// The result of a call with `asio::deferred`. Started with another token, it behaves as if the call had been made with
+/// that token.
 template <class Results, class Initiation, class... A>
 class deferred_operation;
 
@@ -208,7 +211,7 @@ namespace boost::asio {
 template <typename... T>
 class async_result<deferred_t, cles::detail::put_off(boost::system::error_code, T...)> {
   public:
-    using return_type = void; // of no call, but the binders of Asio ask for it
+    using return_type = void; // not the type that is returned, but Asio's binders require it
 
     template <typename Initiation, typename Token, typename... A>
     static auto initiate(Initiation&& initiation, Token&&, A&&... arguments) {
@@ -232,8 +235,8 @@ struct associator<Associator, cles::detail::throwing_handler<Handler>, Default> 
     }
 };
 
-// `co_await operation` of an operation that was put off would throw the bare code: Asio has no other way in than this
-// template, which stands so from 1.81 on. Where it is another one day, the code is thrown without the peer's words.
+// `co_await` of a deferred operation would throw the bare error code. The only way to change that is this template of
+// Asio's, which is unchanged since 1.81. If a later version changes it, the code is thrown without the peer's message.
 #if BOOST_VERSION < 108900
 namespace detail {
 template <typename Signature, typename... T, typename Initiation, typename... A, typename Executor>

@@ -19,25 +19,24 @@
 
 /// Conversion between C++ types and JSON text, without a document tree in between.
 ///
-/// Understood are
+/// Supported types:
 ///
 /// - `bool`, integers, floating-point numbers, strings, and enums described with `BOOST_DESCRIBE_ENUM`, by name;
 /// - `std::vector`, `std::array`, `std::tuple` and `std::pair` as arrays;
-/// - structs described with `BOOST_DESCRIBE_STRUCT` (their described bases too), and `std::map` and
-/// `std::unordered_map`
-///   from `std::string`, as objects;
+/// - structs described with `BOOST_DESCRIBE_STRUCT` (including described bases), and `std::map` and
+///   `std::unordered_map` with keys of type `std::string`, as objects;
 /// - `std::optional` as its value or null, `std::variant` as the value that it holds (`<cles/convert_variant.hpp>`);
 /// - `std::chrono` durations and points in time of the system clock as ISO 8601 (`<cles/convert_chrono.hpp>`);
-/// - `json_text`, JSON as it is, and `boost::json::value` with `<cles/json_value.hpp>`.
+/// - `json_text`, JSON that is passed through, and `boost::json::value` with `<cles/json_value.hpp>`.
 ///
-/// A type of your own joins them by a specialisation of `cles::converter`.
+/// Specialise `cles::converter` for other types.
 ///
-/// Reading is tolerant where a newer or older writer may differ: unknown members are passed over, and a member may be
-/// missing where it is a `std::optional` (or null then), or `CLES_DEFAULTS` names it (`<cles/convert_described.hpp>`).
-/// Any other member that is missing, or of another kind, is an error that names the path to it, as in "route[2].lat:
-/// expected a number, got a string".
+/// Reading tolerates differences between versions: unknown members are skipped, and a member may be missing if it is a
+/// `std::optional` (which is then empty), or if `CLES_DEFAULTS` names it (`<cles/convert_described.hpp>`). Any other
+/// member that is missing or has the wrong type is an error that names the path to it, as in "route[2].lat: expected a
+/// number, got a string".
 ///
-/// Text to be written has to be UTF-8. Where it is not, nothing is sent: `to_json` throws.
+/// Text to be written must be UTF-8. Otherwise `to_json` throws, and nothing is sent.
 
 namespace cles {
 namespace detail {
@@ -53,18 +52,20 @@ concept described_enum = std::is_enum_v<T> && boost::describe::has_describe_enum
 
 } // namespace detail
 
-/// JSON text as a value of its own. Reading copies it; writing checks it and drops its white space.
+/// JSON text as a value. Reading copies it; writing validates it and removes its white space.
 struct json_text {
     json_text() = default;
-    json_text(std::string json) : text(std::move(json)) {} // NOLINT(google-explicit-constructor): text is what it is
+    json_text(std::string json) : text(std::move(json)) {} // NOLINT(google-explicit-constructor): it is text
     json_text(const char* json) : text(json) {}            // NOLINT(google-explicit-constructor)
 
     std::string text = "{}";
 };
 
-/// How T is written and read. Specialise with
-/// `static void write(json_writer&, const T&)` and `static bool read(json_reader&, T&)`. Where what is written is no
-/// object and no array, say so by `static constexpr bool is_scalar = true;`, since scalars travel as {"value":x}.
+/// How T is written and read. A specialisation has
+/// - `static void write(json_writer&, const T&)`,
+/// - `static bool read(json_reader&, T&)`, and
+/// - `static constexpr bool is_scalar = true;` if T is written as neither an object nor an array, because scalars are
+///   sent as {"value":x}.
 template <class T>
 struct converter;
 
@@ -91,7 +92,7 @@ void write_json(json_writer& w, const T& value) {
     }
 }
 
-/// False on failure; the reader then says what and where.
+/// Returns false on failure; `json_reader::error` then says what is wrong and where.
 template <class T>
 bool read_json(json_reader& r, T& value) {
     static_assert(detail::readable<T>, "this type cannot be read from JSON: describe a struct with "
@@ -108,7 +109,7 @@ namespace detail {
 
 [[noreturn]] void throw_broken_text(const json_writer& w);
 
-/// \throws cles::error with `conversion` where text that is not UTF-8 was written
+/// \throws cles::error with `conversion` if text that is not UTF-8 was written
 inline void require_utf8(const json_writer& w) {
     if (w.broken_text() != json_writer::npos) {
         throw_broken_text(w);
@@ -117,7 +118,7 @@ inline void require_utf8(const json_writer& w) {
 
 } // namespace detail
 
-/// \throws cles::error with `conversion` where text is not UTF-8, or a value has no JSON form
+/// \throws cles::error with `conversion` if text is not UTF-8, or a value has no JSON form
 template <class T>
 std::string to_json(const T& value) {
     std::string out;
@@ -131,7 +132,7 @@ std::string to_json(const T& value) {
     return out;
 }
 
-/// Reads all of `text` as a T. On failure `why` (if given) says what was expected, where.
+/// Reads all of `text` as a T. Returns false on failure; `why` (if given) then says what was expected and where.
 template <class T>
 bool from_json(std::string_view text, T& value, std::string* why = nullptr) {
     json_reader reader{text};
@@ -157,7 +158,7 @@ T from_json(std::string_view text) {
 
 namespace detail {
 
-/// \throws cles::error with `conversion` where the text is not JSON
+/// \throws cles::error with `conversion` if the text is not JSON
 void write_text(json_writer& w, std::string_view json);
 
 } // namespace detail
@@ -190,7 +191,7 @@ template <std::floating_point T>
 struct converter<T> {
     static void write(json_writer& w, T value) { w.value(static_cast<double>(value)); }
     static bool read(json_reader& r, T& value) {
-        if (r.peek() == json_reader::kind::null) { // the written form of a number that is not finite
+        if (r.peek() == json_reader::kind::null) { // how numbers that are not finite are written
             value = std::numeric_limits<T>::quiet_NaN();
             return r.read_null();
         }

@@ -9,23 +9,23 @@
 #include <type_traits>
 #include <utility>
 
-/// Conversion of durations and of points in time of the system clock; comes with `<cles/service.hpp>`
-/// and `<cles/registrar.hpp>`.
+/// Conversion of durations and of points in time of the system clock; included by `<cles/service.hpp>` and
+/// `<cles/registrar.hpp>`.
 ///
-/// Written is ISO 8601: a duration as "PT90.5S", a point in time in UTC as "2026-11-23T07:43:14.25Z", both to the
-/// nanosecond. Read are those, durations in weeks, days, hours and minutes too ("P1DT12H"), other time zones
-/// ("2026-11-23T08:43:14.25+01:00"), and numbers: seconds, for a point in time since 1970. What is finer than the type
-/// is rounded down. Durations in floating point keep every digit. Points in time of other clocks mean nothing to
-/// another node, and do not convert.
+/// Writes ISO 8601 with up to nanoseconds: a duration as "PT90.5S", a point in time in UTC as
+/// "2026-11-23T07:43:14.25Z". Reads the same, durations with weeks, days, hours and minutes ("P1DT12H"), other time
+/// zones ("2026-11-23T08:43:14.25+01:00"), and numbers of seconds (for a point in time, since 1970). Values are rounded
+/// down to the resolution of the type. Floating-point durations keep every digit. Points in time of other clocks do not
+/// convert, because they mean nothing to another node.
 
 namespace cles {
 
 namespace detail {
 
-/// A time in parts that hold any that the protocol's peers may write.
+/// A time with the range and resolution of the protocol.
 struct whole_time {
     std::int64_t seconds = 0;
-    std::int64_t nanoseconds = 0; ///< 0 to 999'999'999, so that a negative time is rounded down
+    std::int64_t nanoseconds = 0; ///< 0 to 999'999'999, also for negative times
 };
 
 void write_duration(json_writer& w, whole_time value);
@@ -35,10 +35,10 @@ bool read_duration(json_reader& r, double& seconds);
 void write_time_point(json_writer& w, whole_time since_1970);
 bool read_time_point(json_reader& r, whole_time& since_1970);
 
-/// How many units of num/den seconds a time has, rounded down. False where there are more than can be counted.
+/// Converts a time to units of num/den seconds, rounded down. False if `count` would overflow.
 bool count_units(whole_time value, std::int64_t num, std::int64_t den, std::int64_t& count) noexcept;
 [[noreturn]] void throw_time_out_of_range();
-/// A number of units of num/den seconds. Throws where that is more seconds than can be counted.
+/// Converts from units of num/den seconds. Throws if the number of seconds overflows.
 whole_time whole_of(std::int64_t count, std::int64_t num, std::int64_t den);
 whole_time whole_of(double seconds);
 double seconds_of(whole_time value) noexcept;

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-/// Conversion of the standard containers; comes with `<cles/convert.hpp>`.
+/// Conversion of the standard containers; included by `<cles/convert.hpp>`.
 
 namespace cles {
 
@@ -63,7 +63,7 @@ bool read_members(json_reader& r, Map& values) {
 
 bool fail_count(json_reader& r, std::string_view which, std::size_t wanted);
 
-/// A tuple's elements, each of a type of its own: an array of that length.
+/// A tuple or pair as an array of that length.
 template <class Tuple>
 struct fixed_elements {
     static void write(json_writer& w, const Tuple& values) {
@@ -165,7 +165,7 @@ struct converter<std::map<std::string, T, C, A>> {
     static bool read(json_reader& r, map& values) { return detail::read_members(r, values); }
 };
 
-/// In no particular order.
+/// Members are written in unspecified order.
 template <class T, class H, class E, class A>
 struct converter<std::unordered_map<std::string, T, H, E, A>> {
     using map = std::unordered_map<std::string, T, H, E, A>;

@@ -16,11 +16,11 @@
 #include <type_traits>
 #include <utility>
 
-/// Conversion of structs and enums that are described with Boost.Describe; comes with `<cles/convert.hpp>`.
+/// Conversion of structs and enums that are described with Boost.Describe; included by `<cles/convert.hpp>`.
 
-/// Names members that may be missing from what is read: they keep what their initialisers give. So a message can grow
-/// without refusing those of older senders. It stands behind the description of the struct, in the struct's namespace
-/// (or in the struct, behind `friend`):
+/// Names members that may be missing in the JSON that is read: they keep their default member initialisers. So messages
+/// can get new members, and those of older senders are still accepted. Write it after the description of the struct, in
+/// the struct's namespace (or inside the struct, after `friend`):
 ///
 ///     struct position {
 ///         double lat = 0;
@@ -38,8 +38,9 @@ namespace detail {
 
 // --- The fields of a described struct ---
 //
-// `boost::describe::describe_members<T, mod_public | mod_inherited>` gives them too. It needs all of Boost.Mp11, which
-// every user of this header would compile, so that they are gathered here from the functions which the macros define.
+// `boost::describe::describe_members<T, mod_public | mod_inherited>` returns them too. But it needs all of Boost.Mp11,
+// which every user of this header would have to compile. So they are collected here from the functions that the macros
+// define.
 
 template <class... D>
 struct descriptors {};
@@ -60,14 +61,14 @@ template <template <class...> class List, class... D>
 constexpr bool any_is_named(List<D...>, [[maybe_unused]] std::string_view name) noexcept {
     return ((name == D::name) || ...);
 }
-/// Whether a class describes a member of this name, which hides those of its bases.
+/// Whether a class describes a member of this name, which then hides those of its bases.
 template <class T>
 constexpr bool has_member_named(std::string_view name) noexcept {
     return any_is_named(public_members_of<T>{}, name) || any_is_named(protected_members_of<T>{}, name) ||
            any_is_named(private_members_of<T>{}, name);
 }
 
-// Found: what has been found already. Hiding: the classes below, whose members hide those above them.
+// Found: the fields so far. Hiding: the derived classes, whose members hide those of their bases.
 template <class Found, class Members, class... Hiding>
 struct add_fields {
     using type = Found;
@@ -93,7 +94,8 @@ struct add_bases<Found, List<Base, More...>, Hiding...>
                                       add_class<Found, typename Base::type, Hiding...>, add_bases<Found, void>>::type,
           List<More...>, Hiding...> {};
 
-/// Descriptors of the public data members of a struct and of its public described bases, in their order.
+/// Descriptors of the public data members of a struct and of its public described bases, in declaration order, bases
+/// first.
 template <class T>
 using fields_of = typename add_class<descriptors<>, T>::type;
 
@@ -120,7 +122,7 @@ concept has_defaults = requires {
     cles_members_with_defaults(static_cast<const C*>(nullptr));
 };
 
-/// Takes the next name off a list as "(lat, lon)".
+/// Removes the next name from a list such as "(lat, lon)" and returns it; empty at the end.
 constexpr std::string_view next_name(std::string_view& list) noexcept {
     constexpr std::string_view between = "(), ";
     while (!list.empty() && between.find(list.front()) != std::string_view::npos) {
@@ -131,7 +133,7 @@ constexpr std::string_view next_name(std::string_view& list) noexcept {
     return name;
 }
 
-/// Whether the class that declares a member, or one that inherits it, gives it a default.
+/// Whether `CLES_DEFAULTS` of this class, or of a base if it has none, names the member.
 template <class C>
 constexpr bool has_default(std::string_view member) noexcept {
     if constexpr (has_defaults<C>) {
@@ -223,7 +225,7 @@ struct enumerator_table {
 template <class E>
 inline constexpr enumerator_table<E> enumerators{boost::describe::describe_enumerators<E>{}};
 
-/// The place of the name that comes; fails where it is none of these.
+/// Reads a string and sets `index` to its position in `names`. Fails if it is not among them.
 bool read_choice(json_reader& r, std::span<const std::string_view> names, std::size_t& index);
 
 } // namespace detail

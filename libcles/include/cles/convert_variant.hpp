@@ -8,10 +8,10 @@
 #include <utility>
 #include <variant>
 
-/// Conversion of `std::variant`; comes with `<cles/convert.hpp>`.
+/// Conversion of `std::variant`; included by `<cles/convert.hpp>`.
 ///
-/// A variant is written as the value that it holds, with nothing around it, and read as the first of its alternatives
-/// that fits: put the one that asks for more before the one that asks for less. `std::monostate` is null.
+/// A variant is written as the value that it holds, and read as the first alternative that fits. So order alternatives
+/// from the most to the least specific. `std::monostate` is null.
 
 namespace cles {
 
@@ -45,7 +45,7 @@ struct converter<std::variant<T...>> {
     }
     template <std::size_t I>
     static bool try_one(std::string_view raw, variant& value, std::string& why) {
-        json_reader part{raw, std::string_view::npos}; // it has been checked
+        json_reader part{raw, std::string_view::npos}; // its depth has been checked
         if (read_json(part, value.template emplace<I>())) {
             return true;
         }

@@ -9,7 +9,7 @@
 #include <type_traits>
 #include <variant>
 
-/// Scalars travel as {"value":x}, and come unwrapped. Not for applications.
+/// Scalars are sent as {"value":x}, and unwrapped when read. Not for applications.
 
 namespace cles::detail {
 
@@ -18,7 +18,7 @@ struct wrapped {
     T value;
 };
 
-/// What is always written as a scalar.
+/// Types that are always written as a scalar.
 template <class T>
 inline constexpr bool is_scalar =
     std::is_arithmetic_v<T> || std::is_same_v<T, std::string> || described_enum<T> || requires {
@@ -29,7 +29,7 @@ inline constexpr bool is_scalar<std::optional<T>> = is_scalar<T>;
 template <class... T>
 inline constexpr bool is_scalar<std::variant<T...>> = (is_scalar<T> && ...);
 
-/// What may be written as one.
+/// Types that may be written as a scalar.
 template <class T>
 inline constexpr bool comes_wrapped = is_scalar<T>;
 template <class T>
@@ -70,7 +70,7 @@ struct converter<detail::wrapped<T>> {
             }
         }
         if constexpr (detail::is_optional<T>) {
-            found = true; // or else it was missing
+            found = true; // a missing value is an empty optional
         }
         if (r.ok() && !found) {
             r.fail("is missing");
@@ -79,13 +79,13 @@ struct converter<detail::wrapped<T>> {
         return r.ok();
     }
 
-    // Only a scalar is wrapped, so that an object with a member `value` of another kind is what it is.
+    // Only scalars are wrapped. So an object whose member `value` is not a scalar is read as it is.
     static bool read_either(json_reader& r, detail::wrapped<T>& out) {
         std::string_view raw;
         if (!r.read_raw(raw)) {
             return false;
         }
-        json_reader scalar{raw, std::string_view::npos}; // it has been checked
+        json_reader scalar{raw, std::string_view::npos}; // its depth has been checked
         if (scalar.peek() == json_reader::kind::object && scalar.begin_object()) {
             std::string_view key;
             if (scalar.next_key(key) && key == "value" && scalar.peek() != json_reader::kind::object &&
@@ -102,7 +102,7 @@ struct converter<detail::wrapped<T>> {
 
 namespace cles::detail {
 
-/// A value as the body of a message.
+/// Writes a value as the body of a message.
 template <class T>
 std::string to_body(const T& value) {
     if constexpr (!is_scalar<T> && !comes_wrapped<T> && !std::is_convertible_v<const T&, std::string_view>) {

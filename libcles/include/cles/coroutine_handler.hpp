@@ -14,15 +14,16 @@
 #include <type_traits>
 #include <utility>
 
-/// Handlers that are coroutines: include this where a task is registered with one. Comes with `<cles/service.hpp>`.
+/// Handlers that are coroutines. Include this to register such a handler; included by `<cles/service.hpp>`.
 
 namespace cles::detail {
 
-/// Runs the coroutine on the service's executor; it is cancelled when the request is withdrawn.
+/// Runs the coroutine on the service's executor, and cancels it when the request is cancelled.
 void spawn_handler(const responder& answer, boost::asio::awaitable<void> work);
 
-/// A coroutine handler as an `async_handler`. The coroutine that runs it owns the function object and the request,
-/// since the handler's own frame may refer to both. What the handler throws is the answer where there is none yet.
+/// Adapts a coroutine handler to `async_handler`. The wrapping coroutine owns the function object and the request,
+/// because the handler's own frame may refer to both. An exception from the handler becomes the reply, if there is none
+/// yet.
 template <class F>
 struct coroutine_handler {
     using shape = handler_shape<F>;

@@ -18,17 +18,17 @@
 
 namespace cles {
 
-/// What a feed has to tell.
+/// An event of a feed.
 template <class T>
 struct feed_item {
     feed_event kind = feed_event::update;
     T value{};               ///< of `current` and `update`
-    std::string publisher{}; ///< the node's name; empty where it is not known
-    std::uint64_t seq = 0;   ///< of an `update`: its number in the noun's publications
+    std::string publisher{}; ///< the publishing node's name; empty if not known
+    std::uint64_t seq = 0;   ///< of `update`: its sequence number in the noun's publications
     std::uint64_t missed = 0;
     std::string text{};
 
-    /// True for the kinds that carry a value.
+    /// Whether this kind of event has a value.
     [[nodiscard]] bool has_value() const noexcept { return kind == feed_event::current || kind == feed_event::update; }
 };
 
@@ -36,28 +36,28 @@ namespace detail {
 
 using event_ptr = std::unique_ptr<pending_event, discarding>;
 
-/// The part of a feed that does not depend on its type; implemented by the service.
+/// The type-independent part of a feed; implemented by the service.
 class feed_control {
   public:
     virtual ~feed_control() = default;
-    /// Binds. The operation completes when the publisher has answered; where it fails, the feed is closed.
+    /// Binds. The operation completes when the publisher has replied; if it fails, the feed is closed.
     virtual void start(pending_ptr bound) = 0;
-    /// Closes it where that operation still waits.
+    /// Closes the feed if the operation of `start` is still pending.
     virtual void cancel_start() = 0;
-    /// Takes the event that waits, or keeps the operation until one comes. A second operation while one waits fails.
+    /// Delivers the next queued event to the operation, now or when one arrives. Fails if another operation is pending.
     virtual void next(event_ptr operation) = 0;
-    /// Withdraws this operation, if it still waits.
+    /// Cancels this operation if it is still pending.
     virtual void cancel(const pending_event* operation) = 0;
     /// Unbinds.
     virtual void close() = 0;
     [[nodiscard]] virtual const boost::asio::any_io_executor& executor() const = 0;
 };
 
-/// What a cancellation slot holds of an `async_next`.
+/// The cancellation handler of an `async_next`.
 struct next_withdrawal {
     std::weak_ptr<feed_control> feed;
     const pending_event* operation;
-    boost::asio::any_io_executor executor; ///< the service's, where the slot is emitted on another
+    boost::asio::any_io_executor executor; ///< the service's, if the slot is emitted on another
 
     void operator()() const;
 };
@@ -67,7 +67,7 @@ void dispatch_next(std::shared_ptr<feed_control> control, event_ptr operation);
 /// `control->close`, on the service's executor.
 void dispatch_close(std::shared_ptr<feed_control> control, const boost::asio::any_io_executor& service);
 
-/// False where the body is not JSON. What a type reads of it is checked by reading it.
+/// Reads an event's body. False if it is not JSON; if it does not fit T, sets `code` and `why` instead.
 template <class T>
 bool read_body(const raw_event& event, T& value, boost::system::error_code& code, std::string& why) {
     constexpr std::string_view what = "the update";
@@ -84,7 +84,7 @@ bool read_body(const raw_event& event, T& value, boost::system::error_code& code
     }
 }
 
-/// The same, for less where another feed of this type has read it.
+/// The same, but copies the value if another feed of this type has already read it.
 template <class T>
 bool read_shared_body(const raw_event& event, T& value, boost::system::error_code& code, std::string& why) {
     if constexpr (shared_reading::keeps<T>) {
@@ -103,7 +103,7 @@ bool read_shared_body(const raw_event& event, T& value, boost::system::error_cod
     return read_body(event, value, code, why);
 }
 
-/// False where the body is not JSON.
+/// Fills the item from an event. False if its body is not JSON.
 template <class T>
 bool fill(const raw_event& event, feed_item<T>& item, boost::system::error_code& code, std::string& why) {
     item.kind = event.kind;
@@ -149,10 +149,10 @@ class feed;
 
 namespace detail {
 
-/// An `async_bind`, of a feed of any type.
+/// An `async_bind` operation of a feed of any type.
 class binding : public pending {
   public:
-    /// What the feed is made of; before it starts.
+    /// Sets the feed's control; called before the operation starts.
     void make_of(std::shared_ptr<feed_control> control) { control_ = std::move(control); }
 
   protected:
@@ -195,13 +195,14 @@ class bind_operation final : public binding {
 
 } // namespace detail
 
-/// A binding from the binder's side: updates of one noun, and what happens to it.
+/// A binding from the binder's side: it receives the updates of one noun, and changes of the binding's state.
 ///
-/// Events come in order. While nobody fetches them, the newest are kept, up to `limits::feed`; what is dropped shows as
-/// a gap. When the publisher is lost the feed says so once and binds again by itself, backing off from 100 ms to 5 s.
-/// It ends with its last handle: destruction unbinds. Use it on the executor on which the handler of its `async_bind`
-/// was called (the service's, or the handler's own), with one `async_next` at a time; it may outlive the service, and
-/// then fails with `stopped`.
+/// Events arrive in order. At most `limits::feed` updates wait to be fetched; if more arrive, the oldest are dropped
+/// and reported as a gap. When the publisher is lost, the feed reports it once and binds again by itself, with a
+/// backoff of 100 ms to 5 s. Destroying the feed unbinds.
+///
+/// Use it on the executor on which the handler of its `async_bind` was called (the service's, or the handler's own),
+/// with one `async_next` at a time. It may outlive the service, and then fails with `stopped`.
 template <class T>
 class feed {
   public:
@@ -210,7 +211,7 @@ class feed {
     feed() = default;
     explicit feed(std::shared_ptr<detail::feed_control> control, bool elsewhere = false)
         : control_(std::move(control)), executor_(control_->executor()), elsewhere_(elsewhere) {}
-    /// What was moved from keeps its executor, on which its `async_next` fails.
+    /// A moved-from feed keeps its executor, on which its `async_next` fails.
     feed(feed&& other) noexcept
         // NOLINTNEXTLINE(performance-move-constructor-init)
         : control_(std::move(other.control_)), executor_(other.executor_), elsewhere_(other.elsewhere_) {}
@@ -227,10 +228,10 @@ class feed {
     feed& operator=(const feed&) = delete;
     ~feed() { close(); }
 
-    /// The next event. An update that is not a T fails with `conversion`, and the next call goes on behind it.
-    /// Cancellation (terminal, partial or total) leaves the feed as it was. On a feed that is not open it fails with
-    /// `closed`; the handler then runs on its own executor, which without one is the service's, or, where the feed
-    /// never had any, Asio's system executor.
+    /// Waits for the next event. An update that does not convert to T fails with `conversion`; the next call continues
+    /// with the event after it. Cancellation (terminal, partial or total) does not change the feed. If the feed is not
+    /// open, it fails with `closed`; a handler without an associated executor is then called on the service's executor,
+    /// or on Asio's system executor if the feed was never bound.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_next(Token&& token = {}) {
         constexpr bool with_exceptions = detail::throws<std::remove_cvref_t<Token>>;
@@ -258,7 +259,7 @@ class feed {
             token);
     }
 
-    /// Unbinds. An `async_next` that waits fails with `cancelled`, soon and never inside the call.
+    /// Unbinds. A pending `async_next` fails with `cancelled`, soon, but never inside this call.
     void close() {
         if (auto control = std::exchange(control_, nullptr)) {
             if (elsewhere_) {
@@ -273,8 +274,8 @@ class feed {
 
   private:
     std::shared_ptr<detail::feed_control> control_;
-    boost::asio::any_io_executor executor_; // stays when it is closed
-    bool elsewhere_ = false;                // it was handed to a handler on another executor
+    boost::asio::any_io_executor executor_; // kept when the feed is closed
+    bool elsewhere_ = false;                // it was passed to a handler on another executor
 };
 
 } // namespace cles

@@ -11,30 +11,30 @@
 
 namespace cles {
 
-/// What happens to a binding, as its feed tells it.
+/// The kinds of events of a feed.
 enum class feed_event : std::uint8_t {
-    current, ///< the publisher's last value, as it stood when the binding was made; it bears no `seq`
+    current, ///< the publisher's last value when the binding was made; has no `seq`
     update,  ///< an update
-    gap,     ///< `missed` updates went by unseen
+    gap,     ///< `missed` updates were not received
     lost,    ///< the publisher was lost, for the reason in `text`; the feed binds again by itself
     rebound, ///< the publisher is back
 };
 
 namespace detail {
 
-/// An event as it comes from the link; views are valid for the call.
+/// An event as received from the link; views are valid during the call.
 struct raw_event {
     feed_event kind = feed_event::update;
     std::string_view body = "{}";
-    bool checked = false; ///< that the body is valid JSON
+    bool checked = false; ///< whether the body is known to be valid JSON
     std::string_view publisher{};
     std::uint64_t seq = 0;
     std::uint64_t missed = 0;
     std::string_view text{};
-    std::string_view line{};           ///< of an update that is not queued: all of it
-    shared_reading* reading = nullptr; ///< of the body, where other feeds are handed it too
+    std::string_view line{};           ///< of an update that is not queued: the whole line
+    shared_reading* reading = nullptr; ///< of the body, if other feeds receive it too
 
-    /// Whether the body is valid JSON; looked at only where that is not known.
+    /// Whether the body is valid JSON; checks it only if that is not known yet.
     [[nodiscard]] bool has_json() const {
         if (checked || (reading != nullptr && reading->is_json())) {
             return true;
@@ -47,13 +47,13 @@ struct raw_event {
     }
 };
 
-/// One call of `async_next` that waits.
+/// A pending `async_next`.
 class pending_event {
   public:
     pending_event() = default;
     pending_event(const pending_event&) = delete;
     pending_event& operator=(const pending_event&) = delete;
-    /// False where the event's body is not JSON: the operation goes on waiting. Else it has ended.
+    /// Completes the operation. False if the event's body is not JSON: the operation stays pending.
     virtual bool deliver(const raw_event& event) = 0;
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
     /// Destroys it without calling its handler.

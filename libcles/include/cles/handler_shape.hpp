@@ -9,7 +9,7 @@
 #include <tuple>
 #include <type_traits>
 
-/// What a handler takes and gives, and one readable line where it cannot be one. Not for applications.
+/// Arguments and results of handlers, with readable compiler errors for unsuitable ones. Not for applications.
 
 // Coroutine handlers are recognised here; `<cles/coroutine_handler.hpp>` runs them.
 namespace boost::asio {
@@ -19,7 +19,7 @@ class awaitable;
 
 namespace cles::detail {
 
-/// The arguments and the result of a function, or of an object with one call operator.
+/// The argument and result types of a function, or of an object with one call operator.
 template <class F>
 struct call_signature : call_signature<decltype(&F::operator())> {};
 template <class R, class... A, bool NoThrow>
@@ -49,7 +49,7 @@ struct awaited<boost::asio::awaitable<T, E>> {
     using type = T;
 };
 
-/// How a handler wants its arguments: (), (request), (body), (request, body), (request, responder).
+/// The form of a handler: (), (request), (body), (request, body) or (request, responder).
 template <class F>
 struct handler_shape {
     using arguments = typename call_signature<F>::arguments;
@@ -78,7 +78,7 @@ concept one_signature = (std::is_pointer_v<F> && std::is_function_v<std::remove_
     &F::operator();
 };
 
-// A class that inherits two call operators names neither.
+// In a class that inherits two call operators, naming `operator()` is ambiguous.
 struct a_call_operator {
     void operator()();
 };
@@ -92,7 +92,7 @@ concept callable_somehow = std::is_class_v<F> && !std::is_final_v<F> && !require
 template <class T>
 inline constexpr bool lends_mutable = std::is_lvalue_reference_v<T> && !std::is_const_v<std::remove_reference_t<T>>;
 
-/// False, with a message for the reader, where the result cannot be an answer.
+/// False, with a compiler error, if a handler cannot have this result type.
 template <class Result>
 constexpr bool fits_result() {
     using value = std::remove_cvref_t<typename awaited<Result>::type>;
@@ -125,7 +125,7 @@ constexpr bool fits_body() {
     return !dangles && readable_body && made_first;
 }
 
-/// False, with a message for the reader, where a function object cannot be a handler.
+/// False, with a compiler error, if a function object cannot be a handler.
 template <class F>
 constexpr bool fits_handler() {
     if constexpr (one_signature<F>) {

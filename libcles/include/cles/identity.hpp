@@ -11,16 +11,16 @@
 
 namespace cles {
 
-/// Who is at the other end of a link, as far as the transport can tell. Known from the link's first line on.
+/// The peer of a link, as far as the transport knows it. Complete when the first line arrives.
 struct identity {
     std::string transport;            ///< "tcp", "udp", "unix", "inproc", "multicast"
-    std::string address;              ///< as a URL; of a Unix socket's client, the socket that it came in by
-    std::string name;                 ///< the node's proven name; empty where the transport proves none
-    std::optional<std::uint32_t> uid; ///< of the process, where the kernel tells (Unix sockets)
-    bool local = false;               ///< on this host
+    std::string address;              ///< as a URL; for clients of a Unix socket, the socket that they connected to
+    std::string name;                 ///< the node's authenticated name; empty if the transport authenticates none
+    std::optional<std::uint32_t> uid; ///< of the process, if the kernel reports it (Unix sockets)
+    bool local = false;               ///< whether it is on this host
 };
 
-/// A request that asks to be served.
+/// A request whose access is to be checked.
 struct access {
     const identity& peer;
     cles::verb verb;
@@ -28,8 +28,8 @@ struct access {
     std::string_view path; ///< the task and its parameters: "localization/fast"
 };
 
-/// The one place where access is decided. Runs before every request that a link brings, the reserved task's too; false
-/// is answered with `denied`. It must neither throw nor block.
+/// Decides about access. Called before every request from a link is served, including those to the reserved task
+/// `cles`; if it returns false, the reply is `denied`. It must neither throw nor block.
 using authoriser = std::function<bool(const access&)>;
 
 } // namespace cles

@@ -10,30 +10,30 @@
 
 namespace cles {
 
-/// Reads JSON (RFC 8259, strictly) from text that it borrows, value by value, without building a tree.
+/// Reads JSON (RFC 8259, strictly) value by value from borrowed text, without building a tree.
 ///
-/// Every call returns whether it succeeded; after the first failure all further ones fail too, and `error` says what
-/// was expected, where. Doubles are read exactly (`std::from_chars`). The text must outlive the reader; a key or string
-/// view that a call hands out is valid until the next call. Not thread-safe.
+/// Functions return whether they succeeded. After the first failure, all others fail too, and `error` says what was
+/// expected and where. Doubles are read exactly (`std::from_chars`). The text must outlive the reader; a key or string
+/// view that a function returns is valid until the next call. Not thread-safe.
 class json_reader {
   public:
     enum class kind : std::uint8_t { object, array, string, number, boolean, null, invalid };
 
-    /// The depth counts brackets, the outermost being 1.
+    /// \param max_depth of nested brackets; the outermost has depth 1
     explicit json_reader(std::string_view text, std::size_t max_depth = 32) noexcept
         : text_(text), max_depth_(max_depth) {}
 
-    /// What kind of value comes next, without consuming it.
+    /// The kind of the next value, without consuming it.
     [[nodiscard]] kind peek() noexcept;
 
     bool begin_object();
-    /// Moves to the object's next member; false at its end, which it consumes, and on failure (see `ok`).
+    /// Moves to the object's next member. False at the end of the object, which it consumes, and on failure (see `ok`).
     bool next_key(std::string_view& key);
-    /// As `next_key`, but only where the next member is `name`, written plainly and without white space: then true.
-    /// Otherwise nothing is consumed. Quicker where the order of members is known.
+    /// True if the next member is `name`, written without escapes and white space; then works as `next_key`. Otherwise
+    /// consumes nothing. Faster than `next_key` if the order of members is known.
     bool next_key_is(std::string_view name) noexcept;
     bool begin_array();
-    /// Moves to the array's next element; false at its end, which it consumes, and on failure (see `ok`).
+    /// Moves to the array's next element. False at the end of the array, which it consumes, and on failure (see `ok`).
     bool next_element();
 
     bool read_null();
@@ -42,24 +42,24 @@ class json_reader {
     bool read(std::int64_t& out);
     bool read(std::uint64_t& out);
     bool read(std::string& out);
-    /// A string without copying where it holds no escapes.
+    /// Reads a string; copies it only if it contains escapes.
     bool read(std::string_view& out);
-    /// Skips one value of any kind, checking all of it.
+    /// Skips one value of any kind and validates it.
     bool skip();
-    /// Skips one value and hands out its text as it stands.
+    /// Skips one value, validates it and returns its text unchanged.
     bool read_raw(std::string_view& out);
-    /// True when nothing but white space is left.
+    /// True if only white space is left; fails otherwise.
     bool at_end();
 
     [[nodiscard]] bool ok() const noexcept { return message_.empty(); }
-    /// Fails with this message at the current place.
+    /// Fails with this message at the current position.
     bool fail(std::string_view message);
-    /// Fails as another reader did, which was given a part of this one's text.
+    /// Fails as another reader did that read a part of this reader's text.
     bool fail_as(const json_reader& part);
-    /// Called while unwinding from a failure: names the member or element that it happened in.
+    /// Called while unwinding from a failure: adds the member or element in which it happened to the path.
     void inside_member(std::string_view name);
     void inside_element(std::size_t index);
-    /// As in "localization.lat: expected a number, got a string (at byte 12)".
+    /// The failure, as in "localization.lat: expected a number, got a string (at byte 12)".
     [[nodiscard]] std::string error() const;
 
   private:
@@ -87,10 +87,10 @@ class json_reader {
     std::size_t failed_at_ = 0;
 };
 
-/// Checks that `text` is one JSON value, whole and valid. On failure `why` (if given) says what and where.
+/// Whether `text` is exactly one valid JSON value. If not, `why` (if given) says what is wrong and where.
 bool is_valid_json(std::string_view text, std::size_t max_depth = 32, std::string* why = nullptr);
 
-/// Appends the JSON value in `text` to `out` without its white space outside strings. The text must be valid.
+/// Appends the JSON value in `text` to `out` without white space outside strings. The text must be valid.
 void append_compact_json(std::string_view text, std::string& out);
 
 } // namespace cles

@@ -7,8 +7,8 @@
 
 namespace cles {
 
-/// `boost::json::value` as an argument or result of a handler, for those who want a tree. Doubles are read and written
-/// by the library's own reader and writer, so that they come back exactly.
+/// `boost::json::value` as an argument or result of handlers that need a tree. Doubles are read and written by the
+/// library's own reader and writer, so they round-trip exactly.
 template <>
 struct converter<boost::json::value> {
     static void write(json_writer& w, const boost::json::value& value);

@@ -11,12 +11,12 @@
 
 namespace cles {
 
-/// Appends JSON (RFC 8259) without white space to a string that it borrows.
+/// Appends JSON (RFC 8259) without white space to a borrowed string.
 ///
-/// Commas and colons come by themselves: call `key` before each member of an object, and one value after it. Doubles
-/// are written with the fewest digits that read back the same (`45.1`); a double that is not finite becomes `null`,
-/// since JSON has no name for it. Text that is not UTF-8 is written with U+FFFD where it is broken, so that what is
-/// written is always valid. Not thread-safe; the string must outlive the writer.
+/// Commas and colons are added automatically: call `key` before each member of an object, and write one value after it.
+/// Doubles are written with the fewest digits that round-trip (`45.1`); a double that is not finite becomes `null`,
+/// because JSON cannot express it. In text that is not UTF-8, invalid bytes become U+FFFD, so the output is always
+/// valid. Not thread-safe; the string must outlive the writer.
 class json_writer {
   public:
     explicit json_writer(std::string& out) noexcept : out_(out), start_(out.size()) {}
@@ -26,9 +26,9 @@ class json_writer {
     void begin_array() { open('['); }
     void end_array() { out_.push_back(']'); }
     void key(std::string_view name);
-    /// A name that needs no escapes, as that of a C++ member.
+    /// Writes a key that needs no escapes, such as the name of a C++ member.
     void plain_key(std::string_view name);
-    /// As `plain_key`, with the text made beforehand. \pre an object is open
+    /// As `plain_key`, with text prepared at compile time. \pre an object is open
     void plain_key(const prepared_key& name);
 
     void null();
@@ -37,20 +37,20 @@ class json_writer {
     void value(std::int64_t i);
     void value(std::uint64_t u);
     void value(std::string_view text);
-    /// JSON text that is known to be valid and free of white space.
+    /// Writes JSON text that must be valid and free of white space.
     void raw(std::string_view json);
 
-    /// Where the first text that is not UTF-8 was mended, as an index into `written`; `npos` where none was.
+    /// The position in `written` where text that is not UTF-8 was first replaced; `npos` if there was none.
     [[nodiscard]] std::size_t broken_text() const noexcept { return broken_; }
     static constexpr std::size_t npos = std::string_view::npos;
 
-    /// What has been written by this writer.
+    /// What this writer has written.
     [[nodiscard]] std::string_view written() const noexcept { return std::string_view{out_}.substr(start_); }
 
   private:
     void open(char bracket);
     void append_string(std::string_view text);
-    // Compact JSON tells by its last character whether a comma is due, so that no stack of open brackets is needed.
+    // In compact JSON, the last character shows whether a comma is needed. So no stack of open brackets is needed.
     void separate() {
         if (out_.size() > start_) {
             const auto last = out_.back();

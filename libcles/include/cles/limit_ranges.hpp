@@ -13,7 +13,7 @@
 
 namespace cles {
 
-/// A member of `limits` that is a count or a number of bytes, and what it may be.
+/// A member of `limits` that is a count or a number of bytes, and its range.
 struct count_range {
     std::string_view name;
     std::size_t limits::*member;
@@ -21,7 +21,7 @@ struct count_range {
     std::size_t most;
 };
 
-/// A member of `limits` that is a time, and what it may be.
+/// A member of `limits` that is a time, and its range.
 struct time_range {
     std::string_view name;
     std::chrono::milliseconds limits::*member;
@@ -42,7 +42,7 @@ inline constexpr std::chrono::milliseconds day = std::chrono::hours{24};
 
 } // namespace detail
 
-/// All members of `limits`, for programs that read them from somewhere.
+/// All members of `limits`, for programs that read them, for example from a file.
 inline constexpr std::array<count_range, 17> count_ranges{{
     {"line", &limits::line, 256, 64 * detail::mebi},
     {"depth", &limits::depth, 1, 64},
@@ -72,7 +72,7 @@ inline constexpr std::array<time_range, 6> time_ranges{{
     {"probe", &limits::probe, detail::instant, detail::day},
 }};
 
-/// \throws cles::error with `invalid_option`, naming the first member that is not what it may be
+/// \throws cles::error with `invalid_option`, naming the first member that is out of range
 void check(const limits& bounds);
 
 } // namespace cles

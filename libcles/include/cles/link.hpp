@@ -13,7 +13,7 @@
 
 namespace cles {
 
-/// A way to make links, chosen by the URL's scheme.
+/// Makes links; selected by the URL's scheme.
 class link_transport {
   public:
     link_transport() = default;
@@ -21,21 +21,21 @@ class link_transport {
     link_transport& operator=(const link_transport&) = delete;
     virtual ~link_transport() = default;
 
-    /// Whether listening there is reachable from other hosts.
+    /// Whether a listener on this URL is reachable from other hosts.
     [[nodiscard]] virtual bool is_exposed(const url& where) const = 0;
-    /// \throws boost::system::system_error where the address cannot be had
+    /// \throws boost::system::system_error if the address is not available
     virtual std::unique_ptr<acceptor> listen(const boost::asio::any_io_executor& executor, const url& where,
                                              const limits& bounds) = 0;
-    /// Makes a link; the callback comes once, never from inside the call, within `limits::connect`. The function that
-    /// is returned gives up; the callback then does not come.
+    /// Connects. Calls `done` once, within `limits::connect`, and never from inside this call. The returned function
+    /// cancels; `done` is then not called.
     virtual std::function<void()> dial(const boost::asio::any_io_executor& executor, const url& where,
                                        const limits& bounds, dial_callback done) = 0;
 };
 
-/// The transport of a scheme, or null.
+/// The transport for this scheme; null if there is none.
 link_transport* find_transport(std::string_view scheme);
-/// Adds a transport for the life of the process. To be called before any service is made.
-/// \return the one whose place it takes, which it may wrap; null where there was none
+/// Registers a transport until the process ends. Call it before any service is made.
+/// \return the transport that it replaces, which it may wrap; null if there was none
 std::unique_ptr<link_transport> register_transport(std::string_view scheme, std::unique_ptr<link_transport> carrier);
 
 } // namespace cles

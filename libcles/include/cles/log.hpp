@@ -10,23 +10,23 @@ namespace cles {
 
 enum class log_level : std::uint8_t { debug, info, warning, error };
 
-/// What is told, and of whom. Stands for its text wherever text is wanted; all views are valid for the call.
+/// A log message and what it is about. Converts from and to text; all views are valid during the call.
 struct log_entry {
     template <std::convertible_to<std::string_view> Text>
-    log_entry(const Text& words) noexcept : text(words) {} // NOLINT(google-explicit-constructor): a text is one
+    log_entry(const Text& words) noexcept : text(words) {} // NOLINT(google-explicit-constructor): any text is an entry
     log_entry(std::string_view words, std::string_view whom, std::uint64_t id = 0) noexcept
         : text(words), peer(whom), request(id) {}
 
     std::string_view text;
-    std::string_view peer{};   ///< `identity::address` of who is at the other end; empty where it is nobody's doing
-    std::uint64_t request = 0; ///< the id of the request on its link; 0: none, or one without
+    std::string_view peer{};   ///< `identity::address` of the peer; empty if no peer is concerned
+    std::uint64_t request = 0; ///< the id of the request on its link; 0: no request, or one without id
 
     operator std::string_view() const noexcept { return text; } // NOLINT(google-explicit-constructor): as above
 };
 
-/// Where a service tells what happens to it. Called on the service's executor; it must neither throw nor block. The
-/// library links no logging framework: a program hands its own in, which may take a `std::string_view` for the entry
-/// where it does not care whom it is about.
+/// The log of a service. Called on the service's executor; it must neither throw nor block. The library links no
+/// logging framework, so a program passes a function to its own. If the function does not need the peer, its second
+/// parameter may be a `std::string_view`.
 using log_sink = std::function<void(log_level, const log_entry&)>;
 
 } // namespace cles

@@ -9,12 +9,12 @@
 
 namespace cles {
 
-/// How much a node has to do.
+/// The load of a node.
 struct node_load {
-    std::uint32_t queued = 0;  ///< work that waits
-    std::uint32_t running = 0; ///< handlers that have not ended
-    std::uint32_t workers = 0; ///< what it has for it; 0: no pool of workers
-    /// How long one piece of work takes, smoothed, in microseconds; 0: not known.
+    std::uint32_t queued = 0;  ///< queued work
+    std::uint32_t running = 0; ///< handlers that have not finished
+    std::uint32_t workers = 0; ///< workers in its pool; 0: no pool
+    /// Smoothed execution time of one job in microseconds; 0: not known.
     std::uint32_t service_us = 0;
 
     bool operator==(const node_load&) const = default;
@@ -22,23 +22,23 @@ struct node_load {
 
 enum class peer_state : std::uint8_t {
     live,
-    suspect, ///< not heard of for 3.5 of its intervals; after 15 it is forgotten
-    clash,   ///< a second live node of a name that is taken, this node's own included: never asked
+    suspect, ///< not heard from for 3.5 of its announcement intervals; forgotten after 15
+    clash,   ///< a second live node with a name that is already used, possibly by this node: receives no requests
 };
 
 /// "live", "suspect", "clash"
 std::string_view to_string(peer_state state) noexcept;
 
-/// Another node, as it announced itself to the multicast group, or as others tell of it (docs/protocol.md, "Membership"
+/// Another node, as announced by itself to the multicast group, or reported by others (docs/protocol.md, "Membership"
 /// and "Gossip").
 struct peer {
     std::string node;
-    std::vector<std::string> endpoints; ///< URLs, as they can be used from here; the first is where it is asked
-    std::string epoch;                  ///< of this run of it
-    std::chrono::milliseconds age{0};   ///< since it was last heard
+    std::vector<std::string> endpoints; ///< URLs usable from here; requests are sent to the first
+    std::string epoch;                  ///< identifies its current run
+    std::chrono::milliseconds age{0};   ///< since it was last heard from
     peer_state state = peer_state::live;
     node_load load;
-    std::string tasks; ///< a digest of what it offers, another one when that changes
+    std::string tasks; ///< a digest of its tasks, which changes when they do
 };
 
 } // namespace cles

@@ -22,25 +22,26 @@
 ///     }
 ///     CLES_PLUGIN("answers", "1.0", register_tasks)
 ///
-/// The same function serves an application's service and a test. It may take settings as a second argument, of any type
-/// that `<cles/convert.hpp>` reads; they are what the daemon's configuration says of the plugin under `config`. With a
-/// described struct whose members are `std::optional`, all may be left out, and one of another name is refused. A
-/// struct with a `void check() const` says more about what it takes, by throwing a `cles::setting_error`; `clesd
-/// --check` calls that, and not the function.
+/// The same function works for an application's service and a test. It may take settings as a second argument, of any
+/// type that `<cles/convert.hpp>` reads; they are read from `config` of the plugin in the daemon's configuration. If
+/// the settings are a described struct, unknown names are refused, and members of type `std::optional` may be left out.
+/// The struct may have a `void check() const` that throws a `cles::setting_error` if a value is not valid; `clesd
+/// --check` calls only that, not the function.
 ///
 ///     void register_tasks(cles::registrar& to, const settings& wanted);
 ///
-/// What it throws keeps the plugin from being loaded, with its words in the daemon's log.
+/// If the function throws, the plugin is not loaded, and the message is written to the daemon's log.
 ///
-/// Threads. The function runs once, on the daemon's main thread. Handlers run on threads of a pool, several at once,
-/// and so guard what they share; those that are `inline_ok` run on the I/O thread, which they hold up. Responders may
-/// be used on any thread.
+/// Threads. The function runs once, on the daemon's main thread. Handlers run on threads of a pool, several at a time,
+/// so they must protect shared data; those that are `inline_ok` run on the I/O thread and block it. Responders may be
+/// used on any thread.
 ///
-/// Lifetime. What handlers hold goes when the daemon stops and the last job that uses it has ended: let a thread or a
-/// device of yours be owned by the handlers that need it. The library itself stays loaded until the process ends.
+/// Lifetime. What handlers hold is destroyed when the daemon stops and the last job that uses it has ended, so threads
+/// and devices should be owned by the handlers that need them. The library itself stays loaded until the process ends.
 ///
-/// Link `cles::plugin`, or use `cles_add_plugin` of the CMake package, which also hides all symbols but the entry. Only
-/// the C structures of <cles/plugin_abi.h> cross, so that compiler and Boost may be others than the daemon's.
+/// Link `cles::plugin`, or use `cles_add_plugin` of the CMake package, which also hides all symbols except the entry
+/// point. Only the C structures of <cles/plugin_abi.h> are exchanged, so compiler and Boost may differ from the
+/// daemon's.
 ///
 /// \param name         of the plugin, as text
 /// \param version      of the plugin, as text
@@ -52,14 +53,14 @@
 
 namespace cles::detail {
 
-/// What the host calls, for a plugin whose tasks `Register` registers.
+/// The functions that the host calls, for a plugin whose tasks `Register` registers.
 template <auto Register>
 class plugin_entry {
   public:
     static const cles_plugin* describe(std::string_view name, std::string_view version) noexcept {
         static const cles_plugin description{.size = sizeof(cles_plugin),
                                              .abi_major = CLES_PLUGIN_ABI_MAJOR,
-                                             .abi_minor = 0, // it does without what came later
+                                             .abi_minor = 0, // works without later additions
                                              .reserved = 0,
                                              .name = abi_text(name),
                                              .version = abi_text(version),
@@ -70,13 +71,13 @@ class plugin_entry {
     }
 
   private:
-    // Never destroyed: a job that does not end may use them while the process exits.
+    // Never destroyed, because jobs that do not end may use them while the process exits.
     static plugin_registrar::task_list& tasks() {
         static auto* const list = new plugin_registrar::task_list;
         return *list;
     }
 
-    // Hands what the settings say to `use`.
+    // Reads the settings, if any, and passes them to `use`.
     template <class F>
     static void with_settings(cles_text config, F&& use) {
         using arguments = typename call_signature<decltype(Register)>::arguments;
@@ -89,7 +90,7 @@ class plugin_entry {
         }
     }
 
-    // True where it does not throw; otherwise the host has been told why.
+    // True if it does not throw; otherwise reports the reason to the host.
     template <class F>
     static bool succeeds(const cles_host& host, F&& what) noexcept {
         try {

@@ -19,8 +19,8 @@
 
 namespace cles::detail {
 
-/// What a responder holds inside a plugin: the job's handle. When the last copy goes, the job has been answered one way
-/// or another. Any thread may use it, since the host's functions take any.
+/// The implementation of a responder inside a plugin: the job's handle. Destroying it fails the job if nothing has been
+/// replied. May be used on any thread, because the host's functions may.
 class plugin_call final : public call_control {
   public:
     plugin_call(const cles_host& host, cles_job job) noexcept : host_(host), job_(job) {}
@@ -60,7 +60,7 @@ class plugin_call final : public call_control {
                                          [](void* user) {
                                              try {
                                                  (*static_cast<std::function<void()>*>(user))();
-                                             } catch (...) { // no exception may leave; the job goes on unstopped
+                                             } catch (...) { // exceptions must not cross the ABI; the job continues
                                              }
                                          },
                                      .drop = [](void* user) { delete static_cast<std::function<void()>*>(user); },
@@ -78,14 +78,14 @@ class plugin_call final : public call_control {
                                 .answered = &asked::answer,
                                 .progress = options.on_progress_ ? &asked::report : nullptr,
                                 .user = owned.get()};
-        static_cast<void>(owned.release()); // the answer lets go of it, and may come before the next line
+        static_cast<void>(owned.release()); // freed by `answer`, which may run before `delegate` returns
         host_.delegate(&host_, job_, abi_text(command), &crossing);
     }
 
     [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
 
   private:
-    // A request of this job on its way.
+    // A pending request of this job.
     struct asked {
         static void answer(void* user, cles_text code, cles_text json, cles_text message) {
             const std::unique_ptr<asked> self{static_cast<asked*>(user)};
@@ -100,7 +100,7 @@ class plugin_call final : public call_control {
         static void report(void* user, double fraction, cles_text json) {
             try {
                 static_cast<asked*>(user)->progress(fraction, view_of(json));
-            } catch (...) { // a report that is lost harms nobody
+            } catch (...) { // losing a report does no harm
             }
         }
 

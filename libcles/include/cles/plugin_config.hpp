@@ -7,11 +7,11 @@
 #include <string>
 #include <string_view>
 
-/// A plugin's part of the configuration. Not for applications.
+/// The settings of a plugin. Not for applications.
 
 namespace cles::detail {
 
-/// The first member of the object that C has none of; empty where there is none such.
+/// The first member of the JSON object that C does not have; empty if there is none.
 template <described_struct C>
 std::string unknown_setting(std::string_view json) {
     json_reader reader{json};
@@ -28,21 +28,21 @@ std::string unknown_setting(std::string_view json) {
     return unknown;
 }
 
-/// Settings that can say themselves whether they do, beyond their types.
+/// Settings with a `check()` of their own, in addition to their types.
 template <class C>
 concept checked_settings = requires(const C& settings) {
     settings.check();
 };
 
-/// The path before the words of a failed conversion: "limit" of "limit: expected a number".
+/// The path at the beginning of a conversion error: "limit" of "limit: expected a number"; empty if there is none.
 inline std::string setting_named_in(std::string_view why) {
     const auto end = why.find(": ");
     const auto key = why.substr(0, end == std::string_view::npos ? 0 : end);
     return std::string{key.find(' ') == std::string_view::npos ? key : std::string_view{}};
 }
 
-/// Reads it as a C. A slip of the pen in a setting's name is an error, lest it be taken for the default.
-/// \throws cles::setting_error, and what the settings' own `check()` throws
+/// Reads settings of type C. An unknown setting is an error, so that misspelt names are noticed.
+/// \throws cles::setting_error, and what the settings' `check()` throws
 template <class C>
 C plugin_config(std::string_view json) {
     C config{};
@@ -61,7 +61,7 @@ C plugin_config(std::string_view json) {
     return config;
 }
 
-/// For a plugin that has no settings. \throws cles::setting_error
+/// Checks that a plugin without settings was given none. \throws cles::setting_error
 inline void expect_no_config(std::string_view json) {
     json_reader reader{json};
     std::string_view key;

@@ -17,8 +17,8 @@
 
 namespace cles::detail {
 
-/// A task of this plugin. It is there until the process ends, since the host may call it that long; its handler goes
-/// when the plugin stops and no job uses it any more, and with it what the handler holds.
+/// A task of this plugin. It exists until the process ends, because the host may call it until then. Its handler is
+/// destroyed when the plugin has stopped and no job uses it any more.
 class plugin_task {
   public:
     plugin_task(const cles_host& host, registration task)
@@ -28,7 +28,7 @@ class plugin_task {
         static_cast<plugin_task*>(user)->run(job, known_part(request));
     }
     void stop() noexcept {
-        std::shared_ptr<registration> last; // goes without the lock: what it holds may wait for threads
+        std::shared_ptr<registration> last; // destroyed without the lock: the handler may wait for threads
         const std::scoped_lock lock{mutex_};
         last.swap(handler_);
     }
@@ -50,7 +50,7 @@ class plugin_task {
             plugin_call control{host_, job};
             try {
                 fail_with(control, std::current_exception());
-            } catch (...) { // no memory to say why: its end answers
+            } catch (...) { // no memory to report why: destroying `control` fails the job
             }
         }
     }
@@ -109,7 +109,7 @@ class plugin_updates final : public update_sink {
     const cles_host& host_;
 };
 
-/// The registrar of a plugin: it tells the host of each task.
+/// The registrar of a plugin: adds each task to the host.
 class plugin_registrar final : public registrar {
   public:
     using task_list = std::vector<std::unique_ptr<plugin_task>>;

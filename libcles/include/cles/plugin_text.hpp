@@ -7,7 +7,7 @@
 #include <cstring>
 #include <string_view>
 
-/// Text and structures as they cross between a host and its plugins. Not for applications.
+/// Text and structures of the plugin ABI. Not for applications.
 
 namespace cles::detail {
 
@@ -16,7 +16,7 @@ inline std::string_view view_of(cles_text text) noexcept {
     return text.data == nullptr ? std::string_view{} : std::string_view{text.data, text.size};
 }
 
-/// What the other side filled in of a structure that begins with its size; the rest, which it did not know, is zero.
+/// Copies a structure that begins with its size; members that the other side does not know are zero.
 template <class T>
 T known_part(const T* given) noexcept {
     T out{};

@@ -9,16 +9,16 @@
 
 namespace cles {
 
-/// The name of a JSON object's member as it is written behind another: a comma, the name in quotation marks, and a
-/// colon. Made when a program is compiled, of a name that needs no escapes.
+/// A JSON key as it is written after another member: a comma, the name in quotation marks, and a colon. Made at compile
+/// time from a name that needs no escapes.
 template <std::size_t Length>
 class prepared_key_text {
   public:
-    /// \pre the name has this length
+    /// \pre the name has length `Length`
     consteval explicit prepared_key_text(std::string_view name) {
         text_[0] = ',';
         text_[1] = '"';
-        for (std::size_t i = 0; i < name.size(); ++i) { // without <algorithm>, which every user would pay for
+        for (std::size_t i = 0; i < name.size(); ++i) { // <algorithm> would slow down every user's compilation
             text_[i + 2] = name[i];
         }
         text_[Length + 2] = '"';
@@ -30,7 +30,7 @@ class prepared_key_text {
     std::array<char, Length + 4> text_{};
 };
 
-/// Any such text, which has to outlive it.
+/// A reference to a `prepared_key_text` of any length, which must outlive it.
 class prepared_key {
   public:
     template <std::size_t Length>

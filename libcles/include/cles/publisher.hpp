@@ -12,7 +12,7 @@ namespace cles {
 
 namespace detail {
 
-/// Where a publisher's updates go; implemented by the service, and by the host of a plugin.
+/// Receives a publisher's updates; implemented by the service, and by the host of a plugin.
 class update_sink {
   public:
     virtual ~update_sink() = default;
@@ -21,19 +21,19 @@ class update_sink {
 
 } // namespace detail
 
-/// Publishes updates from any thread, for as long as you like: copies may be kept by handlers, threads and jobs. Made
-/// by `registrar::make_publisher`, so that the same code publishes in an application and in a plugin.
+/// Publishes updates from any thread. Copies may be kept by handlers, threads and jobs. Made by
+/// `registrar::make_publisher`, so the same code works in an application and in a plugin.
 ///
-/// An update is handed to the service and sent soon, on its executor. Nothing blocks, and nothing is reported: what is
-/// published after the service has gone is dropped, and so are the oldest where updates come faster than they can be
-/// sent, or a noun that the service refuses; both are told in its log. On the service's own executor,
-/// `service::update` says more.
+/// `update` passes the value to the service, which sends it soon on its executor. It does not block, and errors are not
+/// returned: updates after the service's end are dropped, and so are the oldest if updates come faster than they can be
+/// sent, and those of a noun that the service refuses; the latter two are logged. On the service's own executor,
+/// `service::update` reports errors.
 class publisher {
   public:
     explicit publisher(std::shared_ptr<detail::update_sink> to) noexcept : to_(std::move(to)) {}
 
-    /// Publishes a value to all that are bound to the task (or to "task/parameter/...").
-    /// \throws cles::error with `conversion` where it cannot be written as JSON, as text that is not UTF-8
+    /// Publishes a value to all binders of the task (or of "task/parameter/...").
+    /// \throws cles::error with `conversion` if it cannot be written as JSON, for example text that is not UTF-8
     template <class T>
     void update(std::string_view noun, const T& value) const {
         to_->publish(noun, to_json(value));

@@ -17,19 +17,19 @@
 
 namespace cles {
 
-/// A plain handler writes its result and returns, or throws. It runs in line, without allocation.
+/// A plain handler writes its result and returns, or throws. It runs inline, without allocation.
 using plain_handler = std::function<void(const request&, json_writer&)>;
-/// A handler that answers later.
+/// A handler that replies later.
 using async_handler = std::function<void(const request&, responder)>;
 
-/// A task with its handler; of the two handlers, one is set (none: a task that is only to be bound).
+/// A task and its handler. At most one of the two handlers is set; none for a task that is only bound.
 struct registration {
     cles::verb verb = verb::pull;
     std::string task{};
     task_info info{};
     plain_handler plain{};
     async_handler async{};
-    bool coroutine = false; ///< `async` runs a coroutine, and so needs the service's executor
+    bool coroutine = false; ///< whether `async` runs a coroutine, which needs the service's executor
 };
 
 namespace detail {
@@ -55,7 +55,7 @@ decltype(auto) invoke_handler(F& f, const request& r) {
 template <class F>
 struct coroutine_handler;
 
-/// A function object as `std::function` wants it, which copies.
+/// Makes a function object copyable, as `std::function` requires.
 template <class F>
 auto copyable(F f) {
     if constexpr (std::is_copy_constructible_v<F>) {
@@ -91,19 +91,19 @@ void set_handler(registration& to, F f) {
 
 } // namespace detail
 
-/// Where tasks are registered: the paper's `register<Verb>Function` (Listing 1.1). A service is one; so are the host of
-/// a plugin and a test, so that one `void register_tasks(cles::registrar&)` serves all three.
+/// Registers tasks: the paper's `register<Verb>Function` (Listing 1.1). Implemented by the service, by the host of a
+/// plugin and by tests, so one `void register_tasks(cles::registrar&)` works for all three.
 ///
-/// A handler takes `()`, `(request)`, `(body)`, `(request, body)` or `(request, responder)`, the body being any type
-/// that `<cles/convert.hpp>` reads, and gives nothing, a value that it writes, or `asio::awaitable` of either. It may
-/// hold what can only be moved. A plain function runs in line, between two lines of the link, and should be quick; a
-/// coroutine may wait (include `<cles/coroutine_handler.hpp>`, which comes with `<cles/service.hpp>`). One that takes a
-/// responder answers through it and may be a coroutine too, an `awaitable<void>`. A body that does not fit is answered
-/// with `bad_request` before the handler runs. What a handler throws becomes the answer: `cles::error` with its code,
-/// anything else `failed`.
+/// A handler takes `()`, `(request)`, `(body)`, `(request, body)` or `(request, responder)`, where the body is any type
+/// that `<cles/convert.hpp>` reads. It returns nothing, a value that `<cles/convert.hpp>` writes, or `asio::awaitable`
+/// of either. It may be move-only. A plain function runs inline, between two lines of the link, and should be quick; a
+/// coroutine may wait (include `<cles/coroutine_handler.hpp>`, or `<cles/service.hpp>`). A handler that takes a
+/// responder replies through it; it may also be an `awaitable<void>`. If the body does not fit, the reply is
+/// `bad_request`, and the handler does not run. An exception from the handler becomes the reply: a `cles::error` with
+/// its code, anything else `failed`.
 ///
-/// In a plugin, handlers, those of BIND too, run on threads of a pool, several at once, unless the task is `inline_ok`;
-/// coroutines, which need the executor of an application, are refused there.
+/// In a plugin, handlers (including those of BIND) run on threads of a pool, several at a time, unless the task is
+/// `inline_ok`. Coroutines are refused there, because they need the executor of an application.
 ///
 /// \throws cles::error from every function: `invalid_name`, `already_registered`
 class registrar {
@@ -114,7 +114,7 @@ class registrar {
     virtual ~registrar() = default;
 
     virtual void add(registration task) = 0;
-    /// For tasks that publish: what it returns may be kept, and used on any thread.
+    /// Returns a publisher for tasks that publish. It may be kept, and used on any thread.
     [[nodiscard]] virtual publisher make_publisher() = 0;
 
     template <class F>
@@ -129,8 +129,8 @@ class registrar {
     void on_delegate(std::string_view task, F handler, task_info info = {}) {
         add_handler(verb::delegate, task, std::move(handler), std::move(info));
     }
-    /// Runs when somebody asks this node to publish (an UPDATE request); the body is published after it. Opens the task
-    /// for BIND too.
+    /// Runs when a node asks this one to publish (an UPDATE request); the body is published afterwards. Also opens the
+    /// task for BIND.
     template <class F>
     void on_update(std::string_view task, F handler, task_info info = {}) {
         add_handler(verb::update, task, std::move(handler), std::move(info));
@@ -139,8 +139,8 @@ class registrar {
     void on_bind(std::string_view task, task_info info = {}) {
         add({.verb = verb::bind, .task = std::string{task}, .info = std::move(info)});
     }
-    /// Opens a task for BIND; the plain function runs at each BIND and may refuse it by throwing, for example because a
-    /// parameter is none that it publishes. What it returns is not used.
+    /// Opens a task for BIND. The plain function runs at each BIND and may refuse it by throwing, for example because
+    /// of an unknown parameter. Its return value is ignored.
     template <class F>
     void on_bind(std::string_view task, F handler, task_info info = {}) {
         if constexpr (detail::one_signature<F>) {

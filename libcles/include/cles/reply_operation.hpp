@@ -14,18 +14,19 @@
 #include <type_traits>
 #include <utility>
 
-/// Requests that wait for their reply, and how the reply becomes a value. Not for applications.
+/// Pending requests, and the conversion of replies to values. Not for applications.
 
 namespace cles::detail {
 
-/// What a result is that could not be read. \param reader stopped where it does not fit
+/// Classifies a result that could not be read: `malformed` if it is not JSON; otherwise sets `code` to `conversion`.
+/// \param reader where it failed
 pending::verdict judge_unread(const json_reader& reader, std::string_view json, boost::system::error_code& code,
                               std::string& why, std::string_view what);
-/// The same where a conversion of the user's own threw.
+/// As `judge_unread`, for a user's conversion that threw.
 void judge_thrown(const std::exception& thrown, boost::system::error_code& code, std::string& why,
                   std::string_view what);
 
-/// A text result read as a T. `json_text` is handed over as it came.
+/// Reads a T from the text of a result.
 template <class T>
 pending::verdict read_result(std::string_view json, T& value, boost::system::error_code& code, std::string& why,
                              std::string_view what = "the answer") {
@@ -71,7 +72,7 @@ class reply_operation final : public pending {
     }
 
     void fail(boost::system::error_code code, std::string_view message) override {
-        const std::string text{message}; // the view may be of something that goes with the handler's memory
+        const std::string text{message}; // the view may refer to memory of the handler
         if constexpr (std::is_void_v<T>) {
             finish(code, text);
         } else {

@@ -16,8 +16,11 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace cles {
+
+class request;
 
 namespace detail {
 
@@ -31,20 +34,41 @@ struct request_data {
     time_point deadline{};
 };
 
-/// A copy that owns all it refers to.
+/// A copy of a request. Its memory is reused for the next request that is assigned.
+class owned_request {
+  public:
+    owned_request() = default;
+    owned_request(const owned_request&) = delete;
+    owned_request& operator=(const owned_request&) = delete;
+
+    /// \param peer a copy of the identity of the request's peer
+    void assign(const request& what, std::shared_ptr<const identity> peer);
+    /// Releases the peer, and the memory of a large request.
+    void clear();
+    /// Always the same object, for a `request` that refers to it.
+    [[nodiscard]] const request_data& data() const noexcept { return data_; }
+
+  private:
+    std::string text_; // all that the views refer to
+    std::vector<std::string_view> parameters_;
+    std::shared_ptr<const identity> peer_;
+    request_data data_;
+};
+
+/// Makes a copy that owns its text.
 std::shared_ptr<const request_data> own(const request_data& data);
 
-/// False where the text is not a number, or not one that fits. Defined for all numbers that `std::from_chars` reads.
+/// False if the text is not a number, or out of range. Defined for all types that `std::from_chars` reads.
 template <class T>
 bool read_number(std::string_view text, T& number) noexcept;
 
 } // namespace detail
 
-/// A request as its handler sees it: decoded, validated and addressed to this node.
+/// A request as its handler receives it: decoded, validated and addressed to this node.
 ///
-/// A handler that is a plain function borrows it: it is valid until the function returns. A copy owns its text and may
-/// be kept for as long as you like; coroutines take their argument by value and thus own it. Not thread-safe while
-/// borrowed; copies may be read from any thread.
+/// In a handler that is a plain function, it is valid until the function returns. A copy owns its text and may be kept;
+/// coroutines take their argument by value and so own it. Not thread-safe until copied; copies may be read from any
+/// thread.
 class request {
   public:
     explicit request(const detail::request_data& borrowed) noexcept : data_(&borrowed) {}
@@ -65,15 +89,15 @@ class request {
     [[nodiscard]] std::string_view task() const noexcept { return data_->task; }
     /// The parameters after the task, percent-decoded.
     [[nodiscard]] std::span<const std::string_view> parameters() const noexcept { return data_->parameters; }
-    /// The JSON body; `{}` where none came.
+    /// The JSON body; `{}` if there is none.
     [[nodiscard]] std::string_view body() const noexcept { return data_->body; }
-    /// Who asks. The reference is valid as long as this request.
+    /// The requester. The reference is valid as long as this request.
     [[nodiscard]] const identity& peer() const noexcept { return *data_->peer; }
     /// When the requester stops waiting.
     [[nodiscard]] time_point deadline() const noexcept { return data_->deadline; }
 
     /// The parameter at `index` (from 0) as text or a number.
-    /// \throws cles::error with `bad_request` where it is missing or no such number
+    /// \throws cles::error with `bad_request` if it is missing, not a number or out of range
     template <class T = std::string_view>
     [[nodiscard]] T parameter(std::size_t index) const {
         const auto text = parameter_text(index);
@@ -81,7 +105,7 @@ class request {
             static_assert(!std::is_same_v<T, bool>, "a parameter is text or a number");
             T number{};
             if (!detail::read_number(text, number)) {
-                throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is no number that fits");
+                throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is not a number that fits");
             }
             return number;
         } else {
@@ -89,8 +113,8 @@ class request {
         }
     }
 
-    /// The body as a T; a scalar is taken out of {"value":x}.
-    /// \throws cles::error with `bad_request`, naming the path to what does not fit
+    /// The body as a T; scalars are unwrapped from {"value":x}.
+    /// \throws cles::error with `bad_request`, naming the path to the part that does not fit
     template <class T>
     [[nodiscard]] T as() const {
         using carrier = std::conditional_t<detail::comes_wrapped<T>, detail::wrapped<T>, T>;

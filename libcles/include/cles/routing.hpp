@@ -7,8 +7,8 @@ namespace detail {
 struct routing_part;
 } // namespace detail
 
-/// What makes a service act for its clients on `any:`, `all:` and the names of other nodes (docs/routing.md), to be
-/// handed to `service_options::routing`. A part of its own, so that a program which does not name it does not carry it.
+/// Returns a value for `service_options::routing` that makes the service forward requests of its clients to `any:`,
+/// `all:` and other nodes (docs/routing.md). Only programs that call this function link its code.
 const detail::routing_part* routing() noexcept;
 
 } // namespace cles

@@ -44,51 +44,53 @@ flags of pkg-config's cles define it"
 
 namespace cles {
 
-/// How a service is set up. Everything but the name may be left out.
+/// The configuration of a service. Only the name is required.
 struct service_options {
     std::string name{};                         ///< 1 to 64 letters, digits, '_', '-', '.'; not self, any, all
-    std::vector<std::string> listen{};          ///< link URLs, see docs/links.md; none: it only asks
-    std::map<std::string, std::string> peers{}; ///< where other nodes are: name to URL
+    std::vector<std::string> listen{};          ///< link URLs, see docs/links.md; none: it does not listen
+    std::map<std::string, std::string> peers{}; ///< URLs of other nodes, by name
     bool insecure = false;                      ///< allow listening beyond this host without credentials
-    /// Networks ("10.0.0.0/8", "fd00::/8") whose hosts are who they say, so that as much is sent to them by UDP as they
-    /// ask for. All others but loopback get less than 64 KiB a second, lest the node be used to flood a third party.
+    /// Networks ("10.0.0.0/8", "fd00::/8") whose source addresses are trusted, so the amount sent to them by UDP is not
+    /// limited. All other hosts except loopback are sent less than 64 KiB a second, so that the node cannot be used to
+    /// flood a third party.
     std::vector<std::string> networks{};
-    /// Whether and where it takes part in multicast; beyond loopback only where it is `insecure` too.
+    /// Multicast. Beyond loopback only if `insecure` is set too.
     multicast_options multicast{};
-    /// Finds other nodes by asking, without multicast and beyond its reach, where it is `cles::gossip({seeds})`.
+    /// `cles::gossip({seeds})` finds other nodes by gossip, without multicast and beyond its reach.
     gossip_options gossip{};
-    /// The pool that it belongs to, a name; empty: the one without a name. Nodes of other pools are not known, so that
-    /// two that share a network, or a port that was used again, never become one.
+    /// The name of the pool that it belongs to; empty: the unnamed pool. Nodes of other pools are ignored, so two pools
+    /// that share a network or reuse a port stay separate.
     std::string pool{};
-    /// Called on the service's executor when another live node turns out to have had this one's name first (of two that
-    /// started within a second, the one with the lower epoch has it), with the URL where that one is. The service goes
-    /// on, and is not asked by its name.
+    /// Called on the service's executor when another live node had this node's name first (of two that started within a
+    /// second, the one with the lower epoch has it), with that node's URL. The service continues, but receives no
+    /// requests by its name.
     std::function<void(std::string_view where)> on_name_taken{};
-    /// Acts for its clients on `any:`, `all:` and the names of other nodes (docs/routing.md) where it is
-    /// `cles::routing()`. Without it these are answered `no_target`.
+    /// `cles::routing()` forwards requests of clients to `any:`, `all:` and other nodes (docs/routing.md). If null,
+    /// these fail with `no_target`.
     const detail::routing_part* routing = nullptr;
-    /// How much this node has to do, as it tells others and is weighed by for `any:`; called on the service's executor,
-    /// often, and so to be quick. Where it is empty: the handlers that have not answered, and no pool of workers.
+    /// Returns the load of this node, which is reported to others and used to balance `any:`. Called often, on the
+    /// service's executor, so it must be quick. If empty, the load is the number of unfinished handlers, without a pool
+    /// of workers.
     std::function<node_load()> load{};
     cles::limits limits{};
-    authoriser authorise{}; ///< nobody is refused where it is empty
+    authoriser authorise{}; ///< if empty, nothing is denied
     log_sink log{};
-    /// Adds what the program counts to the reply of `PULL self:cles/metrics`: called within its object, for keys and
-    /// values of other names. It must neither throw nor block.
+    /// Adds the program's own metrics to the reply of `PULL self:cles/metrics`: called inside the JSON object, for keys
+    /// that are not used yet, and their values. It must neither throw nor block.
     std::function<void(json_writer&)> metrics{};
 };
 
 namespace detail {
 
-class engine; // the service's inside
+class engine; // the implementation of the service
 
-/// What stands where a completion token is expected, and is none of the options that may come before it.
+/// A completion token, as opposed to the options that may precede it.
 template <class T>
 concept token = !std::derived_from<std::remove_cvref_t<T>, call_options>;
 
 inline const call_options no_options{};
 
-/// A body to send, or why it cannot be.
+/// A body to send, or why it cannot be sent.
 struct outgoing_body {
     std::string text{};
     boost::system::error_code wrong{};
@@ -100,7 +102,7 @@ struct outgoing {
     std::string_view body;
 };
 
-// What a cancellation slot holds of an operation.
+// Cancellation handlers of operations.
 
 struct withdrawal {
     std::weak_ptr<engine> service;
@@ -109,58 +111,59 @@ struct withdrawal {
     void operator()() const;
 };
 
-/// Of one that begins on the service's executor, while its slot is emitted on another.
+/// For an operation that starts on the service's executor while its slot is emitted on another.
 struct remote_withdrawal {
     std::weak_ptr<engine> service;
     boost::asio::any_io_executor executor; ///< the service's, on which the other members are used
-    std::shared_ptr<std::uint64_t> ticket; ///< 0 before it has begun
+    std::shared_ptr<std::uint64_t> ticket; ///< 0 until the operation has started
 
     void operator()() const;
 };
 
-/// Of an `async_bind`.
+/// For an `async_bind`.
 struct bind_withdrawal {
-    std::shared_ptr<std::weak_ptr<feed_control>> feed; ///< empty before it has begun
-    boost::asio::any_io_executor executor;             ///< the service's, where the slot is emitted on another
+    std::shared_ptr<std::weak_ptr<feed_control>> feed; ///< empty until the operation has started
+    boost::asio::any_io_executor executor;             ///< the service's, if the slot is emitted on another
 
     void operator()() const;
 };
 
 } // namespace detail
 
-/// A node of the network inside an application (paper, sections 3.3 and 3.4): it serves tasks, publishes, and asks
-/// others.
+/// A node of the network inside an application (paper, sections 3.3 and 3.4): it serves tasks, publishes, and sends
+/// requests.
 ///
-/// It runs on the executor that it is given, starts no thread and takes no lock. All functions are to be called, and
-/// all handlers are called, on that executor; where several threads run it, hand in a strand. Operations whose handler
-/// has an associated executor of its own may be begun, and withdrawn, there, as by a coroutine of another context:
-/// they hop to the service's executor, and their handlers are called on their own. The service must outlive neither
-/// its operations nor its feeds: when it goes, they fail with `stopped`.
+/// Executor. The service runs on the executor that it is given, starts no thread and takes no lock. Call all functions
+/// on that executor; all handlers are called there. If several threads run it, pass a strand. Operations whose handler
+/// has another associated executor, such as a coroutine of another context, may be started and cancelled on that
+/// executor: they are dispatched to the service's executor, and their handlers are called on their own.
 ///
-/// Of a `thread_pool` the service takes a strand itself. Then operations may be begun on any thread, and the other
-/// functions too: they run on the strand, and wait for it (on the pool's own threads, which are not to wait, they throw
-/// `would_deadlock`). `stop` and the destructor are the exception: call them on the service's executor, or when the
-/// pool has been joined.
+/// Lifetime. Operations and feeds may outlive the service: when it is destroyed, they fail with `stopped`.
 ///
-/// Failures. Operations complete with `(error_code, result)`; the peer's own words go to `call_options::diagnostics`.
-/// With `co_await` (the default token) and `use_future`, bound to an executor or not, or begun after `asio::deferred`,
-/// they throw `cles::error`, which holds code and words. A body that cannot be written as JSON completes its operation
-/// with `conversion`.
+/// Thread pools. For a `thread_pool`, the service makes a strand itself. Then operations may be started on any thread.
+/// The other functions may be called on any thread too: they run on the strand and block until done (on the pool's own
+/// threads, which must not block, they throw `would_deadlock`). Exceptions are `stop` and the destructor: call them on
+/// the service's executor, or after the pool has been joined.
 ///
-/// Cancellation. All operations honour their cancellation slot (terminal, partial, total) until they complete: the
-/// request is withdrawn at the peer and completes with `cancelled` without waiting for it.
+/// Failures. Operations complete with `(error_code, result)`; the peer's message is written to
+/// `call_options::diagnostics`. With `co_await` (the default token) and `use_future`, also if bound to an executor or
+/// started after `asio::deferred`, they throw `cles::error`, which contains code and message. If a body cannot be
+/// written as JSON, its operation fails with `conversion`.
 ///
-/// Handlers. A completion handler is never called from inside the function that began, withdrew or ended its operation
-/// (an emission, `stop`, `feed::close`, a destructor), and may do anything: throw (it comes out of the executor's
-/// `run`, as with Asio's operations, and harms no other operation; call `run` again), cancel, begin, destroy the
-/// service. What the functions of `service_options` throw is caught: `authorise` then denies, `load` and `metrics` are
-/// left out, and what `log` throws is dropped.
+/// Cancellation. All operations support cancellation (terminal, partial, total) until they complete: the request is
+/// cancelled at the peer, and completes with `cancelled` without waiting for the peer.
+///
+/// Handlers. A completion handler is never called inside the function that starts, cancels or ends its operation (an
+/// emission, `stop`, `feed::close`, a destructor). It may throw (the exception leaves the executor's `run`, as with
+/// Asio's operations, and affects no other operation; call `run` again), cancel and start operations, and destroy the
+/// service. Exceptions from the functions of `service_options` are caught: `authorise` then denies, `load` and
+/// `metrics` are left out, and what `log` throws is dropped.
 class service : public registrar {
   public:
-    /// Starts listening at once; accepting begins when the executor runs.
-    /// \throws cles::error: `invalid_name`, `invalid_url` (of a network or multicast group too), `unknown_scheme`,
-    /// `insecure_listen`, `invalid_option` (a limit, gossip), or the system's code where an address or interface cannot
-    /// be had (the message names it)
+    /// Starts listening at once; accepts links when the executor runs.
+    /// \throws cles::error: `invalid_name`, `invalid_url` (also of a network or multicast group), `unknown_scheme`,
+    /// `insecure_listen`, `invalid_option` (limits, gossip), or the system's code if an address or interface is not
+    /// available (the message names it)
     service(boost::asio::any_io_executor executor, service_options options);
     template <std::derived_from<boost::asio::execution_context> Context>
     service(Context& context, service_options options)
@@ -168,29 +171,29 @@ class service : public registrar {
     ~service() override;
 
     [[nodiscard]] const std::string& name() const noexcept;
-    /// Where it listens, as URLs with the ports that were given.
+    /// The URLs that it listens on, with the actual ports.
     [[nodiscard]] std::vector<std::string> endpoints() const;
     [[nodiscard]] const boost::asio::any_io_executor& get_executor() const noexcept;
 
-    /// Listens at one more URL and returns it as it turned out (with its port). Throws as the constructor does.
+    /// Listens on another URL and returns it with the actual port. Throws as the constructor does.
     std::string listen(std::string_view url);
-    /// Says where a node is. An empty URL forgets it.
+    /// Sets the URL of a node. An empty URL removes it.
     void set_peer(std::string_view name, std::string_view url);
-    /// Takes part in gossip from now on, with these seeds instead of those that were given before.
+    /// Starts gossip with these seeds, or replaces the seeds.
     /// \throws cles::error: `invalid_url`, `unknown_scheme`, `invalid_option`
     void set_gossip(const gossip_options& how);
-    /// The other nodes that announce themselves to the multicast group, or of which others tell, by name. Requests to
-    /// them need no URL; what `service_options::peers` and `set_peer` say goes first.
+    /// The other nodes known from multicast or gossip, by name. Requests to them need no URL; those in
+    /// `service_options::peers` and `set_peer` take precedence.
     [[nodiscard]] std::vector<peer> peers() const;
-    /// Tells the others that this node leaves: they forget its name, and no `any:` or `all:` of theirs reaches it any
-    /// more. What is asked on links that are there, or at its URL, is answered as before, so that work can be brought
-    /// to its end before `stop`, which does this too. Repeating it does nothing.
+    /// Announces that this node leaves: others forget its name, and no longer route `any:` and `all:` requests to it.
+    /// Requests on existing links, or to its URL, are still served, so work can be completed before `stop`, which calls
+    /// this too. Idempotent.
     void leave();
-    /// Ends in order, so that nobody loses a request: `leave`s, lets no more links in, answers what has been begun (for
-    /// `limit` at most; what is left is then `unavailable`) and whatever else comes with `busy`, says on each link that
-    /// what has not been answered by then has not been begun, and completes when the links have ended, a second after
-    /// that at the latest (`limits::discard`): `void(error_code)`. `stop` is to follow; where it comes before, the code
-    /// is `stopped`. Withdrawn, it waits no longer, and nothing new is begun all the same.
+    /// Shuts down gracefully: calls `leave`, accepts no more links, replies to requests that have started (for at most
+    /// `limit`; the others then fail with `unavailable`), and to new ones with `busy`. Then tells the peers that any
+    /// request without a reply has not been started, and completes when the links have ended, at most a second later
+    /// (`limits::discard`): `void(error_code)`. Call `stop` afterwards; if it is called earlier, the code is `stopped`.
+    /// Cancellation ends the wait, but new requests are still not started.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_close(std::chrono::milliseconds limit, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
@@ -205,35 +208,35 @@ class service : public registrar {
             },
             token, limit);
     }
-    /// Ends everything: listeners, links, feeds; operations fail with `stopped`, handlers that still run are told to
-    /// stop. Answers already given and updates already published are sent first, where the peer takes them at once.
-    /// Repeating it does nothing.
+    /// Ends all listeners, links and feeds. Operations fail with `stopped`, and running handlers are told to stop.
+    /// Replies and updates that are already queued are sent first, as far as the peer accepts them at once. Idempotent.
     void stop();
 
     void add(registration task) override;
     [[nodiscard]] publisher make_publisher() override;
 
-    /// Publishes a value to all that are bound to the task (or to "task/parameter/..."), and keeps it as the last one.
-    /// Opens the task for BIND. Never blocks: what a slow binder does not take in time is dropped for it, and it is
-    /// told. One alone, 100 us or more behind the last, is written in this call; those that come together are written
-    /// together, soon after, and what a handler publishes before it first waits behind an answer that it gives then.
-    /// \throws cles::error: `invalid_name`, `too_large`, `busy` (all the nouns there may be are bound, or no memory is
-    /// left), `failed` (begins like a failure, or is written while a value of the noun is), `conversion` (text that is
-    /// not UTF-8)
+    /// Publishes a value to all binders of the task (or of "task/parameter/..."), and keeps it as the last value. Also
+    /// opens the task for BIND. Never blocks: updates that a slow binder does not accept in time are dropped for that
+    /// binder, which is notified. A single update, at least 100 us after the previous one, is written in this call.
+    /// Updates in quick succession are written together, soon after. What a handler publishes before it first suspends
+    /// is written after a reply that it gives by then.
+    /// \throws cles::error: `invalid_name`, `too_large`, `busy` (the maximum number of nouns is bound, or no memory is
+    /// left), `failed` (the value begins like a failure, or is being written while another value of the noun is),
+    /// `conversion` (text that is not UTF-8)
     template <class T>
     void update(std::string_view noun, const T& value) {
         publish(noun, [&](json_writer& w) { write_json(w, value); });
     }
 
-    /// Forgets the last value of what was published there; who binds it next is answered `{}`. Those that are bound
-    /// stay bound, and have what was published before. False where there is no value.
+    /// Forgets the last value of a noun; later binders receive `{}`. Existing binders stay bound, and still receive
+    /// what was published before. False if there is no value.
     ///
-    /// A task whose nouns come and go ("session/17") need not retire them: past `limits::nouns`, or the memory that
-    /// there is for values, the nouns that nobody is bound to retire by themselves, the one used longest ago first.
+    /// Tasks whose nouns come and go ("session/17") need not call this: beyond `limits::nouns`, or the memory for
+    /// values, nouns without binders are retired automatically, least recently used first.
     bool retire(std::string_view noun);
 
-    /// Publishes once every binder's queue has room, so that nothing is dropped: `void(error_code)`. It completes when
-    /// the update is in those queues, in the order of the calls. Withdrawn before, it is not published.
+    /// Publishes when every binder's queue has room, so that nothing is dropped: `void(error_code)`. It completes when
+    /// the update is in all queues, in the order of the calls. If it is cancelled earlier, the update is not published.
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
@@ -252,8 +255,8 @@ class service : public registrar {
             token, std::string{noun}, converted([&] { return to_json(value); }));
     }
 
-    /// Any request, as a command of the language: "PULL car0:localization", "PUSH car0:notice {\"text\":\"hi\"}". The
-    /// result is the reply's JSON.
+    /// Sends any request, as a command of the language: "PULL car0:localization", "PUSH car0:notice {\"text\":\"hi\"}".
+    /// The result is the reply's JSON.
     template <detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_request(std::string_view command, Token&& token = {}) {
         return async_request(command, call_options{}, std::forward<Token>(token));
@@ -273,7 +276,7 @@ class service : public registrar {
         return initiate<T>(verb::pull, noun, {}, options, std::forward<Token>(token));
     }
 
-    /// PUSH: sends data; completes when its handler has run. Scalars travel as {"value":x}.
+    /// PUSH: sends data; completes when its handler has run. Scalars are sent as {"value":x}.
     template <class T = json_text, class B, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_push(std::string_view noun, const B& body, Token&& token = {}) {
         return initiate<T>(verb::push, noun, body_text(body), std::cref(detail::no_options),
@@ -296,7 +299,7 @@ class service : public registrar {
     }
 
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 13
-    // Chosen for a temporary aggregate that needs its destructor, in a call that is awaited.
+    // Selected for a temporary aggregate with a non-trivial destructor, in a call that is awaited.
     template <class T = json_text, detail::fragile_temporary B, class... Rest>
         requires(detail::awaited_call<Rest...>::value)
     auto async_push(std::string_view noun, B&& body, Rest&&... rest) {
@@ -317,7 +320,7 @@ class service : public registrar {
     }
 #endif
 
-    /// BIND: a feed of updates. Completes when the publisher has answered.
+    /// BIND: returns a feed of updates. Completes when the publisher has replied.
     template <class T = json_text, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_bind(std::string_view noun, Token&& token = {}) {
         return async_bind<T>(noun, bind_options{}, std::forward<Token>(token));
@@ -331,7 +334,7 @@ class service : public registrar {
             token, std::string{noun}, options);
     }
 
-    /// The blocking form, for a host without coroutines: runs the context until the answer is there. Only for an
+    /// The blocking form, for programs without coroutines: runs the context until the reply arrives. Only for an
     /// `io_context` that no other thread runs.
     /// \throws cles::error as above; `would_deadlock` inside a handler
     std::string request(std::string_view command, const call_options& options = {});
@@ -364,8 +367,8 @@ class service : public registrar {
         return detail::make_operation<operation_type>(std::move(handler), get_executor(), diagnostics);
     }
 
-    // The noun and the options are kept by the operation, which may begin later: the noun without allocation where it
-    // is short, the options as they are, or by reference where they are nobody's.
+    // The operation keeps the noun and the options, because it may start later: a short noun without allocation, and
+    // options by value, or by reference if they are the defaults.
     template <class T, class Token, class Options>
     auto initiate(cles::verb verb, std::string_view noun, detail::outgoing_body body, const Options& options,
                   Token&& token) {
@@ -402,8 +405,8 @@ class service : public registrar {
             token, std::string{command}, options);
     }
 
-    /// Whether an operation is begun on another executor than the service's: by its handler's, or, where the service
-    /// has made a strand of its own, by where this is called.
+    /// Whether an operation has to be dispatched to the service's executor: because its handler has another one, or, if
+    /// the service has made a strand, because the caller is not on it.
     template <class Operation>
     [[nodiscard]] bool hops(const Operation& operation) const noexcept {
         return operation.elsewhere() || (pooled_ && !on_strand());
@@ -416,7 +419,7 @@ class service : public registrar {
         }
     }
 
-    /// The slot's connection to an operation that begins on the service's executor, and may end before this returns.
+    /// Connects the slot to an operation that starts on the service's executor, and may end before this returns.
     template <class Slot>
     detail::remote_withdrawal hopping(Slot slot) {
         detail::remote_withdrawal withdraw{engine_, get_executor(), std::make_shared<std::uint64_t>(0)};
@@ -438,7 +441,8 @@ class service : public registrar {
 
     void fail_later(detail::pending_ptr operation, const detail::outgoing_body& why);
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
-    // These return a ticket by which the operation can be withdrawn; 0 where it has been completed or queued for it.
+    // These return a ticket with which the operation can be cancelled; 0 if it has completed or its completion is
+    // queued.
     static std::uint64_t send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
                               detail::pending_ptr operation);
     static std::uint64_t send_command(detail::engine& inside, std::string_view command, const call_options& options,
@@ -446,7 +450,7 @@ class service : public registrar {
     static std::uint64_t publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
                                            detail::pending_ptr operation);
     static std::uint64_t close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation);
-    // The same on the service's executor, where they set the ticket.
+    // The same, dispatched to the service's executor, where they set the ticket.
     void send_elsewhere(const detail::remote_withdrawal& withdraw, const detail::outgoing& request,
                         const call_options& options, detail::pending_ptr operation);
     void send_command_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& command,
@@ -462,7 +466,7 @@ class service : public registrar {
     [[nodiscard]] bool on_strand() const noexcept;
 
     std::shared_ptr<detail::engine> engine_;
-    bool pooled_; ///< it has made a strand of a pool
+    bool pooled_; ///< whether it has made a strand of a pool
 };
 
 } // namespace cles

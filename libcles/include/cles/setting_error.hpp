@@ -8,11 +8,11 @@
 
 namespace cles {
 
-/// A plugin's setting that does not do; thrown by the `check()` of its settings, or by the function that registers its
-/// tasks. The daemon's complaint then names the setting's line in the configuration.
+/// An invalid setting of a plugin; thrown by the `check()` of its settings, or by the function that registers its
+/// tasks. The daemon's error message then names the setting's line in the configuration.
 class setting_error : public error {
   public:
-    /// \param key of the setting, as "limit" or "cameras[2].rate"; empty: the settings as a whole
+    /// \param key of the setting, such as "limit" or "cameras[2].rate"; empty: the settings as a whole
     setting_error(std::string key, std::string message)
         : error(errc::conversion, std::move(message)), key_(std::move(key)) {}
 

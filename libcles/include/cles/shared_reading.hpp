@@ -7,14 +7,14 @@
 
 namespace cles::detail {
 
-/// What one body has been found to be, for all feeds that are handed it one after the other. Of values it keeps the
-/// first that is plain data, which is copied for less than it is read, and shares nothing with its copies.
+/// The result of reading one body, shared by all feeds that receive it in turn. Keeps the first value that is trivially
+/// copyable, because copying it is cheaper than reading it again, and copies share no state.
 class shared_reading {
   public:
     template <class T>
     static constexpr bool keeps = std::is_trivially_copyable_v<T>&& std::copyable<T>;
 
-    /// Null: nobody has read it as a T.
+    /// Null if no T is kept.
     template <class T>
     [[nodiscard]] const T* get() const noexcept {
         return std::any_cast<T>(&value_);

@@ -8,7 +8,7 @@
 
 namespace cles::detail {
 
-/// Text that an operation keeps until it begins: without allocation where it is as short as most nouns are.
+/// Text that an operation keeps until it starts; not allocated if it is as short as most nouns.
 class short_text {
   public:
     explicit short_text(std::string_view text) {

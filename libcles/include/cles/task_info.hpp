@@ -6,12 +6,12 @@
 
 namespace cles {
 
-/// What a task says of itself; shown by `PULL node:cles` and the `cles info` command.
+/// The description of a task; shown by `PULL node:cles` and the `cles info` command.
 struct task_info {
     std::string description{};
     std::vector<std::string> parameters{}; ///< their names, in order
-    bool idempotent = false;               ///< running it twice does no harm
-    bool inline_ok = false;                ///< in the runtime: so quick that it may run on the I/O thread
+    bool idempotent = false;               ///< running it twice has the same effect as once
+    bool inline_ok = false;                ///< in the runtime: quick enough to run on the I/O thread
 };
 
 } // namespace cles

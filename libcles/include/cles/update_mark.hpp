@@ -5,7 +5,7 @@
 
 namespace cles {
 
-/// Which update of a noun a value is: the publication's number, and the publisher's run (docs/protocol.md, "Updates").
+/// Identifies an update of a noun: its sequence number, and the publisher's run (docs/protocol.md, "Updates").
 struct update_mark {
     std::uint64_t seq = 0;
     std::uint32_t epoch = 0;

@@ -10,7 +10,7 @@ namespace cles {
 
 inline constexpr std::uint16_t default_port = 25370;
 
-/// Where a link leads, in parts.
+/// The address of a link, in parts.
 ///
 /// ```
 /// url      = ( "tcp://" / "udp://" ) host [ ":" port ] [ "?dscp=" number ] / "unix://" path / "inproc://" name
@@ -18,8 +18,8 @@ inline constexpr std::uint16_t default_port = 25370;
 /// path     = "/" ... (a socket file) / "@" ... (an abstract socket)
 /// ```
 ///
-/// The port is 25370 where none is given; 0 asks the system for a free one when listening. A DSCP (RFC 2474) is set in
-/// every packet that this end sends on the link, so that the network may treat some links better than others.
+/// The default port is 25370; port 0 makes the system choose a free one when listening. A DSCP (RFC 2474) is set in
+/// every packet that this end sends on the link, so that the network can prioritise links.
 struct url {
     std::string scheme;
     std::string host; ///< of `tcp` and `udp`, without brackets; of `inproc`, the name

@@ -5,7 +5,7 @@
 
 namespace cles {
 
-/// The library's version (semantic versioning); the protocol's own is 1.
+/// The library's version (semantic versioning). The protocol's version is 1.
 inline constexpr std::string_view version = "1.0.0";
 
 } // namespace cles

@@ -5,19 +5,21 @@
 
 namespace cles {
 
-/// Asks the kernel, for as long as it lives, to let no core of this host sleep deeper than it wakes from within a time;
-/// with zero, to let none sleep where it can do without. What waits is then answered sooner and at a steadier pace, for
-/// the power that idle cores save otherwise. It holds for all programs of the host; of several bounds the least counts.
+/// While it exists, asks the kernel to limit the idle states of all cores of this host to those from which waking takes
+/// at most a given time; with zero, to avoid idle states as far as possible. Waiting threads then react sooner and with
+/// less jitter, but idle cores save less power. This affects all programs of the host; of several limits, the least
+/// applies.
 ///
-/// The kernel goes by what the driver of its idle states says that waking takes
-/// (/sys/devices/system/cpu/cpu0/cpuidle/state*/latency): for a virtual machine, that leaves out what the host of the
-/// machine adds, so that only zero helps there; without such a driver nothing does.
+/// The kernel uses the wake-up times reported by the driver of its idle states
+/// (/sys/devices/system/cpu/cpu0/cpuidle/state*/latency). In a virtual machine, they do not include what the host of
+/// the machine adds, so only zero helps there. Without such a driver, it has no effect.
 ///
-/// Any thread may make and end it. See the Linux kernel's documentation of PM Quality of Service.
+/// May be created and destroyed on any thread. See PM Quality of Service in the Linux kernel's documentation.
 class wake_bound {
   public:
-    /// Less than zero counts as zero, more than the kernel takes (some 35 minutes) as that.
-    /// \throws std::system_error where the system refuses: it takes the right to write to /dev/cpu_dma_latency
+    /// \param longest time to wake; values below zero count as zero, values beyond the kernel's maximum (about 35
+    /// minutes) as that maximum
+    /// \throws std::system_error if the system refuses: write access to /dev/cpu_dma_latency is required
     explicit wake_bound(std::chrono::microseconds longest);
     wake_bound(const wake_bound&) = delete;
     wake_bound& operator=(const wake_bound&) = delete;

@@ -11,7 +11,7 @@
 namespace cles::detail {
 namespace {
 
-shell::local_node_options options_of(service_options&& all) {
+core::local_node_options options_of(service_options&& all) {
     return {.node = {.name = std::move(all.name),
                      .pool = std::move(all.pool),
                      .bounds = all.limits,
@@ -42,16 +42,17 @@ void engine::add(registration offered) {
     core::handler entry{.info = std::move(offered.info)};
     if (offered.plain) {
         entry.plain = [this, handler = std::move(offered.plain)](const request& r, json_writer& w) {
-            const core::turns::serving during{turns()};
+            const core::flush_scheduler::serving during{flush_scheduler()};
             handler(r, w);
         };
     }
     if (offered.async) {
         entry.start = [this, handler = std::move(offered.async),
                        self = weak()](const request& r, const std::shared_ptr<core::call>& call) {
-            // Held here too, so that what a handler throws is the answer, and not that its responder went without one.
+            // Held here too, so that the reply is the handler's exception, and not that its responder was destroyed
+            // without one.
             const auto control = std::make_shared<api::service_call>(call, executor(), self);
-            const core::turns::serving during{turns()};
+            const core::flush_scheduler::serving during{flush_scheduler()};
             try {
                 handler(r, responder{control});
             } catch (...) {
@@ -62,39 +63,40 @@ void engine::add(registration offered) {
     node().tasks.add(offered.verb, offered.task, std::move(entry));
 }
 
-std::shared_ptr<update_sink> engine::outside_updates() {
-    if (!outside_updates_) {
-        // The service outlives what is taken: it closes this when it stops.
-        outside_updates_ = std::make_shared<asio_port::outside_updates>(
+std::shared_ptr<update_sink> engine::cross_thread_updates() {
+    if (!cross_thread_updates_) {
+        // The service outlives the updates that are taken: it closes this when it stops.
+        cross_thread_updates_ = std::make_shared<asio_port::cross_thread_updates>(
             executor(),
             [weak = weak()](std::string_view noun, std::string_view json) {
                 const auto self = weak.lock();
-                if (!self) { // what was refused before has been logged, by a program that then let go of the service
+                if (!self) { // an earlier failure was logged, and the program then released the service
                     return;
                 }
                 try {
                     self->publish(noun, [json](json_writer& w) { write_text(w, json); });
                 } catch (const error& e) {
-                    self->say(log_level::warning,
-                              "an update of '" + std::string{noun} + "' was refused: " + e.message());
+                    self->write_log(log_level::warning,
+                                    "an update of '" + std::string{noun} + "' was refused: " + e.message());
                 }
             },
             [weak = weak()](std::size_t count) {
                 if (const auto self = weak.lock()) {
-                    self->say(log_level::warning,
-                              std::to_string(count) + " updates were dropped: they come faster than they go");
+                    self->write_log(log_level::warning,
+                                    std::to_string(count) +
+                                        " updates were dropped: they come faster than they can be sent");
                 }
             });
         if (stopped()) {
-            outside_updates_->close();
+            cross_thread_updates_->close();
         }
     }
-    return outside_updates_;
+    return cross_thread_updates_;
 }
 
 void engine::stop() {
-    if (outside_updates_) {
-        outside_updates_->close();
+    if (cross_thread_updates_) {
+        cross_thread_updates_->close();
     }
     local_node::stop();
 }

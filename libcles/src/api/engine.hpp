@@ -5,8 +5,8 @@
 #include <cles/service.hpp>
 
 #include "asio/asio_environment.hpp"
-#include "asio/outside_updates.hpp"
-#include "shell/local_node.hpp"
+#include "asio/cross_thread_updates.hpp"
+#include "node/local_node.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 
@@ -14,23 +14,24 @@
 
 namespace cles::detail {
 
-/// The inside of a service: a node over Asio, the handlers of the program, and its updates from other threads.
-class engine final : public shell::local_node {
+/// The implementation of a service: a node over Asio, the program's handlers, and its updates from other threads.
+class engine final : public core::local_node {
   public:
     engine(const boost::asio::any_io_executor& executor, service_options options);
 
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return asio_.executor(); }
     void add(registration offered);
-    /// Where updates go that come from other threads.
-    std::shared_ptr<update_sink> outside_updates();
+    /// Receives updates from other threads.
+    std::shared_ptr<update_sink> cross_thread_updates();
     void stop() override;
 
   private:
     engine(std::shared_ptr<asio_port::asio_environment> by, service_options options);
     [[nodiscard]] std::weak_ptr<engine> weak();
 
-    const asio_port::asio_environment& asio_;                     // the node's environment
-    std::shared_ptr<asio_port::outside_updates> outside_updates_; ///< once the program wants to publish from elsewhere
+    const asio_port::asio_environment& asio_; // the node's environment
+    std::shared_ptr<asio_port::cross_thread_updates>
+        cross_thread_updates_; ///< created when the program first publishes from other threads
 };
 
 } // namespace cles::detail

@@ -4,7 +4,7 @@
 #include <cles/reply_operation.hpp>
 
 #include "api/engine.hpp"
-#include "shell/command.hpp"
+#include "node/session/command.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -14,7 +14,7 @@ namespace cles::api {
 
 service_call::~service_call() {
     if (asked_) {
-        call_->forget_on_stop(); // which refers to this object
+        call_->forget_on_stop(); // it refers to this object
     }
     if (!call_->ended()) {
         fail(errc::failed, "the handler ended without an answer");
@@ -37,7 +37,7 @@ void service_call::on_stop(std::function<void()> callback) {
     }
 }
 
-// Calls are stopped while the library goes through all that a lost link has left.
+// Posted: calls are stopped while the library iterates over what a lost link has left.
 std::function<void()> service_call::put(std::function<void()> callback) const {
     return [host = call_->host(), callback = std::move(callback)]() mutable {
         host->completions.call(std::move(callback));
@@ -45,8 +45,8 @@ std::function<void()> service_call::put(std::function<void()> callback) const {
 }
 
 void service_call::log(log_level level, std::string_view text) {
-    if (const auto by = service_.lock()) { // else the log may have gone with it
-        call_->say(level, text);
+    if (const auto by = service_.lock()) { // otherwise the log may be gone too
+        call_->write_log(level, text);
     }
 }
 
@@ -56,16 +56,16 @@ void service_call::delegate(std::string_view command, const call_options& option
     if (!by || by->stopped()) {
         refuse(errc::stopped, "the service has been stopped");
     } else if (call_->ended()) {
-        refuse(errc::cancelled, "nobody waits for the job that asks");
+        refuse(errc::cancelled, "the requesting job has already ended");
     } else if (const auto left = std::chrono::floor<std::chrono::milliseconds>(call_->due() - by->now());
                left.count() <= 0) {
-        refuse(errc::deadline, "the job that asks has no time left");
+        refuse(errc::deadline, "the requesting job has no time left");
     } else {
         send(*by, command, options, std::move(answered), left);
     }
 }
 
-// Not from inside the call that asks: the caller may hold a lock, or not have written down yet that it has asked.
+// Not from inside the requesting call: the caller may hold a lock, or may not have recorded its request yet.
 void service_call::answer_later(answer_callback answered, errc why, const char* words) {
     boost::asio::post(executor_, [weak = weak_from_this(), answered = std::move(answered), why, words] {
         try {
@@ -104,7 +104,7 @@ void service_call::send(detail::engine& by, std::string_view command, const call
     auto chosen = options;
     chosen.diagnostics(*why);
     using operation = detail::reply_operation<json_text, false, decltype(completed)>;
-    const auto ticket = shell::send_command(
+    const auto ticket = core::send_command(
         by, command, chosen,
         detail::pending_ptr{detail::make_operation<operation>(std::move(completed), executor_, why.get())}, left);
     if (const auto found = asked_->tickets.find(key); found != asked_->tickets.end()) {
@@ -112,7 +112,7 @@ void service_call::send(detail::engine& by, std::string_view command, const call
     }
 }
 
-// The call tells one: this object, which then tells the handler too.
+// A call has one stop callback: this object takes it, and then calls the handler's.
 void service_call::follow_stop() {
     asked_->then = call_->forget_on_stop();
     call_->on_stop([this] { withdraw_asked(); });
@@ -130,7 +130,7 @@ void service_call::withdraw_asked() {
             }
         }
     };
-    // First the job's own: it is to know that it was stopped when what it asked ends for that reason.
+    // First the job's own: it must know that it was stopped when its requests fail for that reason.
     try {
         if (then) {
             then();

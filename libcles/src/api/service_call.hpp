@@ -3,7 +3,7 @@
 
 #include <cles/responder.hpp>
 
-#include "core/call.hpp"
+#include "node/session/call.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 
@@ -22,8 +22,8 @@ class engine;
 
 namespace cles::api {
 
-/// What a responder holds: the call, and the service that it came to. When the last copy goes, the call has been
-/// answered one way or another.
+/// What a responder holds: the call, and the service that received it. When the last copy is destroyed, the call has
+/// been answered one way or another.
 class service_call final : public detail::call_control, public std::enable_shared_from_this<service_call> {
   public:
     service_call(std::shared_ptr<core::call> call, boost::asio::any_io_executor executor,
@@ -44,16 +44,16 @@ class service_call final : public detail::call_control, public std::enable_share
     [[nodiscard]] boost::asio::any_io_executor executor() const override { return executor_; }
 
   private:
-    /// Requests of its own that are in flight.
+    /// Its own requests that are in flight.
     struct asked {
         std::uint64_t last = 0;
-        std::map<std::uint64_t, std::uint64_t> tickets; ///< by which they are withdrawn
-        std::function<void()> then;                     ///< the handler's own wish to be told
+        std::map<std::uint64_t, std::uint64_t> tickets; ///< for cancellation
+        std::function<void()> then;                     ///< the handler's own stop callback
     };
     void send(detail::engine& by, std::string_view command, const call_options& options, answer_callback answered,
               std::chrono::milliseconds left);
     void answer_later(answer_callback answered, errc why, const char* words);
-    /// What the handler gave, to be called as its code is.
+    /// Wraps the handler's callback so that it is called as user code.
     [[nodiscard]] std::function<void()> put(std::function<void()> callback) const;
     void follow_stop();
     void withdraw_asked();

@@ -5,8 +5,8 @@
 
 #include "asio/boottime_timer.hpp"
 #include "transport/group_port.hpp"
-#include "transport/inproc.hpp"
 #include "transport/ip_interface.hpp"
+#include "transport/transports.hpp"
 
 #include <boost/asio/execution/context.hpp>
 #include <boost/asio/post.hpp>
@@ -20,7 +20,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-/// A task as a function of the executor, which discards it where its execution context is destroyed.
+/// A task as a function of the executor, which discards it if its execution context is destroyed.
 class posted_task {
   public:
     explicit posted_task(std::shared_ptr<core::task> next) noexcept : task_(std::move(next)) {}
@@ -67,7 +67,7 @@ class asio_environment::timer : public std::enable_shared_from_this<timer> {
             }
             if (self->timer_.take()) {
                 self->due_();
-            } else { // it was set anew while this was on its way
+            } else { // it was set again while this was pending
                 self->wait();
             }
         });
@@ -93,7 +93,7 @@ void asio_environment::set_timer(time_point due) {
 }
 
 void asio_environment::stop_timer() {
-    if (timer_) { // not where making it has failed
+    if (timer_) { // null if its creation failed
         timer_->stop();
     }
 }

@@ -14,8 +14,8 @@
 
 namespace cles::asio_port {
 
-/// The environment of a node over Boost.Asio: the executor that the program gave, its clock and timer, and the
-/// transports that are registered.
+/// The environment of a node over Boost.Asio: the program's executor, its clock and timer, and the registered
+/// transports.
 class asio_environment final : public core::environment {
   public:
     explicit asio_environment(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}

@@ -27,7 +27,7 @@ int make_timer() {
 boottime_timer::boottime_timer(const boost::asio::any_io_executor& executor) : timer_(executor, make_timer()) {}
 
 void boottime_timer::set(time_point due) {
-    // A time of zero would turn it off.
+    // Zero would disarm it.
     const auto at = std::max(due.time_since_epoch(), time_point::duration{1});
     const auto whole = std::chrono::floor<std::chrono::seconds>(at);
     const itimerspec when{.it_interval = {}, .it_value = {.tv_sec = whole.count(), .tv_nsec = (at - whole).count()}};

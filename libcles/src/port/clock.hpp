@@ -5,7 +5,7 @@
 
 namespace cles::core {
 
-/// Where the time comes from when nobody passes it in, as when a handler answers. Tests set it.
+/// The time, if no caller passes it in, as when a handler replies. Tests set it.
 class clock {
   public:
     clock() = default;

@@ -28,24 +28,24 @@ class task {
     task& operator=(const task&) = delete;
     virtual ~task() = default;
     virtual void run() = 0;
-    /// It will not be run, since the environment is being destroyed.
+    /// It will not run: the environment is being destroyed.
     virtual void discard() noexcept {}
 };
 
-/// What a node needs of the world around it: time, chance, links, multicast groups. There are two: one over Boost.Asio
-/// (asio/asio_environment.hpp), and the network of the simulation.
+/// What a node needs from outside: time, randomness, links, multicast groups. There are two implementations: over
+/// Boost.Asio (asio/asio_environment.hpp), and the network of the simulation.
 ///
-/// Everything happens on one thread at a time. No callback is called from inside a call of these functions.
+/// Everything runs on one thread at a time. No callback is called from inside these functions.
 class environment : public clock {
   public:
     /// Uniformly distributed.
     virtual std::uint32_t random() = 0;
 
-    /// Runs a task when what runs now has ended; tasks run in the order of the calls. What one throws passes to the
-    /// thread that runs the environment, and the others run all the same.
+    /// Runs a task after the current one; tasks run in the order of the calls. An exception passes to the thread that
+    /// runs the environment, and the other tasks still run.
     virtual void post(std::shared_ptr<task> next) = 0;
 
-    /// The one timer: `due` is called at the time that was set last, or soon after it.
+    /// The only timer: `due` is called at the time that was set last, or soon after it.
     virtual void start_timer(std::function<void()> due) = 0;
     virtual void set_timer(time_point due) = 0;
     /// `due` is not called any more.
@@ -53,23 +53,23 @@ class environment : public clock {
 
     /// Whether there is a transport for URLs of this scheme.
     [[nodiscard]] virtual bool has_transport(std::string_view scheme) const = 0;
-    /// Whether listening there is reachable from other hosts.
+    /// Whether an endpoint there can be reached from other hosts.
     [[nodiscard]] virtual bool is_exposed(const url& where) const = 0;
-    /// \throws boost::system::system_error where the address cannot be had
+    /// \throws boost::system::system_error if the address is not available
     virtual std::unique_ptr<acceptor> listen(const url& where, const limits& bounds) = 0;
-    /// As `link_transport::dial`.
+    /// See `link_transport::dial`.
     virtual std::function<void()> dial(const url& where, const limits& bounds, dial_callback done) = 0;
 
-    /// Where nodes that share this environment find each other without a socket: the prefix of `inproc` names.
+    /// The prefix of the `inproc` names at which nodes that share this environment find each other.
     [[nodiscard]] virtual std::string local_scope() const = 0;
     /// Whether a node of this process listens at that `inproc` name.
     [[nodiscard]] virtual bool is_open(const std::string& name) const = 0;
 
-    /// The interfaces of this host. \throws boost::system::system_error where the system does not list them
+    /// The interfaces of this host. \throws boost::system::system_error if the system does not list them
     virtual std::vector<network_interface> interfaces() = 0;
-    /// \throws boost::system::system_error where there is none of that name, or it is down or has no IPv4 address
+    /// \throws boost::system::system_error if there is none of that name, or it is down or has no IPv4 address
     virtual network_interface find_interface(const std::string& name) = 0;
-    /// Joins a multicast group by an interface. \throws boost::system::system_error
+    /// Joins a multicast group on an interface. \throws boost::system::system_error
     virtual std::shared_ptr<group_port> join(const network_interface& by, const multicast_options& where) = 0;
 };
 
@@ -83,7 +83,7 @@ class function_task final : public task {
     F function_;
 };
 
-/// Posts a function, which may be movable only.
+/// Posts a function, which may be move-only.
 template <class F>
 void post(environment& by, F function) {
     by.post(std::make_shared<function_task<F>>(std::move(function)));

@@ -7,7 +7,7 @@
 namespace cles::core {
 namespace {
 
-/// Reads a number of at most `most` and what has to follow it.
+/// Parses a number of at most `most`, and `then` after it (the end, if empty).
 bool take_number(std::string_view& text, std::uint32_t most, std::string_view then, std::uint32_t& out) noexcept {
     const auto* const end = text.data() + text.size();
     const auto [rest, code] = std::from_chars(text.data(), end, out);

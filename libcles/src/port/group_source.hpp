@@ -12,12 +12,13 @@
 
 namespace cles::core {
 
-/// Who sent a datagram to the group: the IPv4 address and port of a socket that is one node's for as long as it runs.
+/// The sender of a datagram to the group: the IPv4 address and port of a socket that belongs to one node for as long as
+/// it runs.
 struct group_source {
     std::uint32_t address = 0; ///< 127.0.0.1 is 0x7f000001
     std::uint16_t port = 0;
 
-    // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the zero that comes of it for a pointer
+    // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the resulting zero for a pointer
     auto operator<=>(const group_source&) const = default;
     [[nodiscard]] bool is_loopback() const noexcept { return address >> 24U == 127; }
 };
@@ -39,7 +40,7 @@ inline std::string host_text(const group_source& s) {
 
 /// "10.0.0.2:4000"
 inline std::string to_text(const group_source& s) { return host_text(s) + ":" + std::to_string(s.port); }
-/// Reads that; nothing where it is something else.
+/// Parses that; nothing if it is anything else.
 std::optional<group_source> parse_group_source(std::string_view text) noexcept;
 
 } // namespace cles::core

@@ -11,14 +11,14 @@ namespace cles::core {
 struct network_interface {
     std::string name{};
     int index = 0;
-    std::uint32_t address = 0; ///< its first one, 127.0.0.1 as 0x7f000001; 0: it has none
+    std::uint32_t address = 0; ///< the first one; 127.0.0.1 is 0x7f000001; 0: none
     bool loopback = false;
-    bool running = false;        ///< it is up, and has a link
-    bool multicast = false;      ///< it says so of itself; loopback does not, and carries it all the same
-    bool point_to_point = false; ///< a tunnel, for one
+    bool running = false;        ///< up, and with a link
+    bool multicast = false;      ///< as the system reports it: false for loopback, which works nevertheless
+    bool point_to_point = false; ///< such as a tunnel
 };
 
-/// Those of them by which a node takes part in multicast that was told `auto` (cles/multicast.hpp): loopback first.
+/// The interfaces that a node with `auto` uses for multicast (cles/multicast.hpp): loopback first.
 std::vector<network_interface> automatic(std::vector<network_interface> all);
 
 } // namespace cles::core

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/grammar.hpp"
 
-#include "protocol/digit.hpp"
-#include "protocol/utf8.hpp"
+#include "json/characters.hpp"
 
 #include <array>
 #include <charconv>
@@ -26,7 +25,7 @@ constexpr bool in_class(char c, std::uint8_t wanted) noexcept {
 }
 
 constexpr int hex_value(char c) noexcept {
-    if (is_digit(c)) {
+    if (json_detail::is_digit(c)) {
         return c - '0';
     }
     if (c >= 'A' && c <= 'F') {
@@ -96,7 +95,7 @@ bool is_parameter(std::string_view text) noexcept {
     if (escapes) {
         std::string decoded;
         decode_parameter(text, decoded);
-        return is_utf8(decoded) && !has_control(decoded);
+        return json_detail::is_utf8(decoded) && !has_control(decoded);
     }
     return !text.empty();
 }
@@ -187,6 +186,36 @@ std::string quoted(std::string_view text) {
     out.append(text.substr(0, longest));
     out.append(text.size() > longest ? "...'" : "'");
     return out;
+}
+
+bool split_adverb(std::string_view part, adverb& out) noexcept {
+    const auto equals = part.find('=');
+    if (equals == 0 || equals == std::string_view::npos || equals + 1 == part.size()) {
+        return false;
+    }
+    out = {part.substr(0, equals), part.substr(equals + 1)};
+    for (const auto c : out.key) {
+        if (!((c >= 'a' && c <= 'z') || c == '_')) {
+            return false;
+        }
+    }
+    for (const auto c : out.value) {
+        if (c <= 0x20 || c >= 0x7F) {
+            return false;
+        }
+    }
+    return true;
+}
+
+std::optional<std::uint64_t> number_between(std::string_view text, std::uint64_t low, std::uint64_t high) noexcept {
+    const auto value = parse_number(text);
+    return value && *value >= low && *value <= high ? value : std::nullopt;
+}
+
+void append_number(std::string& out, std::uint64_t n) {
+    std::array<char, 20> digits;
+    const auto* const end = std::to_chars(digits.data(), digits.data() + digits.size(), n).ptr;
+    out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
 }
 
 } // namespace cles::protocol

@@ -8,7 +8,7 @@ namespace cles::protocol {
 namespace {
 
 constexpr std::size_t initial_capacity = 4096;
-constexpr std::size_t read_ahead = 65536; // past this, only a long line makes the buffer grow
+constexpr std::size_t read_ahead = 65536; // beyond this, only a long line makes the buffer grow
 
 } // namespace
 

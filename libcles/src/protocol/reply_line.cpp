@@ -5,7 +5,6 @@
 #include <cles/json_writer.hpp>
 
 #include "protocol/grammar.hpp"
-#include "protocol/parts.hpp"
 #include "protocol/request_line.hpp"
 
 #include <array>

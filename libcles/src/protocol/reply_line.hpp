@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-/// Replies, both directions: how one is read from a line and how it is written (docs/protocol.md).
+/// Replies, in both directions: parsing and writing (docs/protocol.md).
 
 namespace cles::protocol {
 
@@ -21,11 +21,11 @@ constexpr bool is_reply(std::string_view line) noexcept {
 struct reply_line {
     std::uint64_t id = 0; ///< 0: none
     std::optional<double> progress;
-    std::optional<update_mark> mark; ///< of a value that answers BIND
+    std::optional<update_mark> mark; ///< of a value in reply to BIND
     std::string_view body;
 };
 
-/// Reads the parts of a reply; the body is found but not validated.
+/// Parses the parts of a reply; the body is located but not validated.
 bool parse_reply(std::string_view line, reply_line& out) noexcept;
 
 /// Whether a body is a failure.
@@ -34,7 +34,7 @@ constexpr bool is_failure(std::string_view body) noexcept { return body.starts_w
 /// Whether the first key of a JSON text is `error`, however it is written: such a body might be taken for a failure.
 bool begins_with_error(std::string_view body);
 
-/// When to come again, in a `busy` whose writer has nothing better to say.
+/// For a `busy` whose writer has no better estimate.
 inline constexpr std::uint64_t default_retry_ms = 100;
 
 struct failure {
@@ -42,20 +42,20 @@ struct failure {
     std::string message;
     std::optional<std::uint64_t> retry_ms{};
     bool ran = false;
-    std::string answer{}; ///< where it is passed on: the whole body, as another node wrote it
+    std::string answer{}; ///< if it is forwarded: the complete body, as another node wrote it
 };
 
-/// Reads a failure's members; a code from a newer node counts as `failed`. False: it is not valid JSON.
+/// Parses a failure's members; an unknown code counts as `failed`. False: it is not valid JSON.
 bool parse_failure(std::string_view body, failure& out);
 
-/// Appends a failure's body: as it was written already, where it was. `ran` is written where it says something,
-/// `retry_ms` there and with `busy` always.
+/// Appends a failure's body; a forwarded one unchanged. `ran` is written if it is true, `retry_ms` if it is set, and
+/// always with `busy`.
 void append_failure(std::string& out, const failure& f);
 
 /// Appends "id=7 ", or nothing for 0.
 void append_reply_head(std::string& out, std::uint64_t id);
 
-/// "seq=17 epoch=5f3a09c1", as it stands before the value that answers BIND; empty for none.
+/// "seq=17 epoch=5f3a09c1", which precedes the value in a reply to BIND; empty for none.
 std::string mark_text(const std::optional<update_mark>& mark);
 
 /// Appends "id=7 progress=0.4 ".

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/request_line.hpp"
 
-#include "protocol/digit.hpp"
-#include "protocol/parts.hpp"
+#include "json/characters.hpp"
+#include "protocol/grammar.hpp"
 
 #include <algorithm>
 #include <array>
@@ -24,8 +24,8 @@ bool is_name_list(std::string_view text) noexcept {
 }
 
 bool is_epoch_list(std::string_view text) noexcept {
-    constexpr std::size_t each = 9; // with its comma
-    if (text.size() % each != each - 1 || text.size() > most_described * each) {
+    constexpr std::size_t each = 9; // including its comma
+    if (text.size() % each != each - 1 || text.size() > max_described * each) {
         return false;
     }
     for (;; text.remove_prefix(each)) {
@@ -41,7 +41,7 @@ bool is_epoch_list(std::string_view text) noexcept {
     }
 }
 
-/// Takes the value if it is there; false if it is not.
+/// Assigns the value if there is one; returns whether there is.
 template <class Target, class Source>
 bool take(Target& target, const std::optional<Source>& source) {
     if (source) {
@@ -128,7 +128,7 @@ bool apply(known k, std::string_view value, request_line& out) {
     case known::lease: {
         auto lease = parse_number(value);
         if (!lease && is_number(value)) {
-            lease = max_lease_ms; // too long for 64 bits, hence longer than that
+            lease = max_lease_ms; // too long for 64 bits, so the maximum
         }
         return lease && take(out.lease_ms, std::optional{std::min<std::uint64_t>(*lease, max_lease_ms)});
     }
@@ -137,7 +137,7 @@ bool apply(known k, std::string_view value, request_line& out) {
     case known::seq: out.seq = number_between(value, 1, max_id); return out.seq.has_value();
     case known::epoch: out.epoch = parse_epoch(value); return out.epoch.has_value();
     case known::via: out.via = value; return is_name_list(value);
-    case known::since: out.since = value; return value.size() <= longest_since;
+    case known::since: out.since = value; return value.size() <= max_since;
     case known::describe: out.describe = value; return is_epoch_list(value);
     case known::mark: out.wants_mark = true; return value == "yes";
     case known::none: break;
@@ -256,13 +256,25 @@ malformed_request salvage(std::string_view line) {
     if (ids != 1) {
         result.id = 0;
     }
-    if (seq && epoch) { // an update is never answered, however broken
+    if (seq && epoch) { // an update is never answered, even if it is malformed
         result.wants_reply = false;
     }
     return result;
 }
 
-void append_request(std::string& out, const request_text& request) {
+outgoing_request copy_text(const outgoing_request& request, std::string& memory) {
+    memory.clear();
+    memory.reserve(request.size());
+    memory.append(request.noun).append(request.adverbs).append(request.body);
+    const std::string_view all{memory};
+    auto copy = request;
+    copy.noun = all.substr(0, request.noun.size());
+    copy.adverbs = all.substr(request.noun.size(), request.adverbs.size());
+    copy.body = all.substr(request.noun.size() + request.adverbs.size());
+    return copy;
+}
+
+void append_request(std::string& out, const outgoing_request& request) {
     out.append(to_string(request.verb)).push_back(' ');
     out.append(request.noun);
     if (request.id != 0) {
@@ -277,7 +289,7 @@ void append_request(std::string& out, const request_text& request) {
     if (request.wants_progress) {
         out.append(" progress=yes");
     }
-    if (request.urgent) {
+    if (request.carried.urgent) {
         out.append(" urgent=yes");
     }
     if (request.lease_ms) {
@@ -314,7 +326,7 @@ std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept {
         return std::nullopt;
     }
     for (const auto c : text) {
-        const bool digit = is_digit(c);
+        const bool digit = json_detail::is_digit(c);
         if (!digit && (c < 'a' || c > 'f')) {
             return std::nullopt;
         }

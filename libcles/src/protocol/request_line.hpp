@@ -5,7 +5,6 @@
 #include <cles/verb.hpp>
 
 #include "protocol/grammar.hpp"
-#include "protocol/parts.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -13,7 +12,7 @@
 #include <string>
 #include <string_view>
 
-/// Requests, both directions: how one is read from a line and how it is written (docs/protocol.md).
+/// Requests, in both directions: parsing and writing (docs/protocol.md).
 
 namespace cles::protocol {
 
@@ -25,82 +24,119 @@ inline constexpr std::uint64_t max_keep = 65'536;
 inline constexpr std::uint64_t max_hops = 16;
 inline constexpr std::uint32_t default_lease_ms = 10'000;
 inline constexpr std::uint32_t max_lease_ms = 60'000;
-inline constexpr std::size_t longest_since = 64;
-inline constexpr std::size_t most_described = 64;
+inline constexpr std::size_t max_since = 64;
+inline constexpr std::size_t max_described = 64;
 
 constexpr std::uint32_t default_deadline(verb v) noexcept {
     return v == verb::delegate ? default_delegate_deadline_ms : default_deadline_ms;
 }
 
-/// What a line says; absent adverbs hold their defaults.
-struct request_line {
+/// The adverbs that go with a request wherever it goes: from the program that sends it to the line, from the line that
+/// is parsed to the call that replies later, and through nodes that forward it. Code in between copies them as a whole.
+struct carried_adverbs {
+    bool urgent = false;
+
+    /// These, of whatever has them.
+    [[nodiscard]] const carried_adverbs& carried() const noexcept { return *this; }
+};
+
+/// A parsed request; absent adverbs have their defaults.
+struct request_line : carried_adverbs {
     cles::verb verb = verb::pull;
     noun_view noun;
     std::uint64_t id = 0; ///< 0: none
     std::uint32_t deadline_ms = default_deadline_ms;
     bool wants_reply = true;
     bool wants_progress = false;
-    bool urgent = false;
     std::uint8_t hops = 8;
     std::optional<std::uint32_t> lease_ms;
     std::uint32_t every_ms = 0; ///< 0: every update
     std::uint32_t keep = default_keep;
-    bool wants_mark = false; ///< which update the answer to BIND bears
+    bool wants_mark = false; ///< the reply to BIND is to name the update that it holds
     std::optional<std::uint64_t> seq;
     std::optional<std::uint32_t> epoch;
     std::string_view via;
-    std::string_view since;                    ///< what has been told already
-    std::string_view describe;                 ///< epochs of runs that are to be told of in full, separated by commas
-    std::string_view body;                     ///< empty: none was given
-    std::string_view text;                     ///< the line that all this was read from
-    detail::shared_reading* reading = nullptr; ///< of the body, where others are handed the same line
+    std::string_view since;                    ///< what the requester knows already
+    std::string_view describe;                 ///< epochs of the incarnations to describe in full, separated by commas
+    std::string_view body;                     ///< empty: none
+    std::string_view text;                     ///< the whole line
+    detail::shared_reading* reading = nullptr; ///< of the body, if others receive the same line
 
     /// An update, as opposed to a request to publish.
     [[nodiscard]] bool is_update() const noexcept { return seq && epoch; }
     [[nodiscard]] bool unbinds() const noexcept { return lease_ms == 0U; }
 };
 
-/// A line that is no request, and what is known of the request that it was meant to be.
+/// A line that is not a valid request, and what is known of the request that was meant.
 struct malformed_request {
     std::string why;
     std::uint64_t id = 0;
     bool wants_reply = true;
 };
 
-/// Reads the parts of a request. The body is found but not validated, so that a caller which drops it need not pay.
+/// Parses the parts of a request. The body is located but not validated, so that a caller that drops it does not pay
+/// for it.
 bool parse_request(std::string_view line, request_line& out, malformed_request& error);
 
-/// Whether an adverb of that key has a meaning of this version on that verb.
+/// Whether this version defines an adverb of that key for that verb.
 bool is_known_adverb(std::string_view key, verb on) noexcept;
 
-/// What the parts before the body say for an answer to a line that cannot be read as a whole.
+/// What the parts before the body contain for a reply to a malformed line.
 malformed_request salvage(std::string_view line);
 
-/// What a request carries when it is written. Zero or empty means: not written.
-struct request_text {
+/// A request to send, whose text the sender owns. Zero or empty means: not written.
+struct outgoing_request {
     cles::verb verb = verb::pull;
     std::string_view noun{};
     std::uint64_t id = 0;
     std::uint32_t deadline_ms = 0;
     bool wants_reply = true;
     bool wants_progress = false;
-    bool urgent = false;
+    carried_adverbs carried{};
     std::optional<std::uint32_t> lease_ms{};
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
-    std::string_view adverbs{}; ///< further ones, as they stand on the wire
+    std::string_view adverbs{}; ///< further ones, in wire format
     std::string_view body{};
+
+    /// The node that the noun names.
+    [[nodiscard]] std::string_view target() const noexcept { return noun.substr(0, noun.find(':')); }
+    /// The size of its text, without the adverbs that have members.
+    [[nodiscard]] std::size_t size() const noexcept { return noun.size() + adverbs.size() + body.size(); }
+    /// Whether it is for the reserved task. Such requests keep a network together.
+    [[nodiscard]] bool is_reserved() const noexcept { return noun.find(":cles") != std::string_view::npos; }
 };
 
-/// Appends the request and its LF.
-void append_request(std::string& out, const request_text& request);
+/// Copies the text of a request to `memory`, which must stay where it is. Returns the request with that text.
+outgoing_request copy_text(const outgoing_request& request, std::string& memory);
 
-/// Appends an update's head, up to and without its body.
+/// Appends the request and its LF.
+void append_request(std::string& out, const outgoing_request& request);
+
+/// Appends an update's head: everything before its body.
 void append_update_head(std::string& out, std::string_view publisher, std::string_view path, std::uint64_t seq,
                         std::string_view epoch);
 
-/// Eight lower-case hex digits, both ways.
+/// Eight lower-case hex digits: parsing and formatting.
 std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept;
 std::string epoch_text(std::uint32_t epoch);
+
+/// A request that outlives the line from which it was parsed.
+class owned_request {
+  public:
+    explicit owned_request(const protocol::request_line& r) : line_(r.text) {
+        protocol::malformed_request ignored;
+        protocol::parse_request(line_, parsed_, ignored); // was valid on arrival
+    }
+    owned_request(const owned_request&) = delete;
+    owned_request& operator=(const owned_request&) = delete;
+
+    [[nodiscard]] const protocol::request_line& operator*() const noexcept { return parsed_; }
+    [[nodiscard]] const protocol::request_line* operator->() const noexcept { return &parsed_; }
+
+  private:
+    std::string line_;
+    protocol::request_line parsed_;
+};
 
 } // namespace cles::protocol

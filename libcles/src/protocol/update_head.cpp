@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/update_head.hpp"
 
-#include "protocol/digit.hpp"
+#include "json/characters.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -30,7 +30,7 @@ void update_head::remember(std::string_view line, const request_line& update) {
     }
     const auto start = number + 5;
     auto end = start;
-    while (end < head.size() && is_digit(head[end])) {
+    while (end < head.size() && json_detail::is_digit(head[end])) {
         ++end;
     }
     const auto rest = head.substr(end);
@@ -52,14 +52,14 @@ const request_line* update_head::recognise(std::string_view line) noexcept {
     }
     const auto whole = line;
     line.remove_prefix(before_.size());
-    constexpr std::size_t most_digits = 18; // longer ones are for the parser to judge
+    constexpr std::size_t max_digits = 18; // longer ones are left to the parser
     std::uint64_t seq = 0;
     std::size_t digits = 0;
-    while (digits < line.size() && digits <= most_digits && is_digit(line[digits])) {
+    while (digits < line.size() && digits <= max_digits && json_detail::is_digit(line[digits])) {
         seq = seq * 10 + static_cast<std::uint64_t>(line[digits] - '0');
         ++digits;
     }
-    if (digits == 0 || digits > most_digits || line[0] == '0' || !line.substr(digits).starts_with(after_)) {
+    if (digits == 0 || digits > max_digits || line[0] == '0' || !line.substr(digits).starts_with(after_)) {
         return nullptr;
     }
     line.remove_prefix(digits + after_.size());

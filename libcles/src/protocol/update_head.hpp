@@ -9,21 +9,21 @@
 
 namespace cles::protocol {
 
-/// The head of a publisher's updates, which from one to the next differ in their `seq` alone: recognises the next one
-/// without parsing it anew. A stream of updates is read at half the cost so.
+/// The head of a publisher's updates, of which only `seq` changes from one to the next: recognises the next one without
+/// parsing it again, which halves the cost of reading a stream of updates.
 class update_head {
   public:
-    /// Keeps the head of this line, parsed to `update`, if it is of the form that nodes write.
+    /// Remembers the head of this line, parsed to `update`, if it has the form that nodes write.
     void remember(std::string_view line, const request_line& update);
-    /// The line as parsed, if its head is the one remembered but for the `seq`; else null. Valid until the next call.
+    /// The parsed line if its head is the remembered one except for the `seq`; else null. Valid until the next call.
     [[nodiscard]] const request_line* recognise(std::string_view line) noexcept;
     void forget() noexcept { before_.clear(); }
 
   private:
     std::string before_;                   // "UPDATE car1:localization seq="
     std::string after_;                    // " epoch=5f3a09c1 "
-    std::string text_;                     // what `update_` looks into
-    std::unique_ptr<request_line> update_; // big, and most links take no updates
+    std::string text_;                     // what `update_` points into
+    std::unique_ptr<request_line> update_; // large, and most links receive no updates
 };
 
 } // namespace cles::protocol

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/group_port.hpp"
 
-#include "transport/group_socket_option.hpp"
-#include "transport/source_filter.hpp"
+#include "transport/multicast_socket.hpp"
 
 #include <boost/asio/error.hpp>
 
@@ -19,9 +18,9 @@ group_port::group_port(const asio::any_io_executor& executor, const core::networ
     own_.bind({asio::ip::address_v4{by.address}, 0});
     set_ip_option(own_, IP_MULTICAST_IF, membership(group_, by.index));
     set_ip_option(own_, IP_MULTICAST_TTL, 1);
-    set_ip_option(own_, IP_MULTICAST_LOOP, 1); // other nodes of this host hear it too
+    set_ip_option(own_, IP_MULTICAST_LOOP, 1); // for other nodes of this host
     own_.non_blocking(true);
-    drop_all(own_); // nobody reads there
+    drop_all(own_); // nothing reads from it
     source_ = source_of(own_.local_endpoint());
 }
 
@@ -55,7 +54,7 @@ core::lines_done group_port::send(std::string_view lines) {
     }
     while (taken.bytes < lines.size()) {
         const auto line = lines.substr(taken.bytes, lines.find('\n', taken.bytes) + 1 - taken.bytes);
-        if (unsent() + line.size() > most_waiting) {
+        if (unsent() + line.size() > max_waiting) {
             break;
         }
         waiting_.append(line);

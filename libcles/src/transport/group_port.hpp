@@ -5,7 +5,7 @@
 
 #include "port/group_port.hpp"
 #include "port/network_interface.hpp"
-#include "transport/datagram_burst.hpp"
+#include "transport/datagram_io.hpp"
 #include "transport/group_receiver.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
@@ -18,13 +18,13 @@
 
 namespace cles::transport {
 
-/// A place in a multicast group over UDP: receives by a socket that nodes on one executor share, and sends from one of
-/// its own.
+/// An endpoint in a multicast group over UDP: receives through a socket that nodes on one executor share, and sends
+/// through its own.
 class group_port final : public core::group_port, public std::enable_shared_from_this<group_port> {
   public:
     using udp = boost::asio::ip::udp;
 
-    /// Joins. \throws boost::system::system_error
+    /// Joins the group. \throws boost::system::system_error
     group_port(const boost::asio::any_io_executor& executor, const core::network_interface& by,
                const multicast_options& where);
 
@@ -34,7 +34,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     void close() override;
     [[nodiscard]] const core::group_source& source() const noexcept override { return source_; }
 
-    static constexpr std::size_t most_waiting = 1U << 16U;
+    static constexpr std::size_t max_waiting = 1U << 16U;
 
   private:
     void send_rest();
@@ -44,7 +44,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     core::group_source source_;
     std::shared_ptr<group_receiver> receiver_;
     udp::socket own_;
-    datagram_burst burst_;
+    send_batch burst_;
     core::group_listener* owner_ = nullptr; // null: closed
     std::string waiting_;
     std::size_t waiting_at_ = 0;

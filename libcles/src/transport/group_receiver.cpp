@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/group_receiver.hpp"
 
-#include "protocol/group_message.hpp"
-#include "transport/group_socket_option.hpp"
-#include "transport/source_filter.hpp"
+#include "protocol/datagram.hpp"
+#include "transport/multicast_socket.hpp"
 
 #include <boost/asio/execution/context.hpp>
 #include <boost/asio/execution_context.hpp>
@@ -19,7 +18,7 @@ using boost::system::error_code;
 
 namespace {
 
-/// Those of one context.
+/// The receivers of one context.
 class group_receivers final : public asio::execution_context::service {
   public:
     using key_type = group_receivers;
@@ -64,17 +63,17 @@ group_receiver::group_receiver(const asio::any_io_executor& executor, const core
                                const udp::endpoint& group)
     : group_(group), interface_(by.index), socket_(executor, udp::v4()) {
     socket_.set_option(asio::socket_base::reuse_address{true});
-    set_ip_option(socket_, IP_MULTICAST_ALL, 0); // else it receives groups that other programs have joined
+    set_ip_option(socket_, IP_MULTICAST_ALL, 0); // otherwise it receives groups that other programs have joined
     socket_.bind(group_);
     set_ip_option(socket_, IP_ADD_MEMBERSHIP, membership(group_, interface_));
     socket_.non_blocking(true);
     error_code ignored;
-    constexpr int room = 1 << 20; // a burst waits here while others have their turn
+    constexpr int room = 1 << 20; // a burst waits here while other tasks run
     socket_.set_option(asio::socket_base::receive_buffer_size{room}, ignored);
-    datagram_batch::keep_together(socket_);
+    receive_batch::enable_gro(socket_);
 }
 
-// Only its own executor may ask whether the socket is open; from others the executor differs.
+// Only its own executor may check whether the socket is open; for others, the first comparison fails.
 bool group_receiver::is_for(const asio::any_io_executor& executor, const core::network_interface& by,
                             const udp::endpoint& group) {
     return socket_.get_executor() == executor && interface_ == by.index && group_ == group && socket_.is_open();
@@ -82,9 +81,9 @@ bool group_receiver::is_for(const asio::any_io_executor& executor, const core::n
 
 void group_receiver::add(core::group_listener& listener, const core::group_source& source) {
     listeners_.push_back({&listener, source});
-    ++hearing_;
+    ++active_listeners_;
     filter();
-    if (hearing_ == 1) {
+    if (active_listeners_ == 1) {
         receive();
     }
 }
@@ -95,12 +94,12 @@ void group_receiver::remove(const core::group_listener& listener) {
     if (found == listeners_.end()) {
         return;
     }
-    if (telling_) {
-        found->events = nullptr; // the others keep their places
+    if (delivering_) {
+        found->events = nullptr; // the others keep their indices
     } else {
         listeners_.erase(found);
     }
-    if (--hearing_ == 0) {
+    if (--active_listeners_ == 0) {
         error_code ignored;
         socket_.close(ignored);
     } else {
@@ -108,9 +107,9 @@ void group_receiver::remove(const core::group_listener& listener) {
     }
 }
 
-// What one sends the others are to hear.
+// Several listeners receive each other's datagrams; a single one need not receive its own.
 void group_receiver::filter() {
-    if (hearing_ == 1) {
+    if (active_listeners_ == 1) {
         const auto alone =
             std::find_if(listeners_.begin(), listeners_.end(), [](const auto& each) { return each.events != nullptr; });
         drop_from(socket_, {asio::ip::address_v4{alone->source.address}, alone->source.port});
@@ -123,70 +122,68 @@ void group_receiver::receive() {
     socket_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
         if (!code) {
             self->more_ = true;
-            self->next_ = self->listeners_.size(); // the number may be another by now
-            self->hand_over();
+            self->next_ = self->listeners_.size(); // their number may have changed
+            self->deliver();
         }
     });
 }
 
-void group_receiver::go_on_soon() {
-    asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
+void group_receiver::continue_soon() {
+    asio::post(socket_.get_executor(), [self = shared_from_this()] { self->deliver(); });
 }
 
-// The program's handlers run in it. So each listener is given what has come in a function of its own, and what one does
-// there, or throws, is done before the next is called; a single listener is given the next at once, up to a number.
-void group_receiver::hand_over() {
-    constexpr std::size_t most = 256; // about, since fetches count as well; then others have their turn
-    telling_ = true;
+// User handlers run inside. So each listener receives what has arrived in a posted function of its own, and what it
+// does there, or throws, is finished before the next is called. A single listener receives the next at once, up to a
+// number.
+void group_receiver::deliver() {
+    constexpr std::size_t most = 256; // approximate, since fetches count as well
+    delivering_ = true;
     try {
-        for (std::size_t told = 0; told < most; told += heard_.size() + 1) {
+        for (std::size_t delivered = 0; delivered < most; delivered += received_.size() + 1) {
             if (next_ == listeners_.size() && !fetch()) {
-                telling_ = false;
-                if (hearing_ != 0) {
+                delivering_ = false;
+                if (active_listeners_ != 0) {
                     receive();
                 }
                 return;
             }
-            tell_next();
+            deliver_to_next();
             if (listeners_.size() > 1 && (next_ != listeners_.size() || more_)) {
                 break;
             }
         }
-    } catch (...) { // a handler's, for the thread that runs the context; what else has come is not affected
-        go_on_soon();
+    } catch (...) { // of a handler, for the thread that runs the context; other datagrams are not affected
+        continue_soon();
         throw;
     }
-    go_on_soon();
+    continue_soon();
 }
 
-// All have heard what was there. False: no more is.
+// All listeners have received everything fetched. Returns false if there is no more.
 bool group_receiver::fetch() {
     std::erase_if(listeners_, [](const auto& each) { return each.events == nullptr; });
-    heard_.clear();
-    const bool may = more_ && hearing_ != 0;
+    received_.clear();
+    const bool may = more_ && active_listeners_ != 0;
     next_ = may ? 0 : listeners_.size();
     if (may) {
         more_ = arrived_.fetch(socket_);
         while (!arrived_.empty()) {
             const auto one = arrived_.take();
-            auto& kept = heard_.emplace_back(heard{.from = source_of(one.from), .text = one.text});
-            kept.good = protocol::parse_group_message(kept.text, kept.said);
+            auto& kept = received_.emplace_back(received_datagram{.from = source_of(one.from), .text = one.text});
+            kept.good = protocol::parse_group_message(kept.text, kept.request);
         }
     }
     return may;
 }
 
-void group_receiver::tell_next() {
-    const auto events = [this] { return listeners_[next_].events; };
-    while (at_ != heard_.size() && events() != nullptr) {
-        auto& one = heard_[at_++];
-        one.said.reading = hearing_ > 1 ? &one.reading : nullptr;
-        events()->on_datagram({one.from, one.text, one.good ? &one.said : nullptr});
+void group_receiver::deliver_to_next() {
+    while (at_ != received_.size() && listeners_[next_].events != nullptr) {
+        auto& one = received_[at_++];
+        one.request.reading = active_listeners_ > 1 ? &one.reading : nullptr;
+        listeners_[next_].events->on_datagram({one.from, one.text, one.good ? &one.request : nullptr});
     }
     at_ = 0;
-    if (auto* const told = listeners_[next_++].events; told != nullptr) {
-        told->on_batch();
-    }
+    ++next_;
 }
 
 } // namespace cles::transport

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "transport/inproc.hpp"
-
 #include <cles/error.hpp>
 
 #include "transport/inproc_link.hpp"
+#include "transport/transports.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
@@ -20,23 +19,23 @@ namespace asio = boost::asio;
 namespace {
 
 // Where dialling threads leave their links for a listener.
-class doorway : public std::enable_shared_from_this<doorway> {
+class inproc_listener : public std::enable_shared_from_this<inproc_listener> {
   public:
-    doorway(asio::any_io_executor executor, url address, const limits& bounds)
+    inproc_listener(asio::any_io_executor executor, url address, const limits& bounds)
         : local(std::move(address)), executor_(std::move(executor)), bounds_(bounds) {}
 
     const url local;
 
     void open(std::function<void(link_ptr)> on_link) { on_link_ = std::move(on_link); }
 
-    // The executor's context may go from now on.
+    // From now on, the executor's context may be destroyed.
     void shut() {
         const std::lock_guard lock{mutex_};
         executor_ = nullptr;
         on_link_ = nullptr;
     }
 
-    // By any thread; false where the door has been shut.
+    // Called on any thread. Returns false if it has been shut.
     bool admit(const std::shared_ptr<inproc_link>& near) {
         const std::lock_guard lock{mutex_};
         if (!executor_) {
@@ -63,55 +62,55 @@ class doorway : public std::enable_shared_from_this<doorway> {
     std::function<void(link_ptr)> on_link_; // used on the executor only
 };
 
-// The listeners of the process by name; services may be made on several threads.
-class doorways {
+// The listeners of the process by name; services may be created on several threads.
+class inproc_listeners {
   public:
-    bool add(const std::shared_ptr<doorway>& door) {
+    bool add(const std::shared_ptr<inproc_listener>& listener) {
         const std::lock_guard lock{mutex_};
-        auto& place = doors_[door->local.host];
+        auto& place = listeners_[listener->local.host];
         if (!place.expired()) {
             return false;
         }
-        place = door;
+        place = listener;
         return true;
     }
-    void remove(const std::shared_ptr<doorway>& door) {
+    void remove(const std::shared_ptr<inproc_listener>& listener) {
         const std::lock_guard lock{mutex_};
-        const auto found = doors_.find(door->local.host);
-        if (found != doors_.end() && found->second.lock() == door) {
-            doors_.erase(found);
+        const auto found = listeners_.find(listener->local.host);
+        if (found != listeners_.end() && found->second.lock() == listener) {
+            listeners_.erase(found);
         }
     }
-    std::shared_ptr<doorway> find(const std::string& name) {
+    std::shared_ptr<inproc_listener> find(const std::string& name) {
         const std::lock_guard lock{mutex_};
-        const auto found = doors_.find(name);
-        return found == doors_.end() ? nullptr : found->second.lock();
+        const auto found = listeners_.find(name);
+        return found == listeners_.end() ? nullptr : found->second.lock();
     }
 
   private:
     std::mutex mutex_;
-    std::map<std::string, std::weak_ptr<doorway>> doors_;
+    std::map<std::string, std::weak_ptr<inproc_listener>> listeners_;
 };
 
-doorways& all_doorways() {
-    static doorways instance;
+inproc_listeners& all_inproc_listeners() {
+    static inproc_listeners instance;
     return instance;
 }
 
 class inproc_acceptor final : public acceptor {
   public:
-    explicit inproc_acceptor(std::shared_ptr<doorway> door) : door_(std::move(door)) {}
+    explicit inproc_acceptor(std::shared_ptr<inproc_listener> listener) : listener_(std::move(listener)) {}
     ~inproc_acceptor() override { close(); }
 
-    [[nodiscard]] url local() const override { return door_->local; }
-    void start(std::function<void(link_ptr)> on_link) override { door_->open(std::move(on_link)); }
+    [[nodiscard]] url local() const override { return listener_->local; }
+    void start(std::function<void(link_ptr)> on_link) override { listener_->open(std::move(on_link)); }
     void close() override {
-        all_doorways().remove(door_);
-        door_->shut();
+        all_inproc_listeners().remove(listener_);
+        listener_->shut();
     }
 
   private:
-    std::shared_ptr<doorway> door_;
+    std::shared_ptr<inproc_listener> listener_;
 };
 
 class inproc_transport final : public link_transport {
@@ -120,18 +119,18 @@ class inproc_transport final : public link_transport {
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
-        auto door = std::make_shared<doorway>(executor, where, bounds);
-        if (!all_doorways().add(door)) {
+        auto listener = std::make_shared<inproc_listener>(executor, where, bounds);
+        if (!all_inproc_listeners().add(listener)) {
             throw boost::system::system_error{asio::error::address_in_use};
         }
-        return std::make_unique<inproc_acceptor>(std::move(door));
+        return std::make_unique<inproc_acceptor>(std::move(listener));
     }
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
         auto near = std::make_shared<inproc_link>(executor, to_string(where), bounds);
-        const auto door = all_doorways().find(where.host);
-        if (!door || !door->admit(near)) {
+        const auto listener = all_inproc_listeners().find(where.host);
+        if (!listener || !listener->admit(near)) {
             near->close();
             near.reset();
         }
@@ -153,7 +152,7 @@ class inproc_transport final : public link_transport {
 
 } // namespace
 
-bool is_open(const std::string& name) { return all_doorways().find(name) != nullptr; }
+bool is_open(const std::string& name) { return all_inproc_listeners().find(name) != nullptr; }
 
 std::unique_ptr<link_transport> make_inproc() { return std::make_unique<inproc_transport>(); }
 

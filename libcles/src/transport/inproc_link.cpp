@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/inproc_link.hpp"
 
-#include "transport/turn.hpp"
+#include "transport/transports.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
@@ -19,23 +19,23 @@ inproc_link::inproc_link(asio::any_io_executor executor, std::string address, co
                                             .name = {},
                                             .uid = {},
                                             .local = true},
-      bounds_(bounds), inlet_(std::make_shared<mailbox>(executor_)), patience_(executor_) {}
+      bounds_(bounds), own_mailbox_(std::make_shared<mailbox>(executor_)), timeout_(executor_) {}
 
 inproc_link::~inproc_link() { inproc_link::close(); }
 
 void inproc_link::join(const std::shared_ptr<inproc_link>& a, const std::shared_ptr<inproc_link>& b) {
     a->other_ = b;
     b->other_ = a;
-    a->outlet_ = b->inlet_;
-    b->outlet_ = a->inlet_;
+    a->peer_mailbox_ = b->own_mailbox_;
+    b->peer_mailbox_ = a->own_mailbox_;
 }
 
 template <class F>
-void inproc_link::tell_other(F action) {
-    if (!outlet_) {
+void inproc_link::post_to_peer(F action) {
+    if (!peer_mailbox_) {
         return;
     }
-    outlet_->post([weak = other_, action = std::move(action)]() mutable {
+    peer_mailbox_->post([weak = other_, action = std::move(action)]() mutable {
         if (const auto other = weak.lock()) {
             action(*other);
         }
@@ -50,8 +50,8 @@ void inproc_link::start(std::shared_ptr<link_events> owner) {
     if (state_ == state::fresh) {
         state_ = state::open;
     }
-    gone_ = gone_ || other_.expired();
-    if (!inbox_.empty() || ended_ || gone_) {
+    peer_closed_ = peer_closed_ || other_.expired();
+    if (!inbox_.empty() || ended_ || peer_closed_) {
         continue_later();
     }
 }
@@ -62,14 +62,14 @@ void inproc_link::flush() {
     if (state_ == state::closed || state_ == state::finishing || output_.empty()) {
         return;
     }
-    if (gone_) { // told later: the owner may be in the middle of something
+    if (peer_closed_) { // reported later: the owner may be in the middle of something
         output_.clear();
         lose_later();
         return;
     }
     in_transit_ += output_.size();
     flushed_ += output_.size();
-    tell_other([lines = std::exchange(output_, {})](inproc_link& other) mutable { other.receive(std::move(lines)); });
+    post_to_peer([lines = std::exchange(output_, {})](inproc_link& other) mutable { other.receive(std::move(lines)); });
 }
 
 void inproc_link::consumed(std::size_t bytes) {
@@ -79,7 +79,7 @@ void inproc_link::consumed(std::size_t bytes) {
         return;
     }
     if (state_ == state::finishing) {
-        wait_for_goodbye();
+        wait_for_peer_close();
     } else if (const auto owner = owner_) {
         owner->on_room();
     }
@@ -100,16 +100,16 @@ void inproc_link::receive(std::string lines) {
     hand_over();
 }
 
-// Lets the other end know that this much has been read.
+// Notifies the other end that this much has been read.
 void inproc_link::release(std::size_t bytes) {
     if (bytes != 0 && state_ != state::closed) {
-        tell_other([bytes](inproc_link& other) { other.consumed(bytes); });
+        post_to_peer([bytes](inproc_link& other) { other.consumed(bytes); });
     }
 }
 
 void inproc_link::discard_input() {
     if (handing_) {
-        return; // a line of it is being looked at, further up the stack
+        return; // a line of it is being processed further up the stack
     }
     auto bytes = text_.size();
     for (const auto& text : inbox_) {
@@ -121,7 +121,7 @@ void inproc_link::discard_input() {
     release(bytes);
 }
 
-// Makes the next text the one that lines are taken from; false where none is left.
+// Makes the next text the current one. Returns false if none is left.
 bool inproc_link::next_text() {
     if (read_at_ < text_.size()) {
         return true;
@@ -130,7 +130,7 @@ bool inproc_link::next_text() {
     text_.clear();
     read_at_ = 0;
     if (inbox_.empty()) {
-        std::string{}.swap(text_); // which came with its memory
+        std::string{}.swap(text_); // frees its memory
         return false;
     }
     text_ = std::move(inbox_.front());
@@ -141,8 +141,8 @@ bool inproc_link::next_text() {
 void inproc_link::hand_over_batch() {
     const auto owner = owner_;
     hand_over_lines();
-    if (state_ == state::open && ended_ && !told_end_ && !overlong_ && !paused_ && drained()) {
-        told_end_ = true;
+    if (state_ == state::open && ended_ && !end_reported_ && !overlong_ && !paused_ && drained()) {
+        end_reported_ = true;
         owner->on_end();
     }
     if (state_ != state::closed) {
@@ -173,7 +173,7 @@ void inproc_link::hand_over() {
     handing_ = true;
     try {
         hand_over_batch();
-    } catch (...) { // a handler's, for the thread that runs the context; the other lines are not affected
+    } catch (...) { // of a handler, for the thread that runs the context; the other lines are not affected
         handing_ = false;
         continue_later();
         throw;
@@ -186,7 +186,7 @@ void inproc_link::hand_over() {
     } else if (drained()) {
         next_text(); // releases the last one
     }
-    if (gone_ && state_ == state::open && (overlong_ || (!paused_ && drained()))) {
+    if (peer_closed_ && state_ == state::open && (overlong_ || (!paused_ && drained()))) {
         lose();
     }
 }
@@ -223,17 +223,17 @@ void inproc_link::finish() {
     flush();
     state_ = state::finishing;
     discard_input();
-    tell_other([](inproc_link& other) { other.on_other_finished(); });
-    if (ended_ || gone_) {
+    post_to_peer([](inproc_link& other) { other.on_other_finished(); });
+    if (ended_ || peer_closed_) {
         lose_later();
     } else if (on_its_way() == 0) {
-        wait_for_goodbye();
+        wait_for_peer_close();
     }
 }
 
-void inproc_link::wait_for_goodbye() {
-    patience_.expires_after(bounds_.discard);
-    patience_.async_wait([self = shared_from_this()](boost::system::error_code code) {
+void inproc_link::wait_for_peer_close() {
+    timeout_.expires_after(bounds_.discard);
+    timeout_.async_wait([self = shared_from_this()](boost::system::error_code code) {
         if (!code) {
             self->lose();
         }
@@ -249,9 +249,9 @@ void inproc_link::on_other_finished() {
     }
 }
 
-// What the other end said before it closed is still handed over, unless that could take for ever.
+// What the other end sent before it closed is still delivered, unless that could take for ever.
 void inproc_link::on_other_closed() {
-    gone_ = true;
+    peer_closed_ = true;
     const bool held_back = paused_ && unsent() != 0;
     if (state_ == state::finishing || (state_ == state::open && (overlong_ || held_back))) {
         lose();
@@ -280,11 +280,11 @@ void inproc_link::close() {
         return;
     }
     state_ = state::closed;
-    patience_.cancel();
+    timeout_.cancel();
     discard_input();
     owner_.reset();
-    inlet_->shut();
-    tell_other([](inproc_link& other) { other.on_other_closed(); });
+    own_mailbox_->shut();
+    post_to_peer([](inproc_link& other) { other.on_other_closed(); });
 }
 
 } // namespace cles::transport

@@ -3,8 +3,10 @@
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/post.hpp>
 
 #include <string>
+#include <utility>
 
 namespace cles::transport {
 namespace asio = boost::asio;
@@ -36,6 +38,42 @@ asio::ip::address resolve(const url& where, error_code& code) {
         code = asio::error::host_not_found;
     }
     return code ? asio::ip::address{} : addresses.front();
+}
+
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+void host_lookup::start(const url& where, std::chrono::milliseconds within, callback done) {
+    done_ = std::move(done);
+    if (const auto literal = literal_address(where)) {
+        asio::post(resolver_.get_executor(),
+                   [self = shared_from_this(), address = *literal] { self->end({}, {address}); });
+        return;
+    }
+    timeout_.expires_after(within);
+    timeout_.async_wait([self = shared_from_this()](error_code code) {
+        if (!code) {
+            self->end(asio::error::timed_out, {});
+        }
+    });
+    resolver_.async_resolve(where.host, "",
+                            [self = shared_from_this()](error_code code, asio::ip::tcp::resolver::results_type found) {
+                                self->end(code, addresses_of(found));
+                            });
+}
+
+void host_lookup::end(error_code code, const std::vector<asio::ip::address>& found) {
+    const auto done = std::move(done_);
+    give_up();
+    if (done) {
+        done(!code && found.empty() ? asio::error::host_not_found : code, found);
+    }
+}
+
+void host_lookup::give_up() {
+    done_ = nullptr;
+    resolver_.cancel();
+    timeout_.cancel();
 }
 
 } // namespace cles::transport

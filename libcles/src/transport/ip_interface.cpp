@@ -21,7 +21,7 @@ namespace {
 
 [[noreturn]] void refuse(int code) { throw boost::system::system_error{code, boost::system::system_category()}; }
 
-/// What the kernel is asked about interfaces with.
+/// Asks the kernel about an interface.
 class query {
   public:
     explicit query(const std::string& name) : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
@@ -83,7 +83,7 @@ std::vector<core::network_interface> interfaces_of_host() {
     for (const auto* entry = first; entry != nullptr; entry = entry->ifa_next) {
         const auto index = static_cast<int>(::if_nametoindex(entry->ifa_name));
         auto at = std::find_if(all.begin(), all.end(), [&](const auto& each) { return each.index == index; });
-        if (index != 0 && at == all.end()) { // an alias has the number of its interface
+        if (index != 0 && at == all.end()) { // an alias has the index of its interface
             at = all.insert(at, {.name = entry->ifa_name, .index = index});
             take_flags(*at, entry->ifa_flags);
         }

@@ -8,10 +8,10 @@
 
 namespace cles::transport {
 
-/// \throws boost::system::system_error where there is none of that name, or it is down or has no IPv4 address
+/// \throws boost::system::system_error if there is none of that name, or it is down or has no IPv4 address
 core::network_interface find_interface(const std::string& name);
 
-/// All there are, by their numbers. \throws boost::system::system_error where the system does not say
+/// All interfaces, by index. \throws boost::system::system_error if the system does not list them
 std::vector<core::network_interface> interfaces_of_host();
 
 } // namespace cles::transport

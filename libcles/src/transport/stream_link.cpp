@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/stream_link.hpp"
 
-#include "transport/turn.hpp"
+#include "transport/transports.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
@@ -17,18 +17,18 @@ using boost::system::error_code;
 
 namespace {
 
-constexpr std::size_t bytes_per_turn = 65536; // of what is written in answer
-constexpr std::size_t piece = 65536;          // sent as one, before what is urgent has another chance
-constexpr std::size_t roomy = 262144;         // buffers that grew past this are given back
+constexpr std::size_t bytes_per_turn = 65536; // of what is written in reply
+constexpr std::size_t piece = 65536;          // sent as one, before urgent output may pass
+constexpr std::size_t roomy = 262144;         // larger buffers are released
 
-// Assigning an empty string keeps the memory.
+// Assigning an empty string would keep the memory.
 void release(std::string& text) noexcept { std::string{}.swap(text); }
 
 } // namespace
 
 stream_link::stream_link(socket_type socket, identity peer, const limits& bounds)
     : socket_(std::move(socket)), peer_(std::move(peer)), bounds_(bounds), input_(bounds.line),
-      patience_(socket_.get_executor()) {
+      timeout_(socket_.get_executor()) {
     error_code ignored;
     socket_.non_blocking(true, ignored);
 }
@@ -96,7 +96,7 @@ void stream_link::hand_over() {
     bool more = true;
     try {
         more = hand_over_batch();
-    } catch (...) { // a handler's, for the thread that runs the context; the other lines are not affected
+    } catch (...) { // of a handler, for the thread that runs the context; the other lines are not affected
         handing_ = false;
         continue_later();
         throw;
@@ -113,7 +113,7 @@ void stream_link::hand_over() {
     }
 }
 
-// True where lines may be left.
+// Returns true if lines may be left.
 bool stream_link::hand_over_batch() {
     const auto owner = owner_;
     int turn = lines_per_turn;
@@ -131,8 +131,8 @@ bool stream_link::hand_over_batch() {
         case protocol::line_buffer::status::need_more: more = false; break;
         }
     }
-    if (state_ == state::open && !more && ended_ && !told_end_ && !overlong_) {
-        told_end_ = true;
+    if (state_ == state::open && !more && ended_ && !end_reported_ && !overlong_) {
+        end_reported_ = true;
         if (const auto rest = input_.unfinished(); !rest.empty()) {
             owner->on_cut(rest);
         }
@@ -140,7 +140,7 @@ bool stream_link::hand_over_batch() {
             owner->on_end();
         }
         if (state_ == state::open) {
-            watch_for_hang_up();
+            watch_for_hangup();
         }
     }
     if (state_ != state::closed) {
@@ -149,7 +149,7 @@ bool stream_link::hand_over_batch() {
     return more;
 }
 
-// Lines are left, but other links have their turn first.
+// Lines are left, but other links are served first.
 void stream_link::continue_later() {
     if (!posted_) {
         posted_ = true;
@@ -192,7 +192,7 @@ void stream_link::flush() {
     error_code code;
     const auto count = socket_.send(asio::buffer(output_), 0, code);
     if (code && code != asio::error::would_block) {
-        // Told later: the owner may be in the middle of something, and may have read what explains it by then.
+        // Reported later: the owner may be in the middle of something, and may read the explanation before that.
         asio::post(socket_.get_executor(), [self = shared_from_this(), code] { self->lose(code); });
         output_.clear();
         return;
@@ -210,7 +210,7 @@ void stream_link::flush() {
     write_rest();
 }
 
-// As far as to the end of a line, where what is urgent may pass: of this one, if it waits already.
+// Up to the end of a line, where urgent output may pass: of the current line, if such output is pending already.
 void stream_link::write_rest() {
     const auto line = sending_.find('\n', sending_at_ + (urgent_.empty() ? piece : 0));
     const auto end = line == std::string::npos ? sending_.size() : line + 1;
@@ -251,7 +251,7 @@ void stream_link::on_written(error_code code, std::size_t count) {
         return;
     }
     if (state_ == state::finishing) {
-        say_goodbye();
+        shut_down_output();
     } else if (const auto owner = owner_) {
         owner->on_room();
     }
@@ -259,7 +259,7 @@ void stream_link::on_written(error_code code, std::size_t count) {
 
 // -- memory --------------------------------------------------------------------------------------------------------
 
-// The read that waits holds the input's buffer, and is begun anew with a smaller one.
+// The pending read holds the input's buffer; it is restarted with a smaller one.
 void stream_link::shrink() {
     if (state_ != state::open || !sending_.empty() || handing_) {
         return;
@@ -282,7 +282,7 @@ void stream_link::shrink() {
 
 // -- ending --------------------------------------------------------------------------------------------------------
 
-void stream_link::watch_for_hang_up() {
+void stream_link::watch_for_hangup() {
     socket_.async_wait(socket_type::wait_error, [self = shared_from_this()](error_code code) {
         if (!code && self->state_ != state::closed) {
             self->on_error_condition();
@@ -290,7 +290,8 @@ void stream_link::watch_for_hang_up() {
     });
 }
 
-// It may be urgent data, which means nothing here. That stays, so there is no more waiting: a write shows what is next.
+// It may be urgent data, which means nothing here. The condition persists, so this stops waiting; a write shows further
+// errors.
 void stream_link::on_error_condition() {
     pollfd now{.fd = socket_.native_handle(), .events = 0, .revents = 0};
     if (::poll(&now, 1, 0) > 0 && (now.revents & (POLLERR | POLLHUP)) != 0) {
@@ -305,18 +306,18 @@ void stream_link::finish() {
     flush();
     state_ = state::finishing;
     if (sending_.empty()) {
-        say_goodbye();
+        shut_down_output();
     } else if (!handing_) {
         discard();
     }
 }
 
-void stream_link::say_goodbye() {
+void stream_link::shut_down_output() {
     state_ = state::discarding;
     error_code ignored;
     socket_.shutdown(asio::socket_base::shutdown_send, ignored);
-    patience_.expires_after(bounds_.discard);
-    patience_.async_wait([self = shared_from_this()](error_code code) {
+    timeout_.expires_after(bounds_.discard);
+    timeout_.async_wait([self = shared_from_this()](error_code code) {
         if (!code) {
             self->lose(asio::error::eof);
         }
@@ -328,14 +329,14 @@ void stream_link::say_goodbye() {
     }
 }
 
-// Reads and forgets, so that closing does not reset a connection whose last replies are still on their way.
+// Reads and discards, so that closing does not reset a connection whose last replies are still in transit.
 void stream_link::discard() {
     if (reading_ || ended_ || state_ == state::closed) {
         return;
     }
     reading_ = true;
-    nowhere_.resize(4096);
-    socket_.async_receive(asio::buffer(nowhere_), [self = shared_from_this()](error_code code, std::size_t count) {
+    discarded_.resize(4096);
+    socket_.async_receive(asio::buffer(discarded_), [self = shared_from_this()](error_code code, std::size_t count) {
         self->on_read(code, count);
     });
 }
@@ -357,7 +358,7 @@ void stream_link::close() {
     }
     state_ = state::closed;
     error_code ignored;
-    patience_.cancel();
+    timeout_.cancel();
     socket_.close(ignored);
     owner_.reset();
 }

@@ -15,12 +15,12 @@
 
 namespace cles::transport {
 
-/// A link over a stream socket, of whatever family.
+/// A link over a stream socket of any family.
 ///
-/// One read hands over many lines and one write carries many replies. Output is written at once, without waiting for
-/// the reactor; only what the socket does not take waits for it. After a bounded number of lines it lets other links
-/// have their turn. In steady state neither allocates. At the peer's end of stream it goes on to watch for a reset and
-/// for the hang-up of a Unix socket, which no read would show any more.
+/// One read delivers many lines and one write carries many replies. Output is written at once, without waiting for the
+/// reactor; only what the socket does not take waits for it. After a bounded number of lines, other links are served.
+/// In steady state neither allocates. After the peer's end of stream, it watches for a reset and for the hang-up of a
+/// Unix socket, which no read would show any more.
 class stream_link final : public link, public std::enable_shared_from_this<stream_link> {
   public:
     using socket_type = boost::asio::generic::stream_protocol::socket;
@@ -57,9 +57,9 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void write_rest();
     void let_urgent_pass();
     void on_written(boost::system::error_code code, std::size_t count);
-    void say_goodbye();
+    void shut_down_output();
     void discard();
-    void watch_for_hang_up();
+    void watch_for_hangup();
     void on_error_condition();
     void lose(boost::system::error_code why);
 
@@ -69,21 +69,21 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     std::shared_ptr<link_events> owner_;
     protocol::line_buffer input_;
     std::string output_;
-    std::string urgent_;  // goes before it
-    std::string sending_; // what the socket did not take at once
-    std::string nowhere_; // where input goes that is discarded
+    std::string urgent_;    // sent before it
+    std::string sending_;   // what the socket did not take at once
+    std::string discarded_; // buffer for input that is discarded
     std::size_t sending_at_ = 0;
-    boost::asio::steady_timer patience_;
+    boost::asio::steady_timer timeout_;
     std::uint64_t sent_ = 0;
     std::uint64_t received_ = 0;
     state state_ = state::open;
-    bool reading_ = false;   // a read is under way
-    bool shrinking_ = false; // and was cancelled, to go on with a smaller buffer
-    bool handing_ = false;   // lines are being handed over, further up the stack
-    bool posted_ = false;    // `hand_over` is to go on
+    bool reading_ = false;   // a read is pending
+    bool shrinking_ = false; // and was cancelled, to continue with a smaller buffer
+    bool handing_ = false;   // lines are being delivered, further up the stack
+    bool posted_ = false;    // `hand_over` will continue
     bool paused_ = false;
     bool ended_ = false; // the peer sends no more
-    bool told_end_ = false;
+    bool end_reported_ = false;
     bool overlong_ = false;
 };
 

@@ -1,13 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "transport/tcp.hpp"
-
 #include <cles/error.hpp>
 
-#include "transport/host_lookup.hpp"
 #include "transport/ip_host.hpp"
-#include "transport/stream_acceptor.hpp"
-#include "transport/stream_dialler.hpp"
-#include "transport/traffic_class.hpp"
+#include "transport/stream_endpoint.hpp"
+#include "transport/transports.hpp"
 
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/ip/v6_only.hpp>
@@ -29,8 +25,7 @@ using boost::system::error_code;
 
 namespace {
 
-// A peer whose host is gone, or cannot be reached any more, is noticed after `limits::stall`, whether something is on
-// its way to it or nothing is.
+// Detects after `limits::stall` that a peer's host is gone or unreachable, whether data is in transit to it or not.
 void notice_loss(tcp::socket& socket, const limits& bounds) {
     constexpr int least = 6; // seconds
     constexpr int most = 3600;
@@ -87,7 +82,7 @@ class tcp_acceptor final : public acceptor {
     std::shared_ptr<stream_acceptor<tcp>> inside_;
 };
 
-/// Makes one connection to a host: looks it up, where it has a name, and tries its addresses.
+/// Makes one connection to a host: looks up its name, if it has one, and tries its addresses.
 class tcp_call : public std::enable_shared_from_this<tcp_call> {
   public:
     tcp_call(const asio::any_io_executor& executor, url where, const limits& bounds, dial_callback done)

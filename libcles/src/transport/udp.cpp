@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "transport/udp.hpp"
-
-#include "transport/host_lookup.hpp"
 #include "transport/ip_host.hpp"
-#include "transport/traffic_class.hpp"
+#include "transport/transports.hpp"
 #include "transport/udp_port.hpp"
 
 #include <boost/asio/ip/udp.hpp>
@@ -60,7 +57,7 @@ class udp_transport final : public link_transport {
         return std::make_unique<udp_acceptor>(std::make_shared<udp_port>(std::move(socket)));
     }
 
-    // Nothing is sent: whether somebody is there shows when requests are answered.
+    // Sends nothing: whether the peer exists shows when requests are answered.
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
         const auto lookup = std::make_shared<host_lookup>(executor);

@@ -3,6 +3,7 @@
 
 #include "transport/ip_host.hpp"
 
+#include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/container_hash/hash.hpp>
 
@@ -32,9 +33,9 @@ std::size_t udp_port::endpoint_hash::operator()(const udp::endpoint& e) const no
 udp_port::udp_port(udp::socket socket) : socket_(std::move(socket)) {
     error_code ignored;
     socket_.non_blocking(true, ignored);
-    constexpr int room = 1 << 20; // a burst waits here while others have their turn
+    constexpr int room = 1 << 20; // a burst waits here while other tasks run
     socket_.set_option(asio::socket_base::receive_buffer_size{room}, ignored);
-    datagram_batch::keep_together(socket_);
+    receive_batch::enable_gro(socket_);
 }
 
 udp_port::udp::endpoint udp_port::local() const {
@@ -93,15 +94,15 @@ void udp_port::receive() {
     });
 }
 
-// Until all is handed over it counts as receiving: a link that starts meanwhile must not begin to wait.
+// Counts as receiving until everything is delivered: a link that starts meanwhile must not start to wait.
 void udp_port::hand_over() {
     const auto go_on_soon = [this] {
         asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
     };
     bool left = false;
     try {
-        left = arrived_.hand_over(socket_, [this](const datagram_batch::datagram& one) { hand_over(one); });
-    } catch (...) { // a handler's, for the thread that runs the context; the other datagrams are not affected
+        left = arrived_.hand_over(socket_, [this](const receive_batch::datagram& one) { hand_over(one); });
+    } catch (...) { // of a handler, for the thread that runs the context; other datagrams are not affected
         go_on_soon();
         throw;
     }
@@ -113,7 +114,7 @@ void udp_port::hand_over() {
     receive();
 }
 
-void udp_port::hand_over(const datagram_batch::datagram& one) {
+void udp_port::hand_over(const receive_batch::datagram& one) {
     if (is_empty(one.text)) {
         return;
     }
@@ -141,7 +142,7 @@ std::shared_ptr<udp_link> udp_port::link_of(const udp::endpoint& sender) {
     auto made = std::make_shared<udp_link>(shared_from_this(), sender, std::move(who));
     links_.emplace(sender, made.get());
     recent_ = made.get();
-    const auto tell = on_link_; // which may be taken away meanwhile
+    const auto tell = on_link_; // copied: it may be cleared meanwhile
     tell(made);
     return made;
 }
@@ -162,6 +163,142 @@ void udp_port::wait_for_room(std::weak_ptr<udp_link> link) {
                 }
             }
         });
+    }
+}
+
+udp_link::udp_link(std::shared_ptr<udp_port> socket, boost::asio::ip::udp::endpoint peer, identity who)
+    : port_(std::move(socket)), peer_(std::move(peer)), who_(std::move(who)) {}
+
+udp_link::~udp_link() { udp_link::close(); }
+
+void udp_link::start(std::shared_ptr<link_events> owner) {
+    owner_ = std::move(owner);
+    if (port_ == nullptr) {
+        return;
+    }
+    port_->receive();
+    if (!early_.empty()) {
+        boost::asio::post(port_->executor(), [self = shared_from_this()] {
+            for (const auto& datagram : std::exchange(self->early_, {})) {
+                self->deliver(datagram);
+            }
+        });
+    }
+}
+
+void udp_link::deliver(std::string_view datagram) {
+    if (port_ == nullptr) {
+        return;
+    }
+    if (owner_ == nullptr) {
+        constexpr std::size_t max_early = 16;
+        if (early_.size() < max_early) {
+            early_.emplace_back(datagram);
+        }
+        return;
+    }
+    received_ += datagram.size();
+    if (paused_) {
+        return;
+    }
+    const auto owner = owner_; // it may close the link
+    if (datagram.size() > protocol::datagram_bytes) {
+        owner->on_overlong(datagram.substr(0, protocol::datagram_bytes));
+    } else {
+        if (datagram.ends_with('\n')) {
+            datagram.remove_suffix(1);
+        }
+        owner->on_line(datagram);
+    }
+    if (port_ != nullptr) {
+        owner->on_batch();
+    }
+}
+
+void udp_link::flush() {
+    if (port_ == nullptr || output_.empty()) {
+        return;
+    }
+    take_output();
+    send_rest();
+}
+
+// Takes all of it at once: the flushing code relies on finding only new output the next time.
+void udp_link::take_output() {
+    if (sending_.empty()) {
+        sending_.swap(output_);
+        sending_at_ = 0;
+        return;
+    }
+    if (sending_at_ > sending_.size() / 2) {
+        sending_.erase(0, sending_at_);
+        sending_at_ = 0;
+    }
+    sending_.append(output_);
+    output_.clear();
+}
+
+void udp_link::send_rest() {
+    while (!waiting_ && sending_at_ < sending_.size()) {
+        const auto done = port_->send(*this, std::string_view{sending_}.substr(sending_at_));
+        if (done.lines == 0) {
+            waiting_ = true;
+            port_->wait_for_room(weak_from_this());
+            return;
+        }
+        sent_ += done.bytes;
+        sending_at_ += done.bytes;
+    }
+    if (waiting_) {
+        return;
+    }
+    constexpr std::size_t max_kept = 65536;
+    if (sending_.capacity() > max_kept) {
+        std::string{}.swap(sending_); // assigning an empty string would keep the memory
+    }
+    sending_.clear();
+    sending_at_ = 0;
+}
+
+void udp_link::on_room() {
+    waiting_ = false;
+    if (port_ == nullptr) {
+        return;
+    }
+    send_rest();
+    if (const auto owner = owner_; owner && sending_.empty()) {
+        owner->on_room();
+    }
+}
+
+// There is no peer to notify.
+void udp_link::finish() {
+    if (port_ == nullptr) {
+        return;
+    }
+    flush();
+    boost::asio::post(port_->executor(), [self = shared_from_this()] {
+        const auto owner = self->owner_;
+        if (self->port_ != nullptr) {
+            self->close();
+            if (owner) {
+                owner->on_lost(boost::asio::error::eof);
+            }
+        }
+    });
+}
+
+void udp_link::shrink() {
+    if (output_.empty() && sending_.empty()) {
+        std::string{}.swap(output_);
+        std::string{}.swap(sending_);
+    }
+}
+
+void udp_link::close() {
+    if (const auto port = std::exchange(port_, nullptr)) {
+        owner_.reset();
+        port->forget(*this);
     }
 }
 

@@ -3,44 +3,96 @@
 
 #include <cles/link.hpp>
 
-#include "transport/datagram_batch.hpp"
-#include "transport/datagram_burst.hpp"
-#include "transport/udp_link.hpp"
+#include "protocol/datagram.hpp"
+#include "transport/datagram_io.hpp"
 
 #include <boost/asio/ip/udp.hpp>
 #include <boost/unordered/unordered_flat_map.hpp>
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 #include <string_view>
 #include <vector>
 
 namespace cles::transport {
 
-/// A UDP socket and the links that share it: one for each source where it listens, one alone where it was dialled.
+class udp_port;
+
+/// A link over datagrams: one peer of a socket, which it may share with other links. Each line is a datagram.
+class udp_link final : public link, public std::enable_shared_from_this<udp_link> {
+  public:
+    udp_link(std::shared_ptr<udp_port> socket, boost::asio::ip::udp::endpoint peer, identity who);
+    udp_link(const udp_link&) = delete;
+    udp_link& operator=(const udp_link&) = delete;
+    ~udp_link() override;
+
+    void start(std::shared_ptr<link_events> owner) override;
+    std::string& output() override { return output_; }
+    [[nodiscard]] std::size_t datagram() const noexcept override { return protocol::datagram_bytes; }
+    void flush() override;
+    [[nodiscard]] std::size_t unsent() const noexcept override {
+        return output_.size() + sending_.size() - sending_at_;
+    }
+    [[nodiscard]] std::uint64_t sent() const noexcept override { return sent_; }
+    [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
+    /// What arrives meanwhile is dropped: a datagram may be lost at any time.
+    void pause(bool stop) override { paused_ = stop; }
+    void finish() override;
+    void close() override;
+    [[nodiscard]] std::size_t buffered() const noexcept override { return output_.capacity() + sending_.capacity(); }
+    void shrink() override;
+    [[nodiscard]] const identity& peer() const noexcept override { return who_; }
+
+    // For the port.
+    [[nodiscard]] const boost::asio::ip::udp::endpoint& endpoint() const noexcept { return peer_; }
+    /// Delivers what arrived in a datagram.
+    void deliver(std::string_view datagram);
+    /// The socket has room again.
+    void on_room();
+
+  private:
+    void take_output();
+    void send_rest();
+
+    std::shared_ptr<udp_port> port_; // null: closed
+    boost::asio::ip::udp::endpoint peer_;
+    identity who_;
+    std::shared_ptr<link_events> owner_;
+    std::vector<std::string> early_; // received before `start`
+    std::string output_;
+    std::string sending_; // output for which the socket has no room
+    std::size_t sending_at_ = 0;
+    std::uint64_t sent_ = 0;
+    std::uint64_t received_ = 0;
+    bool paused_ = false;
+    bool waiting_ = false; // for room in the socket
+};
+
+/// A UDP socket and the links that share it: one for each source if it listens, or a single one if it was dialled.
 ///
-/// It lives until it is closed and its last link is; it is the links that keep it, and their owners that keep them. A
-/// wake-up hands over what there is, up to a number of datagrams;
-/// then others have their turn. In steady state it allocates nothing.
+/// It lives until it is closed and its last link is closed: the links own it, and their owners own them. Each wake-up
+/// delivers up to a number of datagrams; then other tasks run. In steady state it allocates nothing.
 class udp_port : public std::enable_shared_from_this<udp_port> {
   public:
     using udp = boost::asio::ip::udp;
 
     explicit udp_port(udp::socket socket);
 
-    /// Listens: from now on, each source that sends something becomes a link.
+    /// Listens: from now on, each new source becomes a link.
     void accept(std::function<void(link_ptr)> on_link);
-    /// The one link of a socket that is connected.
+    /// The only link of a connected socket.
     link_ptr connect_link(const udp::endpoint& peer, identity who);
-    /// Nobody comes in any more.
+    /// Accepts no new sources.
     void close();
     [[nodiscard]] udp::endpoint local() const;
 
     // For its links.
     void receive();
-    /// Sends whole lines, each with its LF as a datagram. One that cannot be sent is as good as lost on its way.
-    /// \return what is done; nothing: the socket has no room just now \pre there is a line
+    /// Sends whole lines, each with its LF as one datagram. One that cannot be sent counts as lost in the network.
+    /// \return what is done; nothing: the socket has no room now \pre there is a line
     core::lines_done send(const udp_link& to, std::string_view lines);
     void wait_for_room(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
@@ -52,19 +104,19 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
     };
 
     void hand_over();
-    void hand_over(const datagram_batch::datagram& one);
+    void hand_over(const receive_batch::datagram& one);
     std::shared_ptr<udp_link> link_of(const udp::endpoint& sender);
     void close_if_done();
 
     udp::socket socket_;
-    datagram_burst burst_{socket_};
+    send_batch burst_{socket_};
     bool connected_ = false;
     bool receiving_ = false;
     std::function<void(link_ptr)> on_link_;
-    boost::unordered_flat_map<udp::endpoint, udp_link*, endpoint_hash> links_; // which take themselves out
-    udp_link* recent_ = nullptr; // most datagrams come from where the one before came from
+    boost::unordered_flat_map<udp::endpoint, udp_link*, endpoint_hash> links_; // links remove themselves
+    udp_link* recent_ = nullptr; // usually the source of the previous datagram
     std::vector<std::weak_ptr<udp_link>> waiting_;
-    datagram_batch arrived_;
+    receive_batch arrived_;
 };
 
 } // namespace cles::transport

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "transport/unix.hpp"
-
 #include <cles/error.hpp>
 
-#include "transport/stream_acceptor.hpp"
-#include "transport/stream_dialler.hpp"
+#include "transport/stream_endpoint.hpp"
+#include "transport/transports.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
@@ -41,8 +39,8 @@ identity identify(local_protocol::socket& socket, const std::string& address) {
     return who;
 }
 
-// Whether it is a socket file that a process which died has left behind. Connecting alone does not tell: what is no
-// socket refuses too, and is somebody's file.
+// Whether it is a socket file that a dead process has left behind. Connecting alone is not enough: a regular file
+// refuses too, and belongs to someone.
 bool is_stale(const std::string& path, const local_protocol::endpoint& endpoint) {
     struct stat what {};
     if (::lstat(path.c_str(), &what) != 0 || !S_ISSOCK(what.st_mode)) {
@@ -132,7 +130,7 @@ class unix_transport final : public link_transport {
     }
 
   private:
-    // The file must never be there with wider rights, not even for a moment: fchmod before bind sets those it gets.
+    // The file must never have wider permissions, not even for a moment: fchmod before bind sets those that it gets.
     static void bind_privately(local_protocol::acceptor& socket, const local_protocol::endpoint& endpoint,
                                error_code& code) {
         ::fchmod(socket.native_handle(), S_IRUSR | S_IWUSR);

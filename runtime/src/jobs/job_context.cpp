@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_context.hpp"
 
+#include <cles/registrar.hpp>
+
 #include "jobs/job_record.hpp"
 
 #include <memory>
+#include <utility>
 
 namespace cles::runtime {
 
@@ -95,5 +98,14 @@ std::string& job_context::result_buffer() const { return record_->result_buffer(
 void job_context::set_result_written() const { record_->set_result_written(); }
 
 boost::asio::any_io_executor job_context::executor() const { return record_->executor(); }
+
+job_work take_work(registration& task) {
+    if (task.plain) {
+        return [handler = std::move(task.plain)](const job_context& job) {
+            job.answer_last([&](json_writer& w) { handler(job.request(), w); });
+        };
+    }
+    return [handler = std::move(task.async)](const job_context& job) { handler(job.request(), job.as_responder()); };
+}
 
 } // namespace cles::runtime

@@ -18,6 +18,10 @@
 #include <string_view>
 #include <utility>
 
+namespace cles {
+struct registration;
+}
+
 namespace cles::runtime {
 
 class job_record;
@@ -104,6 +108,9 @@ class job_context {
 /// What the jobs of one task do. It runs on workers, for several jobs at once, and answers through the context, then or
 /// later. An exception from it becomes the answer.
 using job_work = std::function<void(const job_context&)>;
+
+/// Work that calls the task's handler, which it takes over: one that takes a responder gets the job's.
+[[nodiscard]] job_work take_work(registration& task);
 
 /// JSON text that is known to be valid and free of white space, as a result: it is written unchanged.
 struct compact_json {

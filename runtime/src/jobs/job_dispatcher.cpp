@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_dispatcher.hpp"
 
+#include <cles/limits.hpp>
+
 #include "jobs/service_time.hpp"
 
 #include <boost/asio/execution/outstanding_work.hpp>
@@ -13,28 +15,6 @@
 
 namespace cles::runtime {
 
-void drain_operation::begin(std::chrono::milliseconds limit, std::function<void()> on_limit,
-                            std::function<void(const drain_report&)> done) {
-    done_ = std::move(done);
-    limit_->expires_after(limit);
-    limit_->async_wait([on_limit = std::move(on_limit)](boost::system::error_code code) {
-        if (!code) {
-            on_limit();
-        }
-    });
-}
-
-void drain_operation::complete(const drain_report& report) {
-    limit_->cancel();
-    const auto done = std::exchange(done_, nullptr);
-    done(report);
-}
-
-void drain_operation::cancel() {
-    done_ = nullptr;
-    limit_.reset();
-}
-
 namespace asio = boost::asio;
 using clock = time_point::clock;
 using namespace std::chrono_literals;
@@ -43,11 +23,6 @@ namespace {
 
 // After so many jobs of one burst further workers are woken at once, and not when the burst has been read.
 constexpr std::size_t max_unwoken_jobs = 32;
-
-// The input that arrived during a pause counts as read when so many rounds of the executor have brought no job and no
-// withdrawal, or after this time.
-constexpr unsigned max_quiet_rounds = 16;
-constexpr std::chrono::milliseconds max_recovery{250};
 
 std::string seconds(std::chrono::nanoseconds span) {
     const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(span).count() / 100;
@@ -65,7 +40,9 @@ job_dispatcher::job_dispatcher(asio::any_io_executor executor, pool_options opti
               }
           });
       }),
-      workers_(options_, completions_), delegated_(workers_), timer_(std::in_place, executor_), drain_(executor_),
+      workers_(options_, completions_),
+      pauses_(executor_, workers_, options_, [this](std::chrono::nanoseconds lasted) { report_pause(lasted); }),
+      delegated_(workers_), timer_(std::in_place, executor_), drain_(executor_),
       close_timeout_(options_.close_timeout) {}
 
 job_dispatcher::~job_dispatcher() = default;
@@ -78,8 +55,9 @@ asio::any_io_executor job_dispatcher::executor() const {
 void job_dispatcher::start() {
     workers_.start(std::shared_ptr<worker_pool>{shared_from_this(), &workers_}, [this] {
         // If this fails, the next timer does it.
-        static_cast<void>(completions_.post([this] { check_for_pause(); }));
+        static_cast<void>(completions_.post([this] { pauses_.check(); }));
     });
+    pauses_.start(std::shared_ptr<pause_detector>{shared_from_this(), &pauses_});
     if (options_.check_interval.count() > 0) {
         // Once the executor runs, which may be later.
         asio::post(executor_, [weak = weak_from_this()] {
@@ -132,11 +110,11 @@ void job_dispatcher::submit(job what) {
         refuse(what.answer, worker_pool::admission::no_workers);
         return;
     }
-    detect_pause();
-    ++changes_;
+    pauses_.detect();
+    pauses_.count_input();
     auto& r = acquire_record();
     r.requester = reinterpret_cast<std::uintptr_t>(&what.what.peer());
-    r.request_.assign(what.what, identities_.copy_of(what.what.peer()));
+    r.owned_.assign(what.what, identities_.copy_of(what.what.peer()));
     r.work_ = std::move(what.work);
     const auto admission = workers_.push(r);
     if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
@@ -218,7 +196,7 @@ void job_dispatcher::release_record(job_record& r) {
 // -- stopping ------------------------------------------------------------------------------------------------------
 
 void job_dispatcher::stop(job_record& r) {
-    ++changes_;
+    pauses_.count_input();
     std::function<void()> callback;
     {
         const std::lock_guard lock{r.mutex_};
@@ -339,10 +317,10 @@ void job_dispatcher::arm_timer() {
     }
     timer_armed_ = true;
     timer_idle_ = !has_jobs;
-    timer_interval_ =
+    const auto interval =
         has_jobs ? std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms) : options_.check_interval;
-    update_executor_due(clock::now());
-    timer_->expires_after(timer_interval_);
+    pauses_.expect_timer(interval);
+    timer_->expires_after(interval);
     timer_->async_wait([weak = weak_from_this()](boost::system::error_code code) {
         if (const auto self = weak.lock(); self && !code) {
             self->on_timer();
@@ -355,7 +333,7 @@ void job_dispatcher::on_timer() {
     if (closed_) {
         return;
     }
-    check_for_pause();
+    pauses_.check();
     report_stuck();
     process_completions(); // deferred ones
     if (records_.size() != 0 || options_.check_interval.count() > 0) {
@@ -363,64 +341,11 @@ void job_dispatcher::on_timer() {
     }
 }
 
-// -- pauses --------------------------------------------------------------------------------------------------------
+// -- pauses and stuck workers --------------------------------------------------------------------------------------
 
-void job_dispatcher::update_executor_due(time_point now) {
-    if (options_.check_interval.count() > 0) {
-        workers_.set_executor_due(now + timer_interval_ + options_.executor_lateness);
-    }
-}
-
-// The process or the machine was suspended, or a handler blocked the executor. Requesters may have withdrawn in the
-// meantime, in input that has not been read.
-void job_dispatcher::detect_pause() {
-    const auto now = clock::now();
-    if (closed_ || !workers_.executor_is_late(now)) {
-        return;
-    }
-    update_executor_due(now);
-    if (std::exchange(recovering_, true)) {
-        return;
-    }
-    workers_.pause();
-    recovery_began_ = now;
-    quiet_rounds_ = 0;
-    changes_last_round_ = changes_;
-    write_log(log_level::warning, "this node was suspended or blocked for more than " +
-                                      seconds(timer_interval_ + options_.executor_lateness) +
+void job_dispatcher::report_pause(std::chrono::nanoseconds lasted) {
+    write_log(log_level::warning, "this node was suspended or blocked for more than " + seconds(lasted) +
                                       ": no job starts until the input that arrived since has been read");
-    post_recovery_round();
-}
-
-// A worker that has found the executor late waits to be woken, even if the pause has been handled before the worker
-// reports it.
-void job_dispatcher::check_for_pause() {
-    detect_pause();
-    if (!recovering_ && !closed_) {
-        workers_.wake();
-    }
-}
-
-// Posted functions run after those that are ready, and after a check for new input.
-void job_dispatcher::post_recovery_round() {
-    asio::post(executor_, [weak = weak_from_this()] {
-        if (const auto self = weak.lock(); self && !self->closed_) {
-            self->recovery_round();
-        }
-    });
-}
-
-void job_dispatcher::recovery_round() {
-    quiet_rounds_ = changes_ == changes_last_round_ ? quiet_rounds_ + 1 : 0;
-    changes_last_round_ = changes_;
-    const auto now = clock::now();
-    if (quiet_rounds_ < max_quiet_rounds && now - recovery_began_ < max_recovery) {
-        post_recovery_round();
-        return;
-    }
-    recovering_ = false;
-    update_executor_due(now);
-    workers_.unpause();
 }
 
 void job_dispatcher::report_stuck() {
@@ -496,6 +421,7 @@ std::size_t job_dispatcher::close(std::chrono::milliseconds limit) {
     drain_report unreported;
     fail_open_jobs(unreported);
     closed_ = true;
+    pauses_.close();
     drain_.cancel();
     timer_.reset();
     workers_.close([](job_record& r) { r.release(); });

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/limits.hpp>
 #include <cles/peer.hpp>
 
 #include "jobs/completion_queue.hpp"
 #include "jobs/delegated_requests.hpp"
+#include "jobs/drain_operation.hpp"
+#include "jobs/identity_cache.hpp"
 #include "jobs/job_pool.hpp"
 #include "jobs/job_record.hpp"
-#include "jobs/owned_request.hpp"
+#include "jobs/job_record_pool.hpp"
+#include "jobs/pause_detector.hpp"
 #include "jobs/pending_replies.hpp"
 #include "jobs/stop_notifier.hpp"
 #include "jobs/worker_pool.hpp"
@@ -27,24 +29,6 @@
 #include <vector>
 
 namespace cles::runtime {
-
-/// Waits for the last jobs of a pool: completes once, with the last job or at the limit.
-class drain_operation {
-  public:
-    explicit drain_operation(const boost::asio::any_io_executor& executor) : limit_(std::in_place, executor) {}
-
-    /// \param on_limit called unless `complete` or `cancel` was called before
-    void begin(std::chrono::milliseconds limit, std::function<void()> on_limit,
-               std::function<void(const drain_report&)> done);
-    [[nodiscard]] bool is_pending() const noexcept { return done_ != nullptr; }
-    void complete(const drain_report& report);
-    /// Completes without a call, and refers to nothing of the executor any more.
-    void cancel();
-
-  private:
-    std::optional<boost::asio::steady_timer> limit_;
-    std::function<void(const drain_report&)> done_;
-};
 
 /// Takes jobs through a pool, on the service's executor, from admission to reply: it is the sequence of these steps,
 /// and its parts keep their state. It lives as long as any job is held.
@@ -96,11 +80,7 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
 
     void on_timer();
     void arm_timer();
-    void update_executor_due(time_point now);
-    void detect_pause();
-    void check_for_pause();
-    void post_recovery_round();
-    void recovery_round();
+    void report_pause(std::chrono::nanoseconds lasted);
     void report_stuck();
     void fail_open_jobs(drain_report& report);
     void update_drain(bool over);
@@ -112,6 +92,7 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     shared_counts counts_;
     completion_queue completions_;
     worker_pool workers_;
+    pause_detector pauses_;
     delegated_requests delegated_;
     stop_notifier stop_notifier_;
 
@@ -129,14 +110,6 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     drain_operation drain_;
     bool timer_armed_ = false;
     bool timer_idle_ = false; // armed while there was no job
-    std::chrono::milliseconds timer_interval_{0};
-
-    // While the input that arrived during a pause is read.
-    bool recovering_ = false;
-    time_point recovery_began_;
-    unsigned quiet_rounds_ = 0;
-    std::uint64_t changes_ = 0; // jobs that arrived or were stopped, so far
-    std::uint64_t changes_last_round_ = 0;
 
     std::atomic<bool> draining_{false};
     bool closed_ = false;

@@ -14,7 +14,6 @@ namespace {
 constexpr std::size_t max_reports = 16;
 constexpr std::size_t max_log_length = 4096;
 constexpr std::size_t max_retained_result = 65536;
-constexpr std::size_t max_spare = 1024; // records
 
 thread_local job_record::current_run* current = nullptr;
 
@@ -43,7 +42,7 @@ void job_record::clear() {
     if (result_.capacity() > max_retained_result) {
         result_ = {};
     }
-    request_.clear();
+    owned_.clear();
 }
 
 // -- references ----------------------------------------------------------------------------------------------------
@@ -239,31 +238,6 @@ void job_record::run(const std::function<void()>& continuation) noexcept {
     } catch (...) {
         dispatcher_->counts().threw.fetch_add(1, std::memory_order_relaxed);
         fail(std::current_exception());
-    }
-}
-
-// -- the records of a pool -----------------------------------------------------------------------------------------
-
-job_record& job_record_pool::acquire(std::shared_ptr<job_dispatcher> dispatcher) {
-    if (spare_.empty()) {
-        spare_.push_back(std::make_unique<job_record>());
-    }
-    auto& r = *spare_.back().release();
-    spare_.pop_back();
-    r.open(std::move(dispatcher));
-    r.index = in_use_.size();
-    in_use_.push_back(&r);
-    return r;
-}
-
-void job_record_pool::recycle(job_record& r) {
-    std::unique_ptr<job_record> owned{&r};
-    in_use_.back()->index = r.index;
-    in_use_[r.index] = in_use_.back();
-    in_use_.pop_back();
-    r.clear(); // the dispatcher, which runs, outlives this
-    if (spare_.size() < max_spare) {
-        spare_.push_back(std::move(owned));
     }
 }
 

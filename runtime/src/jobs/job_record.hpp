@@ -3,12 +3,12 @@
 
 #include <cles/error.hpp>
 #include <cles/limits.hpp>
+#include <cles/request.hpp>
 #include <cles/responder.hpp>
 
 #include "jobs/adaptive_mutex.hpp"
 #include "jobs/job_context.hpp"
 #include "jobs/job_queue.hpp"
-#include "jobs/owned_request.hpp"
 
 #include <atomic>
 #include <chrono>
@@ -52,7 +52,7 @@ class job_record final : public job_queue::item {
     void delegate(std::string_view command, const call_options& options, answer_callback answered);
     void log(log_level level, std::string_view text);
     [[nodiscard]] bool stopped() const noexcept { return stopped_.load(std::memory_order_acquire); }
-    [[nodiscard]] const cles::request& request() const noexcept { return request_.get(); }
+    [[nodiscard]] const cles::request& request() const noexcept { return request_; }
     [[nodiscard]] boost::asio::any_io_executor executor() const;
 
     /// Where a worker that is the only holder of the job writes its result.
@@ -120,38 +120,14 @@ class job_record final : public job_queue::item {
     std::optional<errc> failure_;                    // then the result is its message
     std::optional<std::chrono::milliseconds> retry_; // of a refusal
     bool result_written_ = false;                    // used by the worker only
-    owned_request request_;
+    detail::owned_request owned_;
+    cles::request request_{owned_.data()};
     std::shared_ptr<job_dispatcher> dispatcher_;
     std::shared_ptr<const job_work> work_;
 
     // -- the executor ----------------------------------------------------------------------------------------------
     std::optional<responder> requester_;
     bool awaited_ = false; // neither answered nor stopped
-};
-
-/// The records of a pool's jobs: those in use, and some spare ones. Used on the service's executor.
-class job_record_pool {
-  public:
-    job_record_pool() = default;
-    job_record_pool(const job_record_pool&) = delete;
-    job_record_pool& operator=(const job_record_pool&) = delete;
-    ~job_record_pool() = default;
-
-    /// A record for a new job, with one reference.
-    job_record& acquire(std::shared_ptr<job_dispatcher> dispatcher);
-    /// Takes back a record without references.
-    void recycle(job_record& r);
-    /// From now on the records destroy themselves.
-    void detach_all() noexcept { in_use_.clear(); }
-    void free_spare() noexcept { spare_.clear(); }
-
-    /// The records in use, in no particular order: recycling one moves another.
-    [[nodiscard]] std::size_t size() const noexcept { return in_use_.size(); }
-    [[nodiscard]] job_record& operator[](std::size_t index) const noexcept { return *in_use_[index]; }
-
-  private:
-    std::vector<std::unique_ptr<job_record>> spare_;
-    std::vector<job_record*> in_use_; // owned; each knows its index
 };
 
 } // namespace cles::runtime

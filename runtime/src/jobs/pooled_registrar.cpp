@@ -28,15 +28,9 @@ class inline_timer {
 void pooled_registrar::add(registration task) {
     if (task.info.inline_ok || task.coroutine) {
         add_inline(std::move(task));
-    } else if (task.plain) {
-        add_work(task.verb, std::move(task.task), std::move(task.info),
-                 [handler = std::move(task.plain)](const job_context& job) {
-                     job.answer_last([&](json_writer& w) { handler(job.request(), w); });
-                 });
-    } else if (task.async) {
-        add_work(
-            task.verb, std::move(task.task), std::move(task.info),
-            [handler = std::move(task.async)](const job_context& job) { handler(job.request(), job.as_responder()); });
+    } else if (task.plain || task.async) {
+        auto work = take_work(task);
+        add_work(task.verb, std::move(task.task), std::move(task.info), std::move(work));
     } else {
         host_.add(std::move(task));
     }

@@ -2,18 +2,19 @@
 // Announcements of nodes, a line each: what is read stays within its bounds, and what is written is what was read. The
 // table of nodes takes them from two sources, with time passing.
 
-#include "core/announcement.hpp"
+#include "node/membership/announcement.hpp"
 
 #include <cles/json_reader.hpp>
 #include <cles/url.hpp>
 
-#include "core/plain_table.hpp"
-#include "core/presence.hpp"
-#include "core/reachable.hpp"
 #include "fuzz/fuzz.hpp"
+#include "node/membership/membership.hpp"
+#include "node/membership/peer_table.hpp"
+#include "node/membership/reachable_endpoints.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/line.hpp"
-#include "protocol/message.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
 
 #include <chrono>
 #include <string>
@@ -25,13 +26,13 @@ constexpr std::size_t most_peers = 4;
 
 void check_bounds(const core::announcement& said, std::string_view line) {
     require(protocol::is_name(said.node) && !protocol::is_reserved_target(said.node), "a node has a name", line);
-    require(said.endpoints.size() <= core::most_endpoints, "endpoints are bounded", line);
+    require(said.endpoints.size() <= core::max_endpoints, "endpoints are bounded", line);
     for (const auto& endpoint : said.endpoints) {
-        require(!endpoint.empty() && endpoint.size() <= core::longest_endpoint, "an endpoint is bounded", line);
+        require(!endpoint.empty() && endpoint.size() <= core::max_endpoint, "an endpoint is bounded", line);
     }
-    require(said.interval >= core::shortest_interval && said.interval <= core::longest_interval,
+    require(said.interval >= core::min_interval && said.interval <= core::max_interval,
             "the interval is within its bounds", line);
-    require(said.tasks.size() <= core::longest_digest, "the digest is bounded", line);
+    require(said.tasks.size() <= core::max_digest, "the digest is bounded", line);
 }
 
 void check_written(const core::announcement& said, const protocol::request_line& update, std::string_view line) {
@@ -52,7 +53,7 @@ void check_written(const core::announcement& said, const protocol::request_line&
 }
 
 void check_reachable(const core::announcement& said, const core::group_source& from) {
-    for (const auto& endpoint : core::reachable_endpoints(said.endpoints, core::teller::of(from))) {
+    for (const auto& endpoint : core::reachable_endpoints(said.endpoints, core::observed_source::of(from))) {
         const auto where = parse_url(endpoint); // throws where it is none
         require(where.scheme != "inproc", "nobody is sent into another process", endpoint);
         require(from.is_loopback() ||
@@ -65,7 +66,7 @@ void check_reachable(const core::announcement& said, const core::group_source& f
 
 void run(std::string_view input) {
     core::deadline_queue deadlines;
-    core::presence table{"me", 1, deadlines, most_peers};
+    core::membership table{"me", 1, deadlines, most_peers};
     time_point now{std::chrono::hours{1}};
     for (unsigned n = 0; !input.empty(); ++n) {
         const auto end = input.find('\n');
@@ -89,7 +90,7 @@ void run(std::string_view input) {
         const core::group_source from =
             n % 3 == 0 ? core::group_source{0x7F000001, 4} : core::group_source{0x0A000007, 5};
         check_reachable(said, from);
-        table.hear(said, *update.epoch, *update.seq, from, now);
+        table.apply_announcement(said, *update.epoch, *update.seq, from, now);
         require(table.size() <= most_peers, "the table is bounded", line);
         std::string json;
         json_writer w{json};

@@ -12,16 +12,19 @@
 // Whatever comes: what goes out is a message of its size, nothing is answered that was not asked, no effect comes twice
 // within a minute, a repeat gets the same answer, what the node asks ends once and in time, and when all is quiet
 // nothing is kept.
+#include "protocol/datagram.hpp"
+
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
 
-#include "core/datagram_output.hpp"
-#include "core/source_life.hpp"
 #include "fuzz/fuzz.hpp"
+#include "node/session/datagram_rules.hpp"
+#include "node/session/link_monitor.hpp"
+#include "protocol/grammar.hpp"
 #include "protocol/line.hpp"
-#include "protocol/message.hpp"
-#include "protocol/parts.hpp"
-#include "support/recording_outlet.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+#include "support/recording_line_sink.hpp"
 #include "support/session_fixture.hpp"
 
 #include <algorithm>
@@ -83,17 +86,17 @@ class asked final : public detail::pending {
 };
 
 /// A source of datagrams as the node sees it.
-class source final : public test::recording_outlet, public core::binder, private core::source_life::keeper {
+class source final : public test::recording_line_sink, public core::subscriber, private core::idle_timer::keeper {
   public:
     source(test::test_node& node, char name)
-        : recording_outlet(protocol::datagram_bytes),
+        : recording_line_sink(protocol::datagram_bytes),
           node_(node), peer_{.transport = "udp", .address = "udp://192.0.2.1:" + std::to_string(1000 + name)},
           session_(node.host, *this, *this, peer_),
           output_(*node.host, protocol::datagram_bytes, name == 'd' ? peer_.address : std::string{}, 28),
           life_(*this, node.host->deadlines, node.clock.now()) {}
 
     void receive(std::string_view datagram) {
-        life_.heard(node_.clock.now());
+        life_.on_datagram(node_.clock.now());
         if (datagram.size() > protocol::datagram_bytes) {
             session_.on_overlong(datagram.substr(0, protocol::datagram_bytes), node_.clock.now());
         } else {
@@ -120,14 +123,14 @@ class source final : public test::recording_outlet, public core::binder, private
     std::size_t answered = 0;
 
   private:
-    [[nodiscard]] bool at_rest() const override { return session_.at_rest(); }
+    [[nodiscard]] bool is_idle() const override { return session_.is_idle(); }
     void on_quiet() override { gone_ = true; }
 
     test::test_node& node_;
     identity peer_;
     core::session session_;
     core::datagram_output output_;
-    core::source_life life_;
+    core::idle_timer life_;
     bool gone_ = false;
 };
 

@@ -12,8 +12,9 @@
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
 
-#include "core/group_session.hpp"
 #include "fuzz/fuzz.hpp"
+#include "node/flush_scheduler.hpp"
+#include "node/publish/group_session.hpp"
 #include "protocol/datagram.hpp"
 #include "support/hear.hpp"
 #include "support/manual_clock.hpp"
@@ -70,7 +71,7 @@ class output final : public core::group_output {
     bool room = true;
 };
 
-class listener final : public core::group_presence {
+class listener final : public core::announcement_listener {
   public:
     void on_solicitation(bool, time_point) override {}
     void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point) override {
@@ -83,7 +84,7 @@ class listener final : public core::group_presence {
 class watched_group {
   public:
     watched_group() {
-        intake_.attend(&presence_);
+        dispatcher_.set_listener(&presence_);
         for (const auto& [target, path] :
              {std::pair{"all", "speed"}, std::pair{"car2", "speed"}, std::pair{"all", "a/b"}}) {
             feeds_.push_back(std::make_unique<core::group_feed>(node_.bounds, node_.completions, target, path));
@@ -92,7 +93,7 @@ class watched_group {
     }
     ~watched_group() {
         for (const auto& feed : feeds_) {
-            intake_.feeds().remove(*feed);
+            dispatcher_.feeds().remove(*feed);
         }
         session_.bindings().clear();
         require(node_.deadlines.size() == 0, "nothing is left behind");
@@ -148,7 +149,7 @@ class watched_group {
         } catch (const error&) { // past a limit
             return;
         }
-        node_.published.drain(clock_.now());
+        core::send_updates(node_.unsent, node_.published, clock_.now());
         if (out_.room) {
             drained_ = published_;
         }
@@ -161,9 +162,9 @@ class watched_group {
     }
     void toggle(std::size_t which) {
         if (open_[which]) {
-            intake_.feeds().remove(*feeds_[which]);
+            dispatcher_.feeds().remove(*feeds_[which]);
         } else {
-            intake_.feeds().add(*feeds_[which], clock_.now());
+            dispatcher_.feeds().add(*feeds_[which], clock_.now());
         }
         open_[which] = !open_[which];
     }
@@ -178,13 +179,13 @@ class watched_group {
     }
 
     test::manual_clock clock_;
-    std::shared_ptr<core::node> shared_node_ = std::make_shared<core::node>(
-        core::node_setup{.name = "car1", .epoch = 1, .bounds = small_limits()}, clock_, [] {});
-    core::node& node_ = *shared_node_;
+    std::shared_ptr<core::node_state> shared_node_ = std::make_shared<core::node_state>(
+        core::node_options{.name = "car1", .epoch = 1, .bounds = small_limits()}, clock_, [] {});
+    core::node_state& node_ = *shared_node_;
     output out_;
     listener presence_;
-    core::group_intake intake_{node_, out_, 1};
-    core::group_session session_{shared_node_, intake_, {.address = 0x7f000001, .port = 0}, out_, 1};
+    core::group_dispatcher dispatcher_{node_, out_, 1};
+    core::group_session session_{shared_node_, dispatcher_, {.address = 0x7f000001, .port = 0}, out_, 1};
     std::vector<std::unique_ptr<core::group_feed>> feeds_;
     std::array<bool, 3> open_{};
     std::size_t published_ = 0;

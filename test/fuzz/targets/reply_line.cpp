@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 // A line of a reply, failures included: what is read is what is written, and a failure is always valid JSON.
+#include "protocol/reply_line.hpp"
+
 #include <cles/json_reader.hpp>
 
 #include "fuzz/fuzz.hpp"
+#include "protocol/datagram.hpp"
 #include "protocol/line.hpp"
-#include "protocol/message.hpp"
+#include "protocol/request_line.hpp"
 
 #include <string>
 

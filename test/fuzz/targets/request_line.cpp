@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 // A line of a request: what is read is what is written, whatever stands there.
+#include "protocol/request_line.hpp"
+
 #include "fuzz/fuzz.hpp"
+#include "protocol/datagram.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/line.hpp"
-#include "protocol/message.hpp"
+#include "protocol/reply_line.hpp"
 
 #include <string>
 

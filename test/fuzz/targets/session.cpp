@@ -4,8 +4,10 @@
 #include <cles/json_reader.hpp>
 
 #include "fuzz/fuzz.hpp"
+#include "protocol/datagram.hpp"
 #include "protocol/line.hpp"
-#include "protocol/message.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
 #include "support/conversation.hpp"
 
 #include <algorithm>

@@ -4,9 +4,9 @@
 
 #include <cles/json_reader.hpp>
 
-#include "core/peer_table.hpp"
-#include "core/presence.hpp"
 #include "fuzz/fuzz.hpp"
+#include "node/membership/membership.hpp"
+#include "node/membership/peer_table.hpp"
 #include "protocol/grammar.hpp"
 
 #include <chrono>
@@ -21,40 +21,41 @@ constexpr std::size_t most_peers = 4;
 
 class learner final : public core::table_reader {
   public:
-    learner(core::presence& table, time_point now) : table_(table), now_(now) {}
+    learner(core::membership& table, time_point now) : table_(table), now_(now) {}
 
     void on_report(const core::peer_report& r) override {
         ++entries;
-        require(protocol::is_name(r.said.node) && !protocol::is_reserved_target(r.said.node), "a node has a name");
-        require(r.said.endpoints.size() <= core::most_endpoints, "endpoints are bounded");
+        require(protocol::is_name(r.announced.node) && !protocol::is_reserved_target(r.announced.node),
+                "a node has a name");
+        require(r.announced.endpoints.size() <= core::max_endpoints, "endpoints are bounded");
         require(r.age >= milliseconds{0} && r.age <= std::chrono::hours{24}, "an age is bounded");
-        require(r.said.interval >= core::shortest_interval && r.said.interval <= core::longest_interval,
+        require(r.announced.interval >= core::min_interval && r.announced.interval <= core::max_interval,
                 "an interval is bounded");
-        table_.be_told(r, core::teller::at("tcp://10.0.0.7:1"), now_, now_);
+        table_.apply_gossip(r, core::observed_source::at("tcp://10.0.0.7:1"), now_, now_);
     }
-    void on_beat(const core::peer_beat& b) override {
+    void on_heartbeat(const core::peer_heartbeat& b) override {
         ++entries;
-        table_.be_told(b, now_, now_);
+        table_.apply_gossip(b, now_, now_);
     }
     void on_bad_entry() override { ++entries; }
 
     std::size_t entries = 0;
 
   private:
-    core::presence& table_;
+    core::membership& table_;
     time_point now_;
 };
 
 // Of another node that asks this one until there is no more.
-void check_told(const core::presence& table, time_point now) {
+void check_told(const core::membership& table, time_point now) {
     core::deadline_queue deadlines;
-    core::presence other{"other", 2, deadlines, most_peers * 2};
+    core::membership other{"other", 2, deadlines, most_peers * 2};
     std::string since = "0";
     for (int i = 0;; ++i) {
         require(i < 64, "there is an end");
         std::string text;
         json_writer w{text};
-        write_news(w, {"me", "00000001"}, table, {since, i % 2 == 0 ? "" : "00000002,00000003"}, 1200, now);
+        write_delta(w, {"me", "00000001"}, table, {since, i % 2 == 0 ? "" : "00000002,00000003"}, 1200, now);
         require(text.size() <= 1200, "an answer fits a datagram", text);
         require(is_valid_json(text), "an answer is JSON", text);
         learner to{other, now};
@@ -66,8 +67,9 @@ void check_told(const core::presence& table, time_point now) {
             break;
         }
     }
-    table.each([&](const core::presence::known& k) {
-        require(k.suspect || k.node == "other" || other.look(k.node).has_value(), "who is live is told of", k.node);
+    table.for_each([&](const core::membership::member& k) {
+        require(k.suspect || k.node == "other" || other.find_member(k.node).has_value(), "who is live is told of",
+                k.node);
     });
 }
 
@@ -75,9 +77,9 @@ void check_told(const core::presence& table, time_point now) {
 
 void run(std::string_view input) {
     core::deadline_queue deadlines;
-    core::presence table{"me", 1, deadlines, most_peers};
+    core::membership table{"me", 1, deadlines, most_peers};
     time_point now{std::chrono::hours{1}};
-    table.speak({.node = "me", .endpoints = {"tcp://0.0.0.0:1"}}, 1, now);
+    table.announce_self({.node = "me", .endpoints = {"tcp://0.0.0.0:1"}}, 1, now);
     while (!input.empty()) {
         const auto end = input.find('\n');
         const auto line = input.substr(0, end);

@@ -220,9 +220,9 @@ BOOST_AUTO_TEST_CASE(each_value_has_its_line) {
 }
 
 BOOST_DATA_TEST_CASE(an_error_names_file_line_and_key, boost::unit_test::data::make(mistakes), wrong) {
-    const auto said = refusal(wrong.text);
-    BOOST_TEST(said.starts_with(wrong.place), said);
-    BOOST_TEST(said.find(wrong.why) != std::string::npos, said);
+    const auto message = refusal(wrong.text);
+    BOOST_TEST(message.starts_with(wrong.place), message);
+    BOOST_TEST(message.find(wrong.why) != std::string::npos, message);
 }
 
 BOOST_AUTO_TEST_CASE(an_unreadable_file_is_an_error) {

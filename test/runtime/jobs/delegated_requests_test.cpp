@@ -117,10 +117,10 @@ BOOST_FIXTURE_TEST_CASE(a_job_whose_callback_does_not_answer_fails, fixture) {
 BOOST_FIXTURE_TEST_CASE(requests_of_a_withdrawn_job_are_withdrawn, fixture) {
     std::vector<cles::responder> kept;
     right.on_delegate("never", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
-    notes told;
+    notes answers;
     left.tasks->add_work(cles::verb::delegate, "asking", {}, [&](const job_context& job) {
-        job.delegate("DELEGATE right:never", {}, [&told, job](boost::system::error_code code, auto, auto) {
-            told.add(code == errc::cancelled ? "cancelled" : code.message());
+        job.delegate("DELEGATE right:never", {}, [&answers, job](boost::system::error_code code, auto, auto) {
+            answers.add(code == errc::cancelled ? "cancelled" : code.message());
         });
     });
     auto client = left.peer();
@@ -128,25 +128,25 @@ BOOST_FIXTURE_TEST_CASE(requests_of_a_withdrawn_job_are_withdrawn, fixture) {
     left.wait_for([&] { return kept.size() == 1; });
     client.send("PUSH self:cles/cancel/1 id=2\n");
     BOOST_TEST(client.line().starts_with(R"(id=1 {"error":"cancelled")"));
-    left.wait_for([&] { return kept.front().stopped() && told.size() == 1; });
-    BOOST_TEST(told.joined() == "cancelled");
+    left.wait_for([&] { return kept.front().stopped() && answers.size() == 1; });
+    BOOST_TEST(answers.joined() == "cancelled");
     left.wait_for([&] { return left.pool->load().running == 0; });
 }
 
 BOOST_FIXTURE_TEST_CASE(requests_of_a_stopped_job_are_cancelled, fixture) {
-    notes told;
+    notes answers;
     left.tasks->add_work(cles::verb::delegate, "late", {}, [&](const job_context& job) {
         while (!job.stopped()) {
             std::this_thread::sleep_for(1ms);
         }
-        job.delegate("PULL right:nothing", {}, [&told, job](boost::system::error_code code, auto, auto) {
-            told.add(code == errc::cancelled ? "cancelled" : code.message());
+        job.delegate("PULL right:nothing", {}, [&answers, job](boost::system::error_code code, auto, auto) {
+            answers.add(code == errc::cancelled ? "cancelled" : code.message());
         });
     });
     auto client = left.peer();
     client.ask("DELEGATE self:late deadline=10 id=1");
-    left.wait_for([&] { return told.size() == 1; });
-    BOOST_TEST(told.joined() == "cancelled");
+    left.wait_for([&] { return answers.size() == 1; });
+    BOOST_TEST(answers.joined() == "cancelled");
 }
 
 BOOST_FIXTURE_TEST_CASE(progress_of_a_request_reaches_the_job, fixture) {
@@ -154,17 +154,17 @@ BOOST_FIXTURE_TEST_CASE(progress_of_a_request_reaches_the_job, fixture) {
         job.progress(0.5);
         job.done();
     });
-    notes told;
+    notes answers;
     left.tasks->add_work(cles::verb::delegate, "asking", {}, [&](const job_context& job) {
         const auto options = cles::call_options{}.on_progress(
-            [&told](double at, std::string_view) { told.add(at == 0.5 ? "half" : "else"); });
-        job.delegate("DELEGATE right:slow", options, [&told, job](auto, auto, auto) {
-            told.add("done");
+            [&answers](double at, std::string_view) { answers.add(at == 0.5 ? "half" : "else"); });
+        job.delegate("DELEGATE right:slow", options, [&answers, job](auto, auto, auto) {
+            answers.add("done");
             job.done();
         });
     });
     BOOST_TEST(left.peer().ask("DELEGATE self:asking") == "{}");
-    BOOST_TEST(told.joined() == "half done");
+    BOOST_TEST(answers.joined() == "half done");
 }
 
 // What the callbacks of jobs received, and where.
@@ -173,8 +173,8 @@ struct ending : fixture {
         right.on_delegate("never", [this](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
         left.tasks->add_work(cles::verb::delegate, "asking", {}, [this](const job_context& job) {
             job.delegate("DELEGATE right:never", {}, [this, job](boost::system::error_code code, auto, auto) {
-                told.add(std::string{cles::wire_name(static_cast<errc>(code.value()))} +
-                         (std::this_thread::get_id() == io_thread ? " in line" : ""));
+                answers.add(std::string{cles::wire_name(static_cast<errc>(code.value()))} +
+                            (std::this_thread::get_id() == io_thread ? " in line" : ""));
                 job.done();
             });
             asked.add("once");
@@ -188,7 +188,7 @@ struct ending : fixture {
     std::thread::id io_thread = std::this_thread::get_id();
     std::vector<cles::responder> kept;
     notes asked;
-    notes told;
+    notes answers;
 };
 
 BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_open_requests, ending) {
@@ -196,10 +196,10 @@ BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_open_requests, ending) {
     client.send("DELEGATE self:asking id=1\n");
     left.wait_for([&] { return kept.size() == 1; });
     end_pool();
-    BOOST_TEST(told.joined() == "unavailable");
+    BOOST_TEST(answers.joined() == "unavailable");
     BOOST_TEST(client.line().starts_with(R"(id=1 {"error":"unavailable")"));
     run_ready(left.io);
-    BOOST_TEST(told.joined() == "unavailable"); // once
+    BOOST_TEST(answers.joined() == "unavailable"); // once
 }
 
 BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_unsent_requests, ending) {
@@ -210,7 +210,7 @@ BOOST_FIXTURE_TEST_CASE(closing_the_pool_completes_unsent_requests, ending) {
         std::this_thread::yield();
     }
     end_pool();
-    BOOST_TEST(told.joined() == "cancelled");
+    BOOST_TEST(answers.joined() == "cancelled");
     run_ready(left.io);
     BOOST_TEST(kept.empty());
 }
@@ -223,8 +223,8 @@ BOOST_FIXTURE_TEST_CASE(at_the_limit_of_a_drain_free_workers_run_callbacks, endi
     left.pool->drain(1ms, [&](const cles::runtime::drain_report& how) { drained = how.abandoned == 1; });
     left.wait_for([&] { return drained; });
     end_pool();
-    BOOST_TEST(told.size() == 1U); // by the end, or because its request was withdrawn
-    BOOST_TEST(!told.has("in line"));
+    BOOST_TEST(answers.size() == 1U); // by the end, or because its request was withdrawn
+    BOOST_TEST(!answers.has("in line"));
 }
 
 BOOST_FIXTURE_TEST_CASE(a_callback_runs_when_its_job_returns_after_the_end, ending) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/job_dispatcher.hpp"
+#include "jobs/drain_operation.hpp"
 #include "jobs/job_pool.hpp"
 
 #include <boost/asio/io_context.hpp>

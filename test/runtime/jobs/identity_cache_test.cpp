@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/owned_request.hpp"
+#include "jobs/identity_cache.hpp"
 
 #include <boost/test/unit_test.hpp>
 

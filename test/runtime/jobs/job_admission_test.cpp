@@ -106,11 +106,11 @@ BOOST_FIXTURE_TEST_CASE(a_job_past_its_deadline_leaves_the_queue, fixture) {
     BOOST_TEST(ran.size() == 0U);
 }
 
-// A job that runs until it is told to stop, and records how it was told.
-struct told : fixture {
-    told() : fixture({.workers = 2}) {
+// A job that runs until it is stopped, and records what it is notified of.
+struct stoppable : fixture {
+    stoppable() : fixture({.workers = 2}) {
         tasks->add_work(cles::verb::delegate, "watchful", {}, [this](const job_context& job) {
-            job.on_stop([this] { ran.add("told"); });
+            job.on_stop([this] { ran.add("notified"); });
             ran.add("begun");
             while (!job.stopped()) {
                 std::this_thread::sleep_for(1ms);
@@ -124,26 +124,26 @@ struct told : fixture {
         wait_for([&] { return ran.has("begun"); });
     }
     void check() {
-        wait_for([&] { return ran.has("told") && ran.has("stopped"); });
+        wait_for([&] { return ran.has("notified") && ran.has("stopped"); });
         wait_for([&] { return pool->load().running == 0; });
         BOOST_TEST(ran.size() == 3U);
     }
 };
 
-BOOST_FIXTURE_TEST_CASE(a_running_job_is_told_that_it_was_withdrawn, told) {
+BOOST_FIXTURE_TEST_CASE(a_running_job_is_notified_that_it_was_withdrawn, stoppable) {
     begin(client, "");
     client.send("PUSH self:cles/cancel/2 id=10\n");
     BOOST_TEST(client.line().starts_with(R"(id=2 {"error":"cancelled")"));
     check();
 }
 
-BOOST_FIXTURE_TEST_CASE(a_running_job_is_told_that_its_link_was_lost, told) {
+BOOST_FIXTURE_TEST_CASE(a_running_job_is_notified_that_its_link_was_lost, stoppable) {
     begin(client, "");
     client.reset();
     check();
 }
 
-BOOST_FIXTURE_TEST_CASE(a_running_job_is_told_of_its_deadline, told) {
+BOOST_FIXTURE_TEST_CASE(a_running_job_is_notified_of_its_deadline, stoppable) {
     begin(client, " deadline=20");
     BOOST_TEST(client.line().starts_with(R"(id=2 {"error":"deadline")"));
     check();

@@ -180,15 +180,15 @@ BOOST_FIXTURE_TEST_CASE(a_job_may_answer_after_the_pool_is_destroyed, fixture) {
     BOOST_TEST(client.line().starts_with(R"({"error":"unavailable")"));
     BOOST_TEST(ask("DELEGATE self:later").starts_with(R"({"error":"unavailable")"));
     BOOST_TEST(kept->stopped());
-    notes told;
-    std::thread{[&told, job = *std::exchange(kept, std::nullopt)] {
-        told.add(job.progress(0.5) ? "heard" : "unheard");
+    notes events;
+    std::thread{[&events, job = *std::exchange(kept, std::nullopt)] {
+        events.add(job.progress(0.5) ? "wanted" : "unwanted");
         job.log(cles::log_level::info, "still here");
         job.done("1");
         job.done("2");
-        told.add(std::string{job.request().task()});
+        events.add(std::string{job.request().task()});
     }}.join();
-    BOOST_TEST(told.joined() == "unheard later");
+    BOOST_TEST(events.joined() == "unwanted later");
     run_ready(io);
 }
 

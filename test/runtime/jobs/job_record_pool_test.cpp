@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/job_record.hpp"
+#include "jobs/job_record_pool.hpp"
 
 #include <boost/test/unit_test.hpp>
 

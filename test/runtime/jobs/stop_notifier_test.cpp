@@ -47,17 +47,17 @@ struct journal {
 
 BOOST_AUTO_TEST_CASE(callbacks_run_in_order_on_one_other_thread) {
     notifier stops{1min};
-    std::atomic<int> told{0};
+    std::atomic<int> calls{0};
     std::atomic<bool> in_order{true};
     std::atomic<bool> here{false};
     for (int i = 0; i < 10; ++i) {
         stops.notify({.callback = [&, i, io = std::this_thread::get_id()] {
-            in_order = in_order && told == i;
+            in_order = in_order && calls == i;
             here = here || std::this_thread::get_id() == io;
-            ++told;
+            ++calls;
         }});
     }
-    wait_until([&] { return told == 10; });
+    wait_until([&] { return calls == 10; });
     BOOST_TEST(in_order);
     BOOST_TEST(!here);
     BOOST_TEST(stops.close(1min) == 0U);
@@ -71,51 +71,51 @@ BOOST_AUTO_TEST_CASE(closing_without_calls_returns_at_once) {
 
 BOOST_AUTO_TEST_CASE(all_callbacks_run_before_close_returns) {
     for (int i = 0; i < 50; ++i) {
-        std::atomic<int> told{0};
+        std::atomic<int> calls{0};
         notifier stops;
-        stops.notify({.callback = [&] { ++told; }});
-        stops.notify({.callback = [&] { ++told; }});
+        stops.notify({.callback = [&] { ++calls; }});
+        stops.notify({.callback = [&] { ++calls; }});
         BOOST_TEST(stops.close(i % 2 == 0 ? 1min : 0ms) == 0U);
-        BOOST_TEST(told == 2);
+        BOOST_TEST(calls == 2);
     }
 }
 
 BOOST_AUTO_TEST_CASE(a_blocking_callback_is_reported_and_delays_no_other) {
     const auto log = std::make_shared<journal>();
     const auto held = std::make_shared<gate>();
-    std::atomic<int> told{0};
+    std::atomic<int> calls{0};
     notifier stops;
     for (int i = 0; i < 5; ++i) {
         stops.notify({.callback = [held] { held->pass(); },
                       .log = [log](log_level level, const std::string& text) { log->add(level, text); }});
-        stops.notify({.callback = [&] { ++told; }});
+        stops.notify({.callback = [&] { ++calls; }});
     }
-    wait_until([&] { return told == 5; });
+    wait_until([&] { return calls == 5; });
     BOOST_TEST(held->passed() == 0);
     wait_until([&] { return log->count("warning: its on_stop callback does not return") >= 4; });
     // Threads that return continue.
     held->open();
     wait_until([&] { return held->passed() == 5; });
-    stops.notify({.callback = [&] { ++told; }});
-    wait_until([&] { return told == 6; });
+    stops.notify({.callback = [&] { ++calls; }});
+    wait_until([&] { return calls == 6; });
     BOOST_TEST(stops.close(1min) == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(threads_are_bounded_and_exhaustion_is_reported_once) {
     const auto log = std::make_shared<journal>();
     const auto held = std::make_shared<gate>();
-    std::atomic<int> told{0};
+    std::atomic<int> calls{0};
     notifier stops{1ms};
     for (std::size_t i = 0; i < notifier::max_threads + 4; ++i) {
         stops.notify({.callback = [held] { held->pass(); },
                       .log = [log](log_level level, const std::string& text) { log->add(level, text); }});
     }
-    stops.notify({.callback = [&] { ++told; }});
+    stops.notify({.callback = [&] { ++calls; }});
     wait_until([&] { return held->arrived() == static_cast<int>(notifier::max_threads); });
     wait_until([&] { return log->count("error: ") == 1; });
-    BOOST_TEST(told == 0);
+    BOOST_TEST(calls == 0);
     held->open();
-    wait_until([&] { return told == 1; });
+    wait_until([&] { return calls == 1; });
     wait_until([&] { return held->passed() == static_cast<int>(notifier::max_threads) + 4; });
     BOOST_TEST(stops.close(1min) == 0U);
     BOOST_TEST(log->count("error: ") == 1U);

@@ -39,7 +39,7 @@ struct fixture : pooled_node {
     }
     drain_report drain(std::chrono::milliseconds limit) {
         std::optional<drain_report> report;
-        pool->drain(limit, [&](const drain_report& told) { report = told; });
+        pool->drain(limit, [&](const drain_report& result) { report = result; });
         wait_for([&] { return report.has_value(); });
         return *report;
     }
@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(a_drain_waits_for_running_and_queued_jobs) {
     node.client.send("DELEGATE self:held id=1\nDELEGATE self:quick id=2\n");
     node.wait_for([&] { return node.hold.arrived() == 1 && node.pool->load().queued == 1; });
     std::optional<drain_report> report;
-    node.pool->drain(patience, [&](const drain_report& told) { report = told; });
+    node.pool->drain(patience, [&](const drain_report& result) { report = result; });
     BOOST_TEST(node.client.ask("DELEGATE self:quick id=3") ==
                R"(id=3 {"error":"busy","message":"car1: it is shutting down","retry_ms":1000})");
     BOOST_TEST(!report.has_value());
@@ -130,20 +130,20 @@ BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_open_jobs_are_answered) {
 }
 
 BOOST_AUTO_TEST_CASE(a_job_that_stops_when_told_ends_with_the_pool) {
-    notes told;
+    notes events;
     {
         fixture node{{.workers = 1, .close_timeout = patience}};
         node.tasks->add_work(cles::verb::delegate, "polite", {}, [&](const job_context& job) {
-            told.add("begun");
+            events.add("begun");
             while (!job.stopped()) {
                 std::this_thread::sleep_for(1ms);
             }
-            told.add("ended");
+            events.add("ended");
         });
         node.client.send("DELEGATE self:polite id=1\n");
-        node.wait_for([&] { return told.size() == 1; });
+        node.wait_for([&] { return events.size() == 1; });
     }
-    BOOST_TEST(told.joined() == "begun ended");
+    BOOST_TEST(events.joined() == "begun ended");
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // Simulates seeds, or plans that lie in files, and tells what was broken (README.md of the folder above).
-#include "simulation/simulate.hpp"
+#include "simulation/world/simulate.hpp"
 
 #include <charconv>
 #include <chrono>

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/convert.hpp>
+
+#include <bitset>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::detail {
+namespace {
+
+struct level {
+    bool is_object = false;
+    std::size_t index = 0;
+    std::string_view key{};
+};
+
+// The path to position `at` of compact JSON, which may end anywhere after it, as "route[2].name".
+std::string path_to(std::string_view json, std::size_t at) {
+    std::vector<level> levels;
+    for (std::size_t i = 0; i < at; ++i) {
+        switch (json[i]) {
+        case '{': levels.push_back({.is_object = true}); break;
+        case '[': levels.push_back({}); break;
+        case '}':
+        case ']': levels.pop_back(); break;
+        case ',': ++levels.back().index; break;
+        case '"': {
+            const auto begin = i + 1;
+            while (++i < json.size() && json[i] != '"') {
+                i += json[i] == '\\' ? 1 : 0;
+            }
+            if (i < at && i + 1 < json.size() && json[i + 1] == ':') {
+                levels.back().key = json.substr(begin, i - begin);
+            }
+            break;
+        }
+        default: break;
+        }
+    }
+    std::string path;
+    for (const auto& l : levels) {
+        if (l.is_object) {
+            path.append(path.empty() ? "" : ".").append(l.key);
+        } else {
+            path.append("[").append(std::to_string(l.index)).append("]");
+        }
+    }
+    return path;
+}
+
+} // namespace
+
+void throw_broken_text(const json_writer& w) {
+    const auto path = path_to(w.written(), w.broken_text());
+    throw error(errc::conversion, path + (path.empty() ? "" : ": ") + "text that is not UTF-8");
+}
+
+bool fail_count(json_reader& r, std::string_view which, std::size_t wanted) {
+    return r.fail(std::string{which} + " than " + std::to_string(wanted) + " elements");
+}
+
+namespace {
+
+std::size_t find_field(std::span<const field> fields, std::string_view name) noexcept {
+    std::size_t i = 0;
+    while (i < fields.size() && fields[i].name != name) {
+        ++i;
+    }
+    return i;
+}
+
+// The fields that have been read; does not allocate for as many as most structs have.
+class seen_fields {
+  public:
+    explicit seen_fields(std::size_t count) : more_(count > few ? count - few : 0) {}
+
+    void add(std::size_t i) {
+        if (i < few) {
+            first_.set(i);
+        } else {
+            more_[i - few] = true;
+        }
+    }
+    [[nodiscard]] bool contains(std::size_t i) const { return i < few ? first_.test(i) : more_[i - few]; }
+
+  private:
+    static constexpr std::size_t few = 64;
+    std::bitset<few> first_;
+    std::vector<bool> more_;
+};
+
+} // namespace
+
+bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
+    seen_fields seen{fields.size()};
+    std::size_t next = 0; // members usually arrive in order
+    std::string_view key;
+    if (!r.begin_object()) {
+        return false;
+    }
+    for (;;) {
+        if (next < fields.size() && r.next_key_is(fields[next].name)) {
+            // as expected
+        } else if (!r.next_key(key)) {
+            break;
+        } else {
+            next = find_field(fields, key);
+        }
+        if (next == fields.size()) {
+            if (!r.skip()) {
+                return false;
+            }
+            continue;
+        }
+        if (!fields[next].read(r, object)) {
+            r.inside_member(fields[next].name);
+            return false;
+        }
+        seen.add(next++);
+    }
+    if (!r.ok()) {
+        return false;
+    }
+    for (std::size_t i = 0; i < fields.size(); ++i) {
+        if (fields[i].required && !seen.contains(i)) {
+            r.fail("is missing");
+            r.inside_member(fields[i].name);
+            return false;
+        }
+    }
+    return true;
+}
+
+bool read_choice(json_reader& r, std::span<const std::string_view> names, std::size_t& index) {
+    std::string_view name;
+    if (!r.read(name)) {
+        return false;
+    }
+    for (std::size_t i = 0; i < names.size(); ++i) {
+        if (names[i] == name) {
+            index = i;
+            return true;
+        }
+    }
+    std::string choices;
+    for (const auto choice : names) {
+        choices.append(choices.empty() ? "" : ", ").append(choice);
+    }
+    return r.fail("expected one of " + choices);
+}
+
+void write_text(json_writer& w, std::string_view json) {
+    std::string why;
+    if (!is_valid_json(json, 32, &why)) {
+        throw error(errc::conversion, "the text to send is not JSON: " + why);
+    }
+    std::string compact;
+    append_compact_json(json, compact);
+    w.raw(compact);
+}
+
+} // namespace cles::detail

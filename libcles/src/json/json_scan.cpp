@@ -1,0 +1,357 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "json/json_scan.hpp"
+
+#include "json/characters.hpp"
+
+#include <array>
+#include <charconv>
+#include <cstdint>
+#include <string>
+
+namespace cles::json_detail {
+namespace {
+
+void append_utf8(std::string& out, std::uint32_t c) {
+    const auto put = [&](std::uint32_t byte) { out.push_back(static_cast<char>(byte)); };
+    if (c < 0x80) {
+        put(c);
+    } else if (c < 0x800) {
+        put(0xC0U | (c >> 6U));
+        put(0x80U | (c & 0x3FU));
+    } else if (c < 0x10000) {
+        put(0xE0U | (c >> 12U));
+        put(0x80U | ((c >> 6U) & 0x3FU));
+        put(0x80U | (c & 0x3FU));
+    } else {
+        put(0xF0U | (c >> 18U));
+        put(0x80U | ((c >> 12U) & 0x3FU));
+        put(0x80U | ((c >> 6U) & 0x3FU));
+        put(0x80U | (c & 0x3FU));
+    }
+}
+
+bool hex4(std::string_view text, std::uint32_t& out) noexcept {
+    if (text.size() < 4) {
+        return false;
+    }
+    const auto* end = text.data() + 4;
+    return std::from_chars(text.data(), end, out, 16).ptr == end;
+}
+
+std::string_view scan_escape(std::string_view text, std::size_t& at) noexcept {
+    ++at;
+    if (at >= text.size()) {
+        return "a string without an end";
+    }
+    if (text[at] == 'u') {
+        std::uint32_t unit = 0;
+        if (!hex4(text.substr(at + 1), unit)) {
+            return "\\u needs four hex digits";
+        }
+        at += 5;
+        return {};
+    }
+    if (std::string_view{"\"\\/bfnrt"}.find(text[at]) == std::string_view::npos) {
+        return "an unknown escape";
+    }
+    ++at;
+    return {};
+}
+
+bool unescape_unit(std::string_view raw, std::size_t& at, std::string& out) {
+    std::uint32_t unit = 0;
+    hex4(raw.substr(at), unit);
+    at += 4;
+    if (unit >= 0xD800 && unit < 0xDC00) {
+        std::uint32_t low = 0;
+        if (raw.substr(at, 2) != "\\u" || !hex4(raw.substr(at + 2), low) || low < 0xDC00 || low > 0xDFFF) {
+            return false;
+        }
+        at += 6;
+        unit = 0x10000 + ((unit - 0xD800) << 10U) + (low - 0xDC00);
+    } else if (unit >= 0xDC00 && unit < 0xE000) {
+        return false;
+    }
+    append_utf8(out, unit);
+    return true;
+}
+
+} // namespace
+
+std::string_view scan_number(std::string_view text, std::size_t& at, bool& integral) noexcept {
+    const auto* p = text.data() + at;
+    const auto* const end = text.data() + text.size();
+    const auto here = [&](char c) { return p != end && *p == c; };
+    const auto skip_digits = [&] {
+        const auto* const from = p;
+        while (p != end && is_digit(*p)) {
+            ++p;
+        }
+        return p != from;
+    };
+    const auto stop = [&](std::string_view wrong) {
+        at = static_cast<std::size_t>(p - text.data());
+        return wrong;
+    };
+    integral = true;
+    p += here('-') ? 1 : 0;
+    if (here('0')) {
+        ++p;
+        if (p != end && is_digit(*p)) {
+            return stop("a number has no leading zeros");
+        }
+    } else if (!skip_digits()) {
+        return stop("'-' without a digit");
+    }
+    if (here('.')) {
+        integral = false;
+        ++p;
+        if (!skip_digits()) {
+            return stop("'.' without a digit");
+        }
+    }
+    if (here('e') || here('E')) {
+        integral = false;
+        ++p;
+        p += here('+') || here('-') ? 1 : 0;
+        if (!skip_digits()) {
+            return stop("an exponent without a digit");
+        }
+    }
+    return stop({});
+}
+
+bool read_short_decimal(std::string_view text, std::size_t& at, double& out) noexcept {
+    constexpr std::size_t max_digits = 15;
+    constexpr std::array<double, max_digits + 1> powers{1e0, 1e1, 1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                                        1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15};
+    const auto* const begin = text.data() + at;
+    const auto* const end = text.data() + text.size();
+    const auto* p = begin;
+    const bool negative = p != end && *p == '-';
+    p += negative ? 1 : 0;
+    std::uint64_t digits = 0;
+    const auto* const whole = p;
+    const auto take_digits = [&] {
+        while (p != end && is_digit(*p)) {
+            digits = digits * 10 + static_cast<std::uint64_t>(*p - '0');
+            ++p;
+        }
+    };
+    take_digits();
+    auto count = static_cast<std::size_t>(p - whole);
+    if (count == 0 || count > max_digits || (count > 1 && *whole == '0')) {
+        return false;
+    }
+    std::size_t decimals = 0;
+    if (p != end && *p == '.') {
+        const auto* const fraction = ++p;
+        take_digits();
+        decimals = static_cast<std::size_t>(p - fraction);
+        count += decimals;
+        if (decimals == 0 || count > max_digits) {
+            return false;
+        }
+    }
+    if (p != end && (*p == 'e' || *p == 'E')) {
+        return false;
+    }
+    const auto value = static_cast<double>(digits) / powers[decimals];
+    out = negative ? -value : value;
+    at += static_cast<std::size_t>(p - begin);
+    return true;
+}
+
+std::string_view scan_string(std::string_view text, std::size_t& at, std::string_view& raw, bool& escaped) noexcept {
+    const auto start = ++at;
+    escaped = false;
+    for (;;) {
+        at = plain_end(text, at);
+        if (at >= text.size()) {
+            return "a string without an end";
+        }
+        if (text[at] == '"') {
+            raw = text.substr(start, at - start);
+            ++at;
+            return {};
+        }
+        if (text[at] == '\\') {
+            escaped = true;
+            if (const auto wrong = scan_escape(text, at); !wrong.empty()) {
+                return wrong;
+            }
+        } else if (static_cast<unsigned char>(text[at]) < 0x20) {
+            return "a control character in a string";
+        } else if (const auto length = utf8_sequence(text, at); length != 0) {
+            at += length;
+        } else {
+            return "invalid UTF-8 in a string";
+        }
+    }
+}
+
+bool unescape(std::string_view raw, std::string& out) {
+    out.clear();
+    for (std::size_t i = 0; i < raw.size();) {
+        if (raw[i] != '\\') {
+            out.push_back(raw[i++]);
+            continue;
+        }
+        const auto c = raw[i + 1];
+        i += 2;
+        switch (c) {
+        case 'b': out.push_back('\b'); break;
+        case 'f': out.push_back('\f'); break;
+        case 'n': out.push_back('\n'); break;
+        case 'r': out.push_back('\r'); break;
+        case 't': out.push_back('\t'); break;
+        case 'u':
+            if (!unescape_unit(raw, i, out)) {
+                return false;
+            }
+            break;
+        default: out.push_back(c);
+        }
+    }
+    return true;
+}
+
+namespace {
+
+using kind = json_error::kind;
+
+// Recursion is bounded by the depth.
+class skipper {
+  public:
+    skipper(std::string_view text, std::size_t at) noexcept : text_(text), at_(at) {}
+
+    [[nodiscard]] std::size_t at() const noexcept { return at_; }
+
+    json_error value(std::size_t depth) {
+        switch (look()) {
+        case '{': return depth == 0 ? json_error{kind::too_deep} : object(depth - 1);
+        case '[': return depth == 0 ? json_error{kind::too_deep} : array(depth - 1);
+        case '"': return string();
+        case 't': return literal("true");
+        case 'f': return literal("false");
+        case 'n': return literal("null");
+        case '-':
+        case '0':
+        case '1':
+        case '2':
+        case '3':
+        case '4':
+        case '5':
+        case '6':
+        case '7':
+        case '8':
+        case '9': return number();
+        default: return {kind::expected, "a value"};
+        }
+    }
+
+  private:
+    // The next character that is not white space; 0 at the end.
+    char look() noexcept {
+        while (at_ < text_.size()) {
+            const auto c = text_[at_];
+            if (c > ' ' || (c != ' ' && c != '\t' && c != '\n' && c != '\r')) {
+                return c;
+            }
+            ++at_;
+        }
+        return '\0';
+    }
+
+    json_error object(std::size_t depth) {
+        ++at_;
+        if (look() == '}') {
+            ++at_;
+            return {};
+        }
+        for (;;) {
+            if (look() != '"') {
+                return {kind::expected, "a member's name"};
+            }
+            if (const auto flaw = string(); flaw.what != kind::none) {
+                return flaw;
+            }
+            if (look() != ':') {
+                return {kind::expected, "':'"};
+            }
+            ++at_;
+            if (const auto flaw = value(depth); flaw.what != kind::none) {
+                return flaw;
+            }
+            const auto c = look();
+            if (c != ',' && c != '}') {
+                return {kind::expected, "',' or '}'"};
+            }
+            ++at_;
+            if (c == '}') {
+                return {};
+            }
+        }
+    }
+
+    json_error array(std::size_t depth) {
+        ++at_;
+        if (look() == ']') {
+            ++at_;
+            return {};
+        }
+        for (;;) {
+            if (const auto flaw = value(depth); flaw.what != kind::none) {
+                return flaw;
+            }
+            const auto c = look();
+            if (c != ',' && c != ']') {
+                return {kind::expected, "',' or ']'"};
+            }
+            ++at_;
+            if (c == ']') {
+                return {};
+            }
+        }
+    }
+
+    json_error string() {
+        std::string_view raw;
+        bool escaped = false;
+        if (const auto wrong = scan_string(text_, at_, raw, escaped); !wrong.empty()) {
+            return {kind::bad, wrong};
+        }
+        if (std::string ignored; escaped && !unescape(raw, ignored)) {
+            return {kind::bad, "half of a surrogate pair"};
+        }
+        return {};
+    }
+
+    json_error number() {
+        bool integral = false;
+        const auto wrong = scan_number(text_, at_, integral);
+        return wrong.empty() ? json_error{} : json_error{kind::bad, wrong};
+    }
+
+    json_error literal(std::string_view word) {
+        if (text_.substr(at_, word.size()) != word) {
+            return {kind::expected, word};
+        }
+        at_ += word.size();
+        return {};
+    }
+
+    std::string_view text_;
+    std::size_t at_;
+};
+
+} // namespace
+
+json_error skip_json(std::string_view text, std::size_t& at, std::size_t max_depth) {
+    skipper s{text, at};
+    const auto flaw = s.value(max_depth);
+    at = s.at();
+    return flaw;
+}
+
+} // namespace cles::json_detail

@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/base/completion_queue.hpp"
+
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+struct caller {
+    void operator()(completion::failure& due) const { due.operation.release()->fail(due.code, due.why); }
+    void operator()(completion::result& due) const { due.operation.release()->offer(due.json); }
+    void operator()(completion::event_failure& due) const { due.operation.release()->fail(due.code, due.why); }
+    void operator()(completion::event& due) const { due.operation.release()->deliver(due.what.view()); }
+    void operator()(const completion::callback& due) const { due.function(); }
+    void operator()(const completion::thrown& due) const { std::rethrow_exception(due.what); }
+};
+
+} // namespace
+
+void completion::operator()() { std::visit(caller{}, kind_); }
+
+void completion_queue::put(completion due) {
+    if (later_) {
+        later_(std::move(due));
+    } else {
+        due();
+    }
+}
+
+// Usually a line causes one call.
+void completion_queue::keep(std::exception_ptr thrown) {
+    if (thrown_ == nullptr) {
+        thrown_ = std::move(thrown);
+    } else {
+        put(completion{completion::thrown{std::move(thrown)}});
+    }
+}
+
+void completion_queue::fail(detail::pending_ptr operation, boost::system::error_code code, std::string_view why,
+                            completion::progress_function progress) {
+    completion::failure due{std::move(operation), code, std::string{why}, std::move(progress)};
+    if (due.operation->calls_user()) {
+        put(completion{std::move(due)});
+    } else {
+        caller{}(due);
+    }
+}
+
+void completion_queue::refuse(detail::pending_ptr operation, const protocol::failure& why, std::string_view answer,
+                              completion::progress_function progress) {
+    if (operation->calls_user()) {
+        fail(std::move(operation), why.code, why.message, std::move(progress));
+    } else {
+        operation.release()->refuse(why.code, why.message, answer);
+    }
+}
+
+void completion_queue::succeed(detail::pending_ptr operation, std::string_view json) {
+    completion::result due{std::move(operation), std::string{json}};
+    if (due.operation->calls_user()) {
+        put(completion{std::move(due)});
+    } else {
+        caller{}(due);
+    }
+}
+
+void completion_queue::fail(pending_event_ptr operation, boost::system::error_code code, std::string_view why) {
+    completion::event_failure due{std::move(operation), code, std::string{why}};
+    if (due.operation->calls_user()) {
+        put(completion{std::move(due)});
+    } else {
+        caller{}(due);
+    }
+}
+
+void completion_queue::deliver(pending_event_ptr operation, const detail::raw_event& event) {
+    if (operation->calls_user()) {
+        put(completion{completion::event{std::move(operation), kept_event{event}}});
+    } else {
+        operation.release()->deliver(event);
+    }
+}
+
+} // namespace cles::core

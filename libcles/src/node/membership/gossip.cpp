@@ -1,0 +1,459 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/gossip.hpp"
+
+#include <cles/limits.hpp>
+
+#include "node/base/metrics.hpp"
+#include "node/membership/announcer.hpp"
+#include "node/membership/membership.hpp"
+#include "node/membership/peer_table.hpp"
+#include "node/membership/reachable_endpoints.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace cles::core {
+
+/// Applies a table to `membership`, and collects what it lacks.
+class delta_applier final : public table_reader {
+  public:
+    /// `interval`: this node's own, for entries without one.
+    delta_applier(membership& into, counters& counts, std::chrono::milliseconds interval, observed_source by,
+                  time_point asked, time_point now)
+        : into_(into), counts_(counts), interval_(interval), by_(std::move(by)), asked_(asked), now_(now) {}
+
+    void on_report(const peer_report& report) override {
+        const bool was_known = into_.find_member(report.announced.node).has_value();
+        if (count(take(report)) == membership::verdict::taken && !was_known && !report.announced.leaving) {
+            newcomer_ = report.announced.node;
+        }
+    }
+    void on_heartbeat(const peer_heartbeat& beat) override {
+        const auto verdict = count(into_.apply_gossip(beat, asked_, now_));
+        if (verdict == membership::verdict::unknown && missing_.size() < protocol::max_described) {
+            missing_.push_back(beat.epoch);
+        }
+    }
+    void on_bad_entry() override { ++counts_.entries_dropped; }
+
+    /// The last node that was not known before; empty if all were known.
+    [[nodiscard]] const std::string& newcomer() const noexcept { return newcomer_; }
+    /// Unknown incarnations of which only heartbeats arrived.
+    [[nodiscard]] const std::vector<std::uint32_t>& missing() const noexcept { return missing_; }
+
+  private:
+    membership::verdict take(const peer_report& report) {
+        if (report.has_interval) {
+            return into_.apply_gossip(report, by_, asked_, now_);
+        }
+        auto whole = report;
+        whole.announced.interval = interval_;
+        return into_.apply_gossip(whole, by_, asked_, now_);
+    }
+    membership::verdict count(membership::verdict v) {
+        counts_.peers_refused += v == membership::verdict::refused ? 1 : 0;
+        return v;
+    }
+
+    membership& into_;
+    counters& counts_;
+    std::chrono::milliseconds interval_;
+    observed_source by_;
+    time_point asked_;
+    time_point now_;
+    std::string newcomer_;
+    std::vector<std::uint32_t> missing_;
+};
+
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr std::size_t max_bootstraps = 4;
+
+std::string list_of(const std::vector<std::uint32_t>& epochs) {
+    std::string text;
+    for (const auto epoch : epochs) {
+        text.append(text.empty() ? "" : ",").append(protocol::epoch_text(epoch));
+    }
+    return text;
+}
+
+bool can_be_asked(const membership::member& k) noexcept { return !k.suspect && !k.where.empty(); }
+
+} // namespace
+
+gossip::gossip(self who, client& out, membership& others, counters& counts, deadline_queue& deadlines, std::size_t most,
+               std::uint32_t seed)
+    : self_(std::move(who)), out_(out), others_(others), counts_(counts), deadlines_(deadlines), jitter_(seed),
+      seeds_(seed * 3 + 1), lost_(most, seed * 5 + 2) {}
+
+void gossip::start(time_point now) {
+    started_ = true;
+    last_asked_ = now;
+    next_search_ = now + until_next_search();
+    deadlines_.arm(*this, now);
+}
+
+void gossip::leave(time_point now) {
+    if (!started_ || left_) {
+        return;
+    }
+    left_ = true;
+    others_.leave(now);
+    for (auto& c : contacts_) {
+        send_own_entry(c, now);
+    }
+}
+
+void gossip::stop(time_point now) {
+    if (!started_) {
+        return;
+    }
+    leave(now);
+    started_ = false;
+    deadlines_.disarm(*this);
+    contacts_.clear();
+}
+
+void gossip::set_seeds(const std::vector<std::string>& urls, time_point now) {
+    seeds_.set(urls);
+    if (started_) {
+        deadlines_.arm(*this, now);
+    }
+}
+
+std::vector<std::string> gossip::asked() const {
+    std::vector<std::string> names;
+    for (const auto& c : contacts_) {
+        if (c.as != part::bootstrap) {
+            names.push_back(c.node);
+        }
+    }
+    return names;
+}
+
+// -- replies -------------------------------------------------------------------------------------------------------
+
+void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point now) {
+    auto* c = contacts_.find_ticket(ticket);
+    if (c == nullptr) {
+        return;
+    }
+    if (now - c->sent > limit) { // suspended meanwhile: its ages are unreliable
+        on_failure(ticket, now);
+        return;
+    }
+    delta_applier in{others_, counts_, interval(), observed_source::at(c->url), c->sent, now};
+    table_head head;
+    if (!read_table(json, others_.max_peers() * 2 + 2, in, head)) {
+        on_failure(ticket, now);
+        return;
+    }
+    c->failures = 0;
+    c->ticket = 0;
+    if (head.node == self_.name && head.epoch == self_.epoch) {
+        seeds_.on_self(c->url);
+        end(*c, true, now);
+    } else if (head.pool != others_.pool() && !head.node.empty()) {
+        end(*c, true, now);
+    } else if (head.next.empty()) {
+        c->since = "0";
+        c->table_bytes = json.size();
+        c->sent = now;
+        c->ticket = ++last_ticket_;
+        out_.ask_description(c->ticket, c->url);
+    } else {
+        c->since = head.next;
+        seeds_.on_answer(c->url, head.node);
+        const bool another = !c->node.empty() && c->node != head.node;
+        c->describe = list_of(in.missing());
+        if (another || (c->as == part::bootstrap && !head.more)) {
+            end(*c, another, now);
+        } else if (head.more) {
+            c->next = now;
+        } else {
+            postpone(*c, now);
+        }
+    }
+    review(now); // before the link of a bootstrap is released: it may be asked again over it
+    follow(now);
+}
+
+void gossip::on_description(std::uint64_t ticket, std::string_view json, time_point now) {
+    auto* c = contacts_.find_ticket(ticket);
+    if (c == nullptr) {
+        return;
+    }
+    peer_report report;
+    if (now - c->sent > limit || !read_description(json, report)) {
+        on_failure(ticket, now);
+        return;
+    }
+    c->ticket = 0;
+    if (report.announced.node == self_.name && protocol::epoch_text(report.epoch) == self_.epoch) {
+        seeds_.on_self(c->url);
+        end(*c, true, now);
+    } else {
+        delta_applier in{others_, counts_, interval(), observed_source::at(c->url), c->sent, now};
+        in.on_report(report);
+        seeds_.on_answer(c->url, report.announced.node);
+        if (c->as == part::bootstrap || (!c->node.empty() && c->node != report.announced.node)) {
+            end(*c, c->as != part::bootstrap, now);
+        } else if (announce_only_.add(others_, c->node, now + interval() * announce_only_nodes::recheck_intervals,
+                                      now)) {
+            end(*c, false, now);
+        } else {
+            const auto pause = milliseconds{c->table_bytes * 1000 / bytes_a_second};
+            c->next = now + std::max(interval() / 2, pause);
+        }
+    }
+    review(now);
+    follow(now);
+}
+
+void gossip::on_failure(std::uint64_t ticket, time_point now) {
+    auto* c = contacts_.find_ticket(ticket);
+    if (c == nullptr) {
+        return;
+    }
+    ++counts_.tables_failed;
+    c->ticket = 0;
+    if (++c->failures >= max_failures || c->as == part::bootstrap) {
+        end(*c, true, now);
+    } else {
+        postpone(*c, now);
+    }
+    sweep();
+    follow(now);
+}
+
+void gossip::write_delta(json_writer& w, const table_question& asked, std::size_t longest, time_point now) {
+    last_asked_ = now;
+    ++counts_.tables_sent;
+    core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now);
+}
+
+bool gossip::on_pushed_table(std::string_view json, const observed_source& by, time_point now) {
+    delta_applier in{others_, counts_, interval(), by, now, now};
+    table_head head;
+    const bool good = read_table(json, max_pushed_entries, in, head);
+    if (started_ && !in.newcomer().empty() && !unknown_peer_) {
+        unknown_peer_ = in.newcomer();
+        deadlines_.arm(*this, now);
+    }
+    return good;
+}
+
+void gossip::on_gone(std::string_view node, std::string_view where, time_point now) { lost_.add(node, where, now); }
+
+// -- selection -----------------------------------------------------------------------------------------------------
+
+void gossip::on_deadline(time_point now) {
+    review(now);
+    for (auto& c : contacts_) {
+        if (c.ticket == 0 && c.next <= now) {
+            call(c, now);
+        }
+    }
+    send_own_entry_if_not_asked(now);
+    follow(now);
+}
+
+void gossip::review(time_point now) {
+    contacts_.expire_resting(now);
+    drop_unresponsive(now);
+    choose_successor(now);
+    choose_at_random(now);
+    contact_bootstraps(now);
+    sweep();
+}
+
+void gossip::drop_unresponsive(time_point now) {
+    for (auto& c : contacts_) {
+        if (c.ticket != 0 && now - c.sent > limit * 2) { // no outcome was reported
+            c.ticket = 0;
+            ++c.failures;
+        }
+        if (c.as == part::bootstrap) {
+            continue;
+        }
+        const auto known = others_.find_member(c.node);
+        // Nodes chosen while few were known would be the same for all, and changes would come only from them.
+        const bool had_its_time = c.until <= now || (c.as == part::chosen && others_.size() >= 2 * c.among);
+        if (!known || !can_be_asked(*known) || c.failures >= max_failures || (had_its_time && c.ticket == 0)) {
+            end(c, c.failures != 0, now);
+        } else {
+            c.url = known->where;
+        }
+    }
+}
+
+void gossip::choose_successor(time_point now) {
+    std::optional<membership::member> next;
+    auto name = self_.name;
+    for (std::size_t i = 0; i < others_.size(); ++i) {
+        const auto k = others_.next_member(name);
+        if (can_be_asked(*k) && !contacts_.rests(k->node, now) && !announce_only_.contain(*k, now)) {
+            next = k;
+            break;
+        }
+        name = k->node;
+    }
+    const auto* current = contacts_.find(part::successor);
+    if (!next || (current != nullptr && current->node == next->node)) {
+        return;
+    }
+    // While the table grows, there is often a closer successor, and each change costs a whole table.
+    if (current != nullptr && now < next_successor_) {
+        return;
+    }
+    next_successor_ = now + interval();
+    for (auto& c : contacts_) {
+        if (c.as == part::successor) {
+            c.as = part::chosen;
+            c.until = now + interval();
+            c.among = others_.size();
+        }
+    }
+    if (auto* already = contacts_.find_node(next->node); already != nullptr) {
+        already->as = part::successor;
+        already->until = time_point::max();
+    } else {
+        contacts_.add(part::successor, next->node, next->where, now);
+    }
+}
+
+void gossip::choose_at_random(time_point now) {
+    constexpr int tries = 8; // the next turn comes soon
+    const auto size = others_.size();
+    for (int i = 0; i < tries && size != 0 && contacts_.count(part::chosen) < random_contacts; ++i) {
+        const auto k = others_.at(jitter_.below(size));
+        if (can_be_asked(k) && contacts_.find_node(k.node) == nullptr && !announce_only_.contain(k, now) &&
+            (size <= random_contacts + 1 || !contacts_.rests(k.node, now))) {
+            const auto stay = interval() * intervals_of_stay;
+            auto& c = contacts_.add(part::chosen, k.node, k.where, now);
+            c.until = now + stay - jitter_.quarter_of(stay);
+            c.among = size;
+        }
+    }
+}
+
+void gossip::contact_bootstraps(time_point now) {
+    while (contacts_.count(part::bootstrap) < max_bootstraps) {
+        const auto url = seeds_.due(others_, now, search_pause());
+        if (!url) {
+            break;
+        }
+        contacts_.add(part::bootstrap, {}, *url, now);
+    }
+    if (unknown_peer_) {
+        const auto known = others_.find_member(*unknown_peer_);
+        unknown_peer_.reset();
+        if (known && can_be_asked(*known) && contacts_.find_node(known->node) == nullptr) {
+            contacts_.add(part::bootstrap, known->node, known->where, now);
+        }
+    }
+    if (now >= next_search_) {
+        next_search_ = now + until_next_search();
+        if (const auto lost = lost_.any(others_, now); lost && contacts_.find_node(lost->name) == nullptr) {
+            contacts_.add(part::bootstrap, lost->name, lost->url, now);
+        }
+    }
+}
+
+// -- requests ------------------------------------------------------------------------------------------------------
+
+void gossip::call(contact& c, time_point now) {
+    if (!c.own_entry_sent) {
+        send_own_entry(c, now);
+    }
+    ++counts_.tables_requested;
+    c.sent = now;
+    c.ticket = ++last_ticket_;
+    out_.ask(c.ticket, c.url, c.since, c.describe);
+}
+
+void gossip::send_own_entry(contact& c, time_point now) {
+    const auto* own = others_.own();
+    if (own == nullptr) {
+        return;
+    }
+    c.own_entry_sent = true;
+    std::string table;
+    json_writer w{table};
+    write_own_entry(w, own->announced, self_.epoch, own->seq, std::chrono::ceil<milliseconds>(now - own->last_seen));
+    out_.push(c.url, table);
+}
+
+// A node that is no other node's successor would otherwise remain unknown.
+void gossip::send_own_entry_if_not_asked(time_point now) {
+    if (now - last_asked_ < interval()) {
+        return;
+    }
+    last_asked_ = now;
+    const auto who =
+        std::find_if(contacts_.begin(), contacts_.end(), [](const contact& c) { return c.as != part::bootstrap; });
+    if (who != contacts_.end()) {
+        send_own_entry(*who, now);
+    }
+}
+
+void gossip::postpone(contact& c, time_point now) {
+    const bool few = others_.size() <= random_contacts + 1;
+    const auto pause = interval() / (few ? turns_among_few : turns_per_interval);
+    c.next = now + pause - jitter_.quarter_of(pause);
+}
+
+void gossip::end(contact& c, bool rests, time_point now) {
+    c.ended = true;
+    if (rests && !c.node.empty()) {
+        contacts_.rest(c.node, now + interval() * intervals_of_rest);
+    }
+}
+
+void gossip::sweep() {
+    for (const auto& url : contacts_.take_ended()) {
+        out_.release(url);
+    }
+}
+
+void gossip::follow(time_point now) {
+    if (!started_) {
+        return;
+    }
+    auto due = std::min(next_search_, last_asked_ + interval());
+    if (const auto seed = seeds_.next(); seed && contacts_.count(part::bootstrap) < max_bootstraps) {
+        due = std::min(due, *seed);
+    }
+    for (const auto& c : contacts_) {
+        due = std::min(due, c.ticket == 0 ? c.next : c.sent + limit * 2);
+    }
+    const bool wanting = contacts_.count(part::chosen) + contacts_.count(part::successor) <
+                         std::min<std::size_t>(random_contacts + 1, announce_only_.count_gossiping(others_, now));
+    if (wanting) {
+        due = std::min(due, now + interval() / turns_per_interval);
+    }
+    deadlines_.arm(*this, std::max(due, now + milliseconds{1}));
+}
+
+milliseconds gossip::interval() const noexcept { return announcer::interval_among(others_.size()); }
+
+// All nodes together try at most four times a second, however many they are, so as not to flood a node that is down.
+milliseconds gossip::search_pause() const noexcept {
+    return std::max(seeds::min_rest, milliseconds{250} * static_cast<int>(others_.size() + 1));
+}
+
+// At random within twice that pause: nodes that started together would otherwise all try at once.
+milliseconds gossip::until_next_search() noexcept {
+    return milliseconds{jitter_.below(static_cast<std::size_t>(search_pause().count()) * 2)};
+}
+
+} // namespace cles::core

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "node/base/backoff.hpp"
+#include "node/base/deadlines.hpp"
+#include "node/base/metrics.hpp"
+#include "node/membership/gossip_candidates.hpp"
+#include "node/membership/gossip_contacts.hpp"
+#include "node/membership/membership.hpp"
+#include "node/membership/peer_table.hpp"
+#include "node/membership/reachable_endpoints.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// Decides which nodes are asked for their tables, and when (docs/protocol.md, "Gossip"): the successor by name, so
+/// that each node is asked by some node; two random nodes, so that changes spread fast; and from time to time a lost
+/// node.
+class gossip final : public peer_table_server, private deadline {
+  public:
+    /// Sends the requests. The outcome of a ticket is reported to `on_answer`, `on_description` or `on_failure`, never
+    /// from inside the call.
+    class client {
+      public:
+        client() = default;
+        client(const client&) = delete;
+        client& operator=(const client&) = delete;
+        /// `PULL self:cles/peers since=... describe=...` at `url`; without `describe` if it is empty.
+        virtual void ask(std::uint64_t ticket, std::string_view url, std::string_view since,
+                         std::string_view describe) = 0;
+        /// `PULL self:cles` at `url`.
+        virtual void ask_description(std::uint64_t ticket, std::string_view url) = 0;
+        /// `PUSH self:cles/peers` at `url`; the outcome is not reported.
+        virtual void push(std::string_view url, std::string_view table) = 0;
+        /// No requests follow at `url` for a while.
+        virtual void release(std::string_view url) = 0;
+
+      protected:
+        ~client() = default;
+    };
+
+    static constexpr std::size_t random_contacts = 2;        ///< number of random nodes to ask
+    static constexpr std::chrono::milliseconds limit{2'000}; ///< for a reply
+    static constexpr unsigned max_failures = 2;              ///< in a row, before the node is replaced
+    static constexpr int turns_per_interval = 8;
+    static constexpr int turns_among_few = 4;           ///< if all others are asked
+    static constexpr int intervals_of_rest = 2;         ///< after a failure
+    static constexpr int intervals_of_stay = 30;        ///< of a random node
+    static constexpr std::size_t bytes_a_second = 4096; ///< average for tables that are always sent whole
+
+    struct self {
+        std::string name;
+        std::string epoch; ///< as text
+    };
+
+    gossip(self who, client& out, membership& others, counters& counts, deadline_queue& deadlines, std::size_t most,
+           std::uint32_t seed);
+
+    void start(time_point now);
+    /// Sends its leave to the nodes it asks, if this node has announced itself. It keeps asking.
+    void leave(time_point now);
+    /// Leaves, and stops asking.
+    void stop(time_point now);
+    void set_seeds(const std::vector<std::string>& urls, time_point now);
+
+    void on_answer(std::uint64_t ticket, std::string_view json, time_point now);
+    void on_description(std::uint64_t ticket, std::string_view json, time_point now);
+    void on_failure(std::uint64_t ticket, time_point now);
+
+    void write_delta(json_writer& w, const table_question& asked, std::size_t longest, time_point now) override;
+    bool on_pushed_table(std::string_view json, const observed_source& by, time_point now) override;
+    /// A node was removed without having left.
+    void on_gone(std::string_view node, std::string_view where, time_point now);
+
+    /// The nodes that are asked regularly, for inspection.
+    [[nodiscard]] std::vector<std::string> asked() const;
+
+  private:
+    using contact = gossip_contact;
+    using part = gossip_contact::part;
+
+    void on_deadline(time_point now) override;
+    void review(time_point now);
+    void drop_unresponsive(time_point now);
+    void choose_successor(time_point now);
+    void choose_at_random(time_point now);
+    void contact_bootstraps(time_point now);
+    void call(contact& c, time_point now);
+    void send_own_entry(contact& c, time_point now);
+    void send_own_entry_if_not_asked(time_point now);
+    void postpone(contact& c, time_point now);
+    void end(contact& c, bool rests, time_point now);
+    void sweep();
+    void follow(time_point now);
+
+    [[nodiscard]] std::chrono::milliseconds interval() const noexcept;
+    [[nodiscard]] std::chrono::milliseconds search_pause() const noexcept;
+    [[nodiscard]] std::chrono::milliseconds until_next_search() noexcept;
+
+    const self self_;
+    client& out_;
+    membership& others_;
+    counters& counts_;
+    deadline_queue& deadlines_;
+    jitter jitter_;
+    seeds seeds_;
+    lost_nodes lost_;
+    gossip_contacts contacts_;
+    announce_only_nodes announce_only_;
+    std::optional<std::string> unknown_peer_; // sent its own entry, and is to be asked
+    time_point next_search_{};
+    time_point next_successor_ = time_point::min();
+    time_point last_asked_{};
+    std::uint64_t last_ticket_ = 0;
+    bool started_ = false;
+    bool left_ = false;
+};
+
+} // namespace cles::core

@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+
+#include "node/membership/announcement.hpp"
+#include "node/membership/reachable_endpoints.hpp"
+#include "port/group_source.hpp"
+
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+namespace cles::core {
+
+/// Incarnations that have ended, so that older sightings do not bring them back. Bounded; each is kept until no such
+/// sighting would be accepted.
+class tombstones {
+  public:
+    struct entry {
+        std::string node;
+        std::uint64_t seq = 0; ///< of its last announcement
+        time_point at{};       ///< when it ended
+        time_point until{};    ///< when this expires
+        bool graceful = false; ///< it announced that it leaves
+        std::uint64_t revision = 0;
+    };
+
+    explicit tombstones(std::size_t most) noexcept : max_entries_(most) {}
+
+    void add(std::uint32_t epoch, entry ended, time_point now);
+    /// The incarnation is alive after all.
+    void forget(std::uint32_t epoch) { entries_.erase(epoch); }
+    /// Whether that announcement was made before the end, or for lack of a `seq` may have been.
+    [[nodiscard]] bool covers(std::string_view node, std::uint32_t epoch, std::uint64_t seq) const noexcept;
+    /// The same without the name of the node.
+    [[nodiscard]] bool covers(std::uint32_t epoch, std::uint64_t seq) const noexcept;
+    [[nodiscard]] const std::unordered_map<std::uint32_t, entry>& all() const noexcept { return entries_; }
+
+  private:
+    std::size_t max_entries_;
+    std::unordered_map<std::uint32_t, entry> entries_; // by epoch
+};
+
+/// Finds an entry by the epoch of its incarnation. Two incarnations may have the same epoch, by chance or because of a
+/// bad random source; such an epoch is ambiguous.
+template <class T>
+class epoch_index {
+  public:
+    void add(std::uint32_t epoch, T* what) {
+        if (!first_.emplace(epoch, what).second) {
+            further_.emplace_back(epoch, what);
+        }
+    }
+    void remove(std::uint32_t epoch, T* what) {
+        const auto further = std::find(further_.begin(), further_.end(), std::pair{epoch, what});
+        if (further != further_.end()) {
+            further_.erase(further);
+            return;
+        }
+        const auto found = first_.find(epoch);
+        if (found == first_.end() || found->second != what) {
+            return;
+        }
+        const auto next =
+            std::find_if(further_.begin(), further_.end(), [epoch](const auto& f) { return f.first == epoch; });
+        if (next == further_.end()) {
+            first_.erase(found);
+        } else {
+            found->second = next->second;
+            further_.erase(next);
+        }
+    }
+    /// Null if there is none, or more than one.
+    [[nodiscard]] T* find(std::uint32_t epoch) const noexcept {
+        const auto found = first_.find(epoch);
+        return found == first_.end() || is_shared(epoch) ? nullptr : found->second;
+    }
+    [[nodiscard]] bool contains(std::uint32_t epoch) const noexcept { return first_.contains(epoch); }
+    [[nodiscard]] bool is_shared(std::uint32_t epoch) const noexcept {
+        return std::any_of(further_.begin(), further_.end(), [epoch](const auto& f) { return f.first == epoch; });
+    }
+
+  private:
+    boost::unordered_flat_map<std::uint32_t, T*> first_;
+    std::vector<std::pair<std::uint32_t, T*>> further_;
+};
+
+/// An announcement of an incarnation, as received. Borrows what it refers to.
+struct sighting {
+    const announcement& announced;
+    std::uint32_t epoch;
+    std::uint64_t seq;       ///< 0: missing
+    time_point announced_at; ///< when the node itself announced it
+    group_source from;       ///< all zeros: received by gossip
+    const observed_source& by;
+
+    [[nodiscard]] bool is_from_gossip() const noexcept { return from == group_source{}; }
+};
+
+/// What is known of a node from one start to the next.
+struct incarnation {
+    std::uint32_t epoch = 0;
+    group_source from;     ///< the source of its endpoints; all zeros: known by gossip only
+    std::uint64_t seq = 0; ///< 0: missing
+    time_point last_seen{};
+    time_point last_seen_at_source{};     ///< from `from`
+    std::uint64_t revision = 0;           ///< of the last sighting
+    std::uint64_t described_revision = 0; ///< of the last change beyond a heartbeat
+    std::uint32_t service_us = 0;         ///< as of `described_revision`
+    announcement announced{};
+    std::vector<std::string> endpoints;         ///< usable from here
+    std::vector<std::string> relayed_endpoints; ///< as relayed to others
+
+    /// From its first sighting; draws its revision from `numbers`.
+    static incarnation first(const sighting& w, std::uint64_t& numbers);
+    /// Applies a newer sighting.
+    void apply(const sighting& w, std::uint64_t& numbers);
+    /// Whether `now` differs from the known load by more than a heartbeat reports.
+    [[nodiscard]] bool is_significant_load_change(const node_load& now) const noexcept;
+    /// Applies the endpoints of a sighting. Returns whether they replaced the known ones.
+    bool apply_endpoints(const sighting& w);
+    /// Applies a sighting received again, by the same or another interface. Returns whether its endpoints replaced the
+    /// known ones.
+    bool on_repeat(const sighting& w);
+
+    [[nodiscard]] bool matches(std::uint32_t e, const group_source& f) const noexcept {
+        return epoch == e && (from == group_source{} || f == group_source{} || sends_from(f));
+    }
+    /// Whether `f` is its source in the group, or one of its announced sources.
+    [[nodiscard]] bool sends_from(const group_source& f) const noexcept {
+        return from == f || std::find(announced.sources.begin(), announced.sources.end(), f) != announced.sources.end();
+    }
+    /// Whether `w` is a copy of the last announcement, sent by another of several interfaces.
+    [[nodiscard]] bool is_repeated_by(const sighting& w) const noexcept {
+        return !w.is_from_gossip() && !announced.sources.empty() && w.seq == seq;
+    }
+    /// Whether a sighting is newer than everything known.
+    [[nodiscard]] bool is_older_than(std::uint64_t s, time_point announced_at) const noexcept {
+        return seq != 0 && s != 0 ? s > seq : announced_at >= (s != 0 ? last_seen : last_seen + announced.interval / 2);
+    }
+    [[nodiscard]] std::string_view where() const noexcept {
+        return endpoints.empty() ? std::string_view{} : std::string_view{endpoints.front()};
+    }
+
+  private:
+    [[nodiscard]] bool is_better_endpoint_source(const sighting& w) const noexcept;
+};
+
+} // namespace cles::core

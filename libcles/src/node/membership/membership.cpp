@@ -1,0 +1,612 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/membership.hpp"
+
+#include <cles/peer.hpp>
+
+#include "node/membership/announcer.hpp"
+#include "protocol/request_line.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <iterator>
+#include <string>
+#include <utility>
+
+namespace cles::core {
+
+// -- sightings -----------------------------------------------------------------------------------------------------
+
+membership::verdict membership::apply_announcement(const announcement& said, std::uint32_t epoch, std::uint64_t seq,
+                                                   const group_source& from, time_point now) {
+    return take_sighting({said, epoch, seq, now, from, observed_source::of(from)}, now);
+}
+
+membership::verdict membership::apply_gossip(const peer_report& report, const observed_source& by, time_point asked,
+                                             time_point now) {
+    const sighting w{report.announced, report.epoch, report.seq, asked - report.age, {}, by};
+    return report.announced.leaving ? take_leave(w, now) : take_sighting(w, now);
+}
+
+membership::verdict membership::apply_gossip(const peer_heartbeat& beat, time_point asked, time_point now) {
+    const auto announced_at = asked - beat.age;
+    const auto second_says = [&](const incarnation& r, auto&& take) {
+        auto said = r.announced;
+        said.interval = beat.interval;
+        said.load.queued = beat.queued;
+        said.load.running = beat.running;
+        return take(sighting{said, beat.epoch, beat.seq, announced_at, {}, {}});
+    };
+    if (beat.epoch == own_epoch_) {
+        return verdict::own;
+    }
+    if (own_name_conflict_ && own_name_conflict_->contender.epoch == beat.epoch) {
+        return second_says(own_name_conflict_->contender,
+                           [&](const sighting& w) { return take_own_name_sighting(w, now); });
+    }
+    auto* const at = by_epoch_.find(beat.epoch);
+    if (at == nullptr) {
+        return ended_.covers(beat.epoch, beat.seq) ? verdict::old : verdict::unknown;
+    }
+    auto& e = at->second;
+    if (e.owner.epoch != beat.epoch) {
+        const auto result = second_says(e.second->contender,
+                                        [&](const sighting& w) { return take_conflicting_sighting(e.second, w, now); });
+        if (result == verdict::taken) {
+            freshen(*at);
+        }
+        return result;
+    }
+    if (!e.owner.is_older_than(beat.seq, announced_at)) {
+        return verdict::old;
+    }
+    auto& r = e.owner;
+    r.seq = std::max(r.seq, beat.seq);
+    r.last_seen = std::max(r.last_seen, announced_at);
+    r.announced.interval = beat.interval;
+    r.announced.load.queued = beat.queued;
+    r.announced.load.running = beat.running;
+    r.revision = ++revision_;
+    on_owner_seen(*at, false, true, now);
+    return verdict::taken;
+}
+
+void membership::announce_self(const announcement& own, std::uint64_t seq, time_point now) {
+    if (!own_) {
+        own_since_ = now;
+        own_.emplace();
+        own_->epoch = own_epoch_;
+        own_->described_revision = ++revision_;
+    }
+    auto& r = *own_;
+    if (r.announced.endpoints != own.endpoints || r.announced.tasks != own.tasks ||
+        r.is_significant_load_change(own.load)) {
+        r.described_revision = ++revision_;
+        r.service_us = own.load.service_us;
+    }
+    r.announced = own;
+    r.relayed_endpoints = own.endpoints;
+    r.seq = seq;
+    r.last_seen = now;
+    r.revision = ++revision_;
+}
+
+void membership::leave(time_point now) {
+    if (!own_ || own_->announced.leaving) {
+        return;
+    }
+    own_->announced.leaving = true;
+    ++own_->seq;
+    own_->last_seen = now;
+    own_->revision = ++revision_;
+}
+
+incarnation membership::first_sighting(const sighting& w) {
+    ended_.forget(w.epoch);
+    return incarnation::first(w, revision_);
+}
+
+membership::verdict membership::take_sighting(const sighting& w, time_point now) {
+    if (w.announced.pool != own_pool_) {
+        return verdict::foreign;
+    }
+    const bool own_name = w.announced.node == own_name_;
+    if (own_name && w.epoch == own_epoch_) {
+        return verdict::own;
+    }
+    if (ended_.covers(w.announced.node, w.epoch, w.seq)) {
+        return verdict::old;
+    }
+    if (own_name) {
+        return take_own_name_sighting(w, now);
+    }
+    const auto at = peers_.find(w.announced.node);
+    if (at != peers_.end() && at->second.owner.matches(w.epoch, w.from)) {
+        return take_owner_sighting(at, w, now);
+    }
+    if (at != peers_.end() && !at->second.suspect) {
+        auto& second = at->second.second;
+        if (second) {
+            by_epoch_.remove(second->contender.epoch, &*at);
+        }
+        const auto result = take_conflicting_sighting(second, w, now);
+        if (second) {
+            by_epoch_.add(second->contender.epoch, &*at);
+        }
+        if (second && result == verdict::taken) {
+            freshen(*at);
+            conflicts_.check_owner(at->first, at->second.owner, *second, now);
+        }
+        return result;
+    }
+    if (w.announced.leaving) {
+        return verdict::old;
+    }
+    if (at != peers_.end()) {
+        if (w.is_from_gossip() && w.announced_at <= at->second.owner.last_seen) {
+            return verdict::old;
+        }
+        remember(at->first, at->second.owner, false, now);
+        succeed(at, first_sighting(w));
+        return verdict::taken;
+    }
+    if (is_stale(w, now)) {
+        return verdict::old;
+    }
+    if (peers_.size() >= max_peers_) {
+        return verdict::refused;
+    }
+    const auto made = peers_.emplace(w.announced.node, entry{first_sighting(w), false, nullptr, {}, now}).first;
+    made->second.in_revision_order = by_revision_.insert(by_revision_.end(), &*made);
+    by_epoch_.add(w.epoch, &*made);
+    follow(suspect_at(made->second.owner));
+    notify(w.announced.node, change::appeared, made->second.owner.where());
+    return verdict::taken;
+}
+
+membership::verdict membership::take_owner_sighting(entries::iterator at, const sighting& w, time_point now) {
+    auto& r = at->second.owner;
+    if (!r.is_older_than(w.seq, w.announced_at)) {
+        const auto result = r.is_repeated_by(w) ? verdict::duplicate : verdict::old;
+        if (r.on_repeat(w)) {
+            r.described_revision = r.revision = ++revision_;
+            freshen(*at);
+            notify(at->first, change::moved, r.where());
+        }
+        return result;
+    }
+    if (w.announced.leaving) {
+        r.seq = w.seq;
+        end(at, change::left, now);
+        return verdict::taken;
+    }
+    const std::string before{r.where()};
+    r.apply(w, revision_);
+    on_owner_seen(*at, before != r.where(), w.is_from_gossip(), now);
+    return verdict::taken;
+}
+
+void membership::on_owner_seen(named_entry& one, bool moved, bool by_gossip, time_point now) {
+    auto& [name, e] = one;
+    freshen(one);
+    if (e.second) {
+        // Gossip is late: an announcement that the owner made before the contender started does not show that both are
+        // live.
+        e.second->owner_seen_since |=
+            !by_gossip || e.owner.last_seen > e.second->first_seen + interval_of(e.owner.announced, e.owner.from);
+    }
+    follow(suspect_at(e.owner));
+    // The last announcement of a silent node may be late too.
+    const bool returned = e.suspect && suspect_at(e.owner) > now;
+    e.suspect = e.suspect && !returned;
+    if (moved) {
+        notify(name, change::moved, e.owner.where());
+    } else if (returned) {
+        notify(name, change::returned, e.owner.where());
+    } else {
+        notify_seen(name);
+    }
+}
+
+membership::verdict membership::take_own_name_sighting(const sighting& w, time_point now) {
+    // This node announces as well, which shows that both are live. But gossip may be about its previous incarnation.
+    if (own_name_conflict_) {
+        own_name_conflict_->owner_seen_since |=
+            !w.is_from_gossip() || (own_ && w.announced_at > own_since_ + interval_of(w.announced, w.from));
+    }
+    const auto result = take_conflicting_sighting(own_name_conflict_, w, now);
+    if (own_name_conflict_) {
+        conflicts_.check_own_name(*own_name_conflict_, now);
+    }
+    return result;
+}
+
+membership::verdict membership::take_conflicting_sighting(std::unique_ptr<name_conflict>& second, const sighting& w,
+                                                          time_point now) {
+    if (second && second->contender.matches(w.epoch, w.from)) {
+        if (!second->contender.is_older_than(w.seq, w.announced_at)) {
+            const auto result = second->contender.is_repeated_by(w) ? verdict::duplicate : verdict::old;
+            second->contender.on_repeat(w);
+            return result;
+        }
+        if (w.announced.leaving) {
+            second->contender.seq = w.seq;
+            remember(w.announced.node, second->contender, true, now);
+            second.reset();
+            return verdict::taken;
+        }
+        second->contender.apply(w, revision_);
+        follow(suspect_at(second->contender));
+        // A single announcement may be a late one, of an incarnation that has ended.
+        if (second->owner_seen_since) {
+            report_conflict(*second);
+        }
+        return verdict::taken;
+    }
+    if (w.announced.leaving || (second && suspect_at(second->contender) > now) || is_stale(w, now)) {
+        return verdict::old; // at most two incarnations of a name are kept
+    }
+    second = std::make_unique<name_conflict>(name_conflict{first_sighting(w), w.announced_at, false, false, {}});
+    follow(suspect_at(second->contender));
+    return verdict::taken;
+}
+
+// -- name conflicts ------------------------------------------------------------------------------------------------
+
+void membership::on_probed(std::uint64_t ticket, const probe_outcome& found, time_point now) {
+    using action = name_conflicts::action;
+    const auto name = conflicts_.take_probe(ticket);
+    if (!name) {
+        return;
+    }
+    if (*name == own_name_) {
+        if (own_name_conflict_ && own_name_conflict_->check.ticket == ticket) {
+            const auto next = conflicts_.on_own_name_probed(*own_name_conflict_, found, now);
+            const std::string where{own_name_conflict_->contender.where()};
+            if (next != action::none) {
+                confirm_conflict(*own_name_conflict_);
+            }
+            if (next == action::own_name_taken) {
+                notify(own_name_, change::taken, where);
+            }
+        }
+        return;
+    }
+    const auto at = peers_.find(*name);
+    if (at == peers_.end() || !at->second.second || at->second.second->check.ticket != ticket) {
+        return;
+    }
+    auto& e = at->second;
+    switch (conflicts_.on_probed(at->first, e.owner, e.since, *e.second, found, resumed_at_, now)) {
+    case action::owner_gone:
+        if (suspect_at(e.second->contender) > now) {
+            end(at, change::gone, now);
+        }
+        break;
+    case action::swap: swap_with_contender(at); break;
+    case action::conflict_confirmed: confirm_conflict(*e.second); break;
+    case action::none:
+    case action::own_name_taken: break;
+    }
+}
+
+void membership::swap_with_contender(entries::iterator at) {
+    auto& e = at->second;
+    std::swap(e.owner, e.second->contender);
+    e.since = e.second->first_seen;
+    e.owner.described_revision = e.owner.revision = ++revision_;
+    freshen(*at);
+    const auto name = at->first;
+    follow(suspect_at(e.owner));
+    notify(name, change::moved, e.owner.where());
+    const auto still = peers_.find(name);
+    if (still != peers_.end() && still->second.second) {
+        confirm_conflict(*still->second.second);
+    }
+}
+
+void membership::confirm_conflict(name_conflict& conflict) {
+    conflict.check.confirmed = true;
+    report_conflict(conflict);
+}
+
+void membership::report_conflict(name_conflict& conflict) {
+    if (!std::exchange(conflict.is_reported, true)) {
+        const auto& r = conflict.contender;
+        const auto name = r.announced.node;
+        notify(name, change::clash, r.from == group_source{} ? std::string{r.where()} : host_text(r.from));
+    }
+}
+
+std::optional<std::string_view> membership::conflicting_endpoint_of(std::string_view node) const noexcept {
+    const auto found = peers_.find(node);
+    if (found == peers_.end() || !found->second.second || !found->second.second->check.confirmed) {
+        return {};
+    }
+    return found->second.second->contender.where();
+}
+
+// -- leaving and removal -------------------------------------------------------------------------------------------
+
+membership::verdict membership::take_leave(const sighting& w, time_point now) {
+    if (w.announced.node == own_name_ && w.epoch == own_epoch_) {
+        return verdict::own;
+    }
+    const auto until = w.announced_at + interval_of(w.announced, w.from) * 15;
+    if (ended_.covers(w.announced.node, w.epoch, w.seq) || until <= now) {
+        return verdict::old;
+    }
+    const auto at = peers_.find(w.announced.node);
+    if (at != peers_.end() && at->second.owner.epoch == w.epoch) {
+        auto& r = at->second.owner;
+        if (r.from != group_source{} || w.seq < r.seq) { // it would have left in the group
+            return verdict::old;
+        }
+        r.seq = w.seq;
+        end(at, change::left, now);
+        return verdict::taken;
+    }
+    if (at != peers_.end() && at->second.second && at->second.second->contender.epoch == w.epoch) {
+        drop_second(at);
+    }
+    ended_.add(w.epoch, {w.announced.node, w.seq, w.announced_at, until, true, ++revision_}, now);
+    return verdict::taken;
+}
+
+// Removes the owner of a name. A live contender takes the name over.
+void membership::end(entries::iterator at, change how, time_point now) {
+    remember(at->first, at->second.owner, how == change::left, now);
+    auto& second = at->second.second;
+    if (second && suspect_at(second->contender) > now) {
+        succeed(at, std::move(second->contender));
+        return;
+    }
+    drop_second(at);
+    by_epoch_.remove(at->second.owner.epoch, &*at);
+    const auto name = at->first;
+    const std::string where{at->second.owner.where()};
+    by_revision_.erase(at->second.in_revision_order);
+    peers_.erase(at);
+    notify(name, how, where);
+}
+
+void membership::succeed(entries::iterator at, incarnation next) {
+    by_epoch_.remove(at->second.owner.epoch, &*at);
+    if (at->second.second) {
+        by_epoch_.remove(at->second.second->contender.epoch, &*at);
+    }
+    by_epoch_.add(next.epoch, &*at);
+    next.described_revision = next.revision = ++revision_;
+    const auto since = next.last_seen;
+    at->second = entry{std::move(next), false, nullptr, at->second.in_revision_order, since};
+    freshen(*at);
+    follow(suspect_at(at->second.owner));
+    const auto name = at->first;
+    notify(name, change::moved, at->second.owner.where());
+}
+
+void membership::drop_second(entries::iterator at) {
+    if (at->second.second) {
+        by_epoch_.remove(at->second.second->contender.epoch, &*at);
+        at->second.second.reset();
+    }
+}
+
+void membership::remember(const std::string& node, const incarnation& over, bool graceful, time_point now) {
+    if (over.seq != 0 || graceful) { // without `seq`, past and future announcements look the same
+        ended_.add(over.epoch,
+                   {node, over.seq, now, now + interval_of(over.announced, over.from) * 15, graceful,
+                    graceful ? ++revision_ : 0},
+                   now);
+    }
+}
+
+// -- time ----------------------------------------------------------------------------------------------------------
+
+// A node that has just started knows few others. The interval that it announces is then shorter than the time that
+// gossip takes to arrive here.
+std::chrono::milliseconds membership::interval_of(const announcement& said, const group_source& from) const {
+    return from == group_source{} ? std::max(said.interval, announcer::interval_among(peers_.size())) : said.interval;
+}
+
+bool membership::is_stale(const sighting& w, time_point now) const {
+    return w.is_from_gossip() && now - w.announced_at >= interval_of(w.announced, w.from) * 7 / 2;
+}
+
+time_point membership::suspect_at(const incarnation& r) const {
+    return std::max(r.last_seen, resumed_at_) + interval_of(r.announced, r.from) * 7 / 2;
+}
+
+time_point membership::expires_at(const incarnation& r) const {
+    return std::max(r.last_seen, resumed_at_) + interval_of(r.announced, r.from) * 15;
+}
+
+void membership::follow(time_point due) {
+    if (!armed() || due < this->due()) {
+        deadlines_.arm(*this, due);
+    }
+}
+
+// Checks all nodes and arms the timer for the earliest: cheaper than rearming it on each announcement.
+void membership::on_deadline(time_point now) {
+    for (auto at = peers_.begin(); at != peers_.end();) {
+        const auto here = at++;
+        auto& e = here->second;
+        if (e.second && suspect_at(e.second->contender) <= now) {
+            drop_second(here);
+        }
+        if (now >= expires_at(e.owner) || (e.second && now >= suspect_at(e.owner))) {
+            end(here, change::gone, now);
+        } else if (!e.suspect && now >= suspect_at(e.owner)) {
+            e.suspect = true;
+            notify(here->first, change::silent, e.owner.where());
+        }
+    }
+    if (own_name_conflict_ && suspect_at(own_name_conflict_->contender) <= now) {
+        own_name_conflict_.reset();
+    }
+    for (const auto& [name, e] : peers_) {
+        follow(e.suspect ? expires_at(e.owner) : suspect_at(e.owner));
+        if (e.second) {
+            follow(suspect_at(e.second->contender));
+        }
+    }
+    if (own_name_conflict_) {
+        follow(suspect_at(own_name_conflict_->contender));
+    }
+}
+
+void membership::notify(std::string_view node, change what, std::string_view where) const {
+    if (watcher_ != nullptr) {
+        watcher_->on_peer(node, what, where);
+    }
+    notify_seen(node);
+}
+
+void membership::notify_seen(std::string_view node) const {
+    if (on_seen_) {
+        on_seen_(node);
+    }
+}
+
+// -- queries -------------------------------------------------------------------------------------------------------
+
+std::optional<std::string_view> membership::address_of(std::string_view node) const noexcept {
+    const auto at = peers_.find(node);
+    return at == peers_.end() ? std::nullopt : std::optional{at->second.owner.where()};
+}
+
+std::optional<group_source> membership::source_of(std::string_view node) const noexcept {
+    const auto* const run = announced(node);
+    return run != nullptr ? std::optional{run->from} : std::nullopt;
+}
+
+const incarnation* membership::announced(std::string_view node) const noexcept {
+    const auto found = peers_.find(node);
+    return found != peers_.end() && found->second.owner.from != group_source{} ? &found->second.owner : nullptr;
+}
+
+std::optional<membership::member> membership::find_member(std::string_view node) const {
+    const auto found = peers_.find(node);
+    return found == peers_.end() ? std::nullopt : std::optional{member_of(*found)};
+}
+
+std::optional<membership::member> membership::next_member(std::string_view node) const {
+    if (peers_.empty()) {
+        return {};
+    }
+    auto next = peers_.upper_bound(node);
+    if (next == peers_.end()) {
+        next = peers_.begin();
+    }
+    return member_of(*next);
+}
+
+membership::member membership::at(std::size_t index) const {
+    const auto found = std::next(peers_.begin(), static_cast<std::ptrdiff_t>(index));
+    return member_of(*found);
+}
+
+std::vector<delta_entry> membership::deltas_since(std::uint64_t revision, time_point now) const {
+    using kind = delta_entry::kind;
+    std::vector<delta_entry> items;
+    const auto add = [&](const std::string& node, const incarnation& r, peer_state state, bool in_full) {
+        if (r.revision > revision) {
+            items.push_back({in_full || r.described_revision > revision ? kind::description : kind::heartbeat, node,
+                             &r.announced, &r.relayed_endpoints, r.epoch, r.seq, r.last_seen, state, r.revision});
+        }
+    };
+    const auto add_leave = [&items](std::string_view node, std::uint32_t epoch, std::uint64_t seq, time_point at,
+                                    std::uint64_t of) {
+        items.push_back(
+            {.what = kind::leave, .node = node, .epoch = epoch, .seq = seq, .last_seen = at, .revision = of});
+    };
+    if (own_ && own_->announced.leaving) {
+        if (own_->revision > revision) {
+            add_leave(own_name_, own_epoch_, own_->seq, own_->last_seen, own_->revision);
+        }
+    } else if (own_) {
+        add(own_name_, *own_, peer_state::live, by_epoch_.contains(own_epoch_));
+    }
+    for (auto i = by_revision_.end(); i != by_revision_.begin();) {
+        const auto& [name, e] = **--i;
+        if (e.owner.revision <= revision && (!e.second || e.second->contender.revision <= revision)) {
+            break;
+        }
+        add(name, e.owner, e.suspect ? peer_state::suspect : peer_state::live,
+            e.owner.epoch == own_epoch_ || by_epoch_.is_shared(e.owner.epoch));
+        if (e.second) {
+            add(name, e.second->contender, peer_state::clash, true);
+        }
+    }
+    for (const auto& [epoch, ended] : ended_.all()) {
+        if (ended.graceful && ended.revision > revision && ended.until > now) {
+            add_leave(ended.node, epoch, ended.seq, ended.at, ended.revision);
+        }
+    }
+    std::sort(items.begin(), items.end(), [](const auto& a, const auto& b) { return a.revision < b.revision; });
+    return items;
+}
+
+std::optional<delta_entry> membership::description_of(std::uint32_t epoch) const {
+    const auto* found = by_epoch_.find(epoch);
+    if (found == nullptr || found->second.owner.epoch != epoch) {
+        return {};
+    }
+    const auto& [name, e] = *found;
+    return delta_entry{delta_entry::kind::description,
+                       name,
+                       &e.owner.announced,
+                       &e.owner.relayed_endpoints,
+                       epoch,
+                       e.owner.seq,
+                       e.owner.last_seen,
+                       e.suspect ? peer_state::suspect : peer_state::live,
+                       e.owner.revision};
+}
+
+std::vector<peer> membership::list(time_point now) const {
+    std::vector<peer> all;
+    const auto add = [&](const incarnation& r, peer_state state) {
+        all.push_back({.node = r.announced.node,
+                       .endpoints = r.endpoints,
+                       .epoch = protocol::epoch_text(r.epoch),
+                       .age = std::chrono::duration_cast<std::chrono::milliseconds>(now - r.last_seen),
+                       .state = state,
+                       .load = r.announced.load,
+                       .tasks = r.announced.tasks});
+    };
+    const auto add_conflict = [&](const std::unique_ptr<name_conflict>& second) {
+        if (second && second->is_reported) {
+            add(second->contender, peer_state::clash);
+        }
+    };
+    bool own_name_due = true;
+    for (const auto& [name, e] : peers_) {
+        if (own_name_due && own_name_ < name) {
+            own_name_due = false;
+            add_conflict(own_name_conflict_);
+        }
+        add(e.owner, e.suspect ? peer_state::suspect : peer_state::live);
+        add_conflict(e.second);
+    }
+    if (own_name_due) {
+        add_conflict(own_name_conflict_);
+    }
+    return all;
+}
+
+} // namespace cles::core
+
+namespace cles {
+
+std::string_view to_string(peer_state state) noexcept {
+    switch (state) {
+    case peer_state::live: return "live";
+    case peer_state::suspect: return "suspect";
+    case peer_state::clash: return "clash";
+    }
+    return "";
+}
+
+} // namespace cles

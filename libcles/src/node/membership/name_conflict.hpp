@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+#include <cles/pending.hpp>
+
+#include "node/membership/incarnation.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace cles::core {
+
+/// The outcome of asking an incarnation whether it is alive.
+struct probe_outcome {
+    enum class kind : std::uint8_t {
+        answered, ///< by the node that the members below describe
+        absent,   ///< refused, or no reply in time
+        unclear,  ///< an error reply or an unreadable one, or this node could not ask
+    };
+    kind what = kind::unclear;
+    std::string node{};
+    std::uint32_t epoch = 0;
+    std::chrono::milliseconds uptime{0};
+};
+
+/// Reads the reply to `PULL self:cles`; if it cannot be read, the outcome is unclear.
+probe_outcome read_probe_answer(std::string_view json);
+
+/// The progress in finding out which of two incarnations of one name is alive.
+struct name_check {
+    enum class stage : std::uint8_t { none, owner, contender, over };
+    stage at = stage::none;
+    std::uint64_t ticket = 0;
+    time_point asked{};
+    time_point owner_began{};
+    bool confirmed = false; ///< both have answered
+};
+
+/// Another incarnation (the contender) under a name that is taken.
+struct name_conflict {
+    incarnation contender;
+    time_point first_seen{};       ///< the contender
+    bool owner_seen_since = false; ///< the owner was received after the contender
+    bool is_reported = false;      ///< both are live
+    name_check check{};
+};
+
+/// Probes the incarnations of a contested name, and decides from the outcomes which of them is the owner. Limits the
+/// probes, because any host that can send to the group can trigger them.
+class name_conflicts {
+  public:
+    /// Asks an incarnation whether it is alive, by `PULL self:cles` at `url` within `probe_limit`. The outcome is
+    /// reported to `membership::on_probed`, never from inside the call.
+    class prober {
+      public:
+        prober() = default;
+        prober(const prober&) = delete;
+        prober& operator=(const prober&) = delete;
+        virtual void probe(std::uint64_t ticket, std::string_view url) = 0;
+
+      protected:
+        ~prober() = default;
+    };
+    static constexpr std::chrono::milliseconds probe_limit{500};
+    /// Of two nodes that start within it, neither was first.
+    static constexpr std::chrono::milliseconds same_start_tolerance{1'000};
+    static constexpr std::chrono::milliseconds probe_interval{50}; ///< average time between probes
+    static constexpr std::chrono::milliseconds probe_burst{1'600};
+
+    /// What follows from the outcome of a probe.
+    enum class action : std::uint8_t {
+        none,
+        owner_gone,         ///< the name passes to the contender
+        swap,               ///< both are live, and the contender was first: it becomes the owner
+        conflict_confirmed, ///< both are live, and the owner keeps the name
+        own_name_taken,     ///< the same for this node's own name, but the contender was first
+    };
+
+    name_conflicts(std::string own_name, std::uint32_t own_epoch)
+        : own_name_(std::move(own_name)), own_epoch_(own_epoch) {}
+
+    void set_prober(prober* who) noexcept { prober_ = who; }
+    /// This node has started.
+    void begin(time_point now) noexcept { started_at_ = now; }
+
+    /// The contender of `name` was received: probes the owner, once.
+    void check_owner(const std::string& name, const incarnation& owner, name_conflict& conflict, time_point now);
+    /// The contender of this node's own name was received: probes it, once.
+    void check_own_name(name_conflict& conflict, time_point now);
+    /// The name for which that probe was sent, once; nothing if the ticket is unknown.
+    std::optional<std::string> take_probe(std::uint64_t ticket);
+    /// The outcome of the last probe for `conflict`. `since`: when the owner became known here; `resumed_at`: when this
+    /// node was last suspended.
+    action on_probed(const std::string& name, const incarnation& owner, time_point since, name_conflict& conflict,
+                     const probe_outcome& found, time_point resumed_at, time_point now);
+    /// The same for the conflict about this node's own name.
+    [[nodiscard]] action on_own_name_probed(name_conflict& conflict, const probe_outcome& found, time_point now) const;
+
+  private:
+    [[nodiscard]] bool may_probe(time_point now) noexcept;
+    void probe(name_check& check, name_check::stage stage, const std::string& name, std::string_view where,
+               time_point now);
+    action on_owner_probed(const std::string& name, const incarnation& owner, name_conflict& conflict,
+                           const probe_outcome& found, time_point now);
+
+    const std::string own_name_;
+    const std::uint32_t own_epoch_;
+    prober* prober_ = nullptr;
+    std::map<std::uint64_t, std::string> probes_; // in progress: the name by ticket
+    std::uint64_t last_probe_ = 0;
+    time_point probe_debt_{};
+    time_point started_at_{};
+};
+
+class local_node;
+
+/// Receives the reply to a probe, or its failure.
+class probe_reply final : public detail::pending {
+  public:
+    probe_reply(std::weak_ptr<local_node> host, std::uint64_t ticket, std::string url)
+        : host_(std::move(host)), ticket_(ticket), url_(std::move(url)) {}
+
+    verdict offer(std::string_view json) override;
+    void fail(boost::system::error_code code, std::string_view message) override;
+    void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override;
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
+
+  private:
+    void report(core::probe_outcome found) const;
+
+    std::weak_ptr<local_node> host_;
+    std::uint64_t ticket_;
+    std::string url_;
+};
+
+} // namespace cles::core

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/node_state.hpp"
+
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <utility>
+
+namespace cles::core {
+
+node_state::node_state(node_options setup, const core::clock& source, const std::function<void()>& wake)
+    : name(std::move(setup.name)), epoch(protocol::epoch_text(setup.epoch)), first_datagram_id(setup.first_datagram_id),
+      bounds(setup.bounds), authorise(std::move(setup.authorise)), log(std::move(setup.log)),
+      metrics(std::move(setup.metrics)), load(std::move(setup.load)), time(source), started(source.now()),
+      completions(std::move(setup.complete)), memory(bounds.memory),
+      kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
+      kept_requests(std::make_shared<memory_account>(memory)), peers(name, setup.epoch, deadlines, bounds.peers),
+      unsent(wake),
+      published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch, unsent),
+      unsent_relayed(wake), remembered{.limit = bounds.remembered} {
+    peers.begin(setup.pool, started);
+}
+
+// Forwarded requests are not counted: other nodes do that work.
+node_load node_state::load_now() const noexcept {
+    try {
+        if (load) {
+            return load();
+        }
+    } catch (...) { // as if there were no function
+    }
+    return {.running = static_cast<std::uint32_t>(counts.handlers_running - counts.routed)};
+}
+
+void node_state::write_log(log_level level, const log_entry& what) const noexcept {
+    try {
+        if (log) {
+            log(level, what);
+        }
+    } catch (...) { // there is nowhere to report it
+    }
+}
+
+void node_state::post_log(log_level level, std::string what, std::string peer) {
+    if (log) {
+        completions.call([log = log, level, what = std::move(what), peer = std::move(peer)] {
+            try {
+                log(level, {what, peer});
+            } catch (...) { // there is nowhere to report it
+            }
+        });
+    }
+}
+
+} // namespace cles::core

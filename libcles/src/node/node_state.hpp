@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+#include <cles/json_writer.hpp>
+#include <cles/limits.hpp>
+#include <cles/log.hpp>
+
+#include "node/base/completion_queue.hpp"
+#include "node/base/deadlines.hpp"
+#include "node/base/memory_budget.hpp"
+#include "node/base/metrics.hpp"
+#include "node/membership/membership.hpp"
+#include "node/publish/publications.hpp"
+#include "node/publish/unsent_topics.hpp"
+#include "node/session/dedup.hpp"
+#include "node/session/reflection_limit.hpp"
+#include "node/session/task_registry.hpp"
+#include "port/clock.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+class peer_table_server;
+
+/// The settings of a node.
+struct node_options {
+    std::string name;
+    std::string pool{};                  ///< empty: the pool without a name
+    std::uint32_t epoch = 0;             ///< random for each incarnation
+    std::uint64_t first_datagram_id = 0; ///< likewise; request ids by datagram count from here
+    cles::limits bounds{};
+    authoriser authorise{};
+    log_sink log{};
+    std::function<void(json_writer&)> metrics{}; ///< metrics of the program
+    std::function<node_load()> load{};           ///< load of the program; empty: its running handlers
+    completion_queue::runner complete{};         ///< runs completions
+};
+
+class router;
+
+/// The state that all sessions of a node share.
+struct node_state {
+    /// `wake` schedules a call of `send_updates`.
+    node_state(node_options setup, const core::clock& source, const std::function<void()>& wake);
+
+    const std::string name;
+    const std::string epoch;
+    const std::uint64_t first_datagram_id;
+    const cles::limits bounds;
+    const authoriser authorise;
+    const log_sink log;
+    const std::function<void(json_writer&)> metrics;
+    const std::function<node_load()> load;
+    const core::clock& time;
+    const time_point started;
+
+    completion_queue completions;
+    std::vector<std::string> endpoints;
+    memory_budget memory;                                ///< of what is held for peers
+    const std::shared_ptr<memory_account> kept_values;   ///< last values and queued updates
+    const std::shared_ptr<memory_account> kept_requests; ///< of this node and of clients, waiting for a link
+    task_registry tasks;
+    deadline_queue deadlines;
+    membership peers;
+    peer_table_server* gossip_responder = nullptr; ///< answers gossip requests; null if this node does not gossip
+    counters counts;
+    latency_histogram handler_time; ///< of all handlers that reply later, and of a sample of the others
+    std::uint64_t plain_runs = 0;   ///< of those others, for sampling
+    unsent_topics unsent;           ///< of `published`
+    publications published;
+    unsent_topics unsent_relayed; ///< of other nodes, forwarded by this one
+    dedup_memory remembered;
+    reflection_limit reflection;
+    std::uint64_t next_id = 1;       ///< of the requests that this node sends
+    router* active_router = nullptr; ///< serves requests for `any`, `all` and other nodes; null: none
+
+    // These do not let exceptions of the user's functions out.
+    [[nodiscard]] node_load load_now() const noexcept;
+    void write_log(log_level level, const log_entry& what) const noexcept;
+    /// The same from inside a loop over data that the log function could change.
+    void post_log(log_level level, std::string what, std::string peer = {});
+};
+
+} // namespace cles::core

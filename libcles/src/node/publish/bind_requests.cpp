@@ -1,0 +1,241 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/publish/bind_requests.hpp"
+
+#include "node/base/deadlines.hpp"
+#include "node/session/handler_failure.hpp"
+#include "node/session/request_checks.hpp"
+
+#include <chrono>
+#include <string>
+#include <utility>
+
+namespace cles::core {
+
+namespace {
+
+std::chrono::milliseconds lease_of(const protocol::request_line& r) {
+    return std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)};
+}
+
+std::string head_of(const topic& t, bool wants_mark) {
+    return wants_mark ? protocol::mark_text(t.last_mark()) : std::string{};
+}
+
+binding::terms terms_of(const protocol::request_line& r) {
+    return {.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep};
+}
+
+} // namespace
+
+bind_requests::bind_requests(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates,
+                             const identity& peer, reply_writer& replies)
+    : shared_node_(std::move(host)), node_(*shared_node_), peer_(peer), out_(out), replies_(replies), updates_(updates),
+      bound_(node_.published, updates) {
+    if (out.datagram() != 0) {
+        leases_.emplace(node_.deadlines, [this](const std::string& path) {
+            ++node_.counts.leases_expired;
+            drop(path);
+        });
+    }
+}
+
+void bind_requests::clear() {
+    if (leases_) {
+        leases_->clear();
+    }
+    pending_.clear();
+    remote_bindings_.reset();
+    bound_.clear();
+}
+
+void bind_requests::drain(time_point now) {
+    bound_.drain(now);
+    if (remote_bindings_) {
+        remote_bindings_->drain(now);
+    }
+}
+
+// A noun of another node begins with its name and a colon, which no path of this node contains.
+void bind_requests::drop(const std::string& noun) {
+    const auto colon = noun.find(':');
+    if (colon == std::string::npos) {
+        bound_.unbind(noun);
+    } else if (remote_bindings_) {
+        remote_bindings_->unbind(std::string_view{noun}.substr(0, colon), std::string_view{noun}.substr(colon + 1));
+    }
+}
+
+void bind_requests::serve_remote(const protocol::request_line& r, time_point due, time_point now, call_factory& from) {
+    std::string scratch;
+    auto noun = std::string{r.noun.target}.append(":").append(protocol::canonical_path(r.noun, scratch));
+    if (r.unbinds()) {
+        if (leases_) {
+            leases_->drop(noun);
+        }
+        drop(noun);
+        replies_.done(reply_target{r}, {});
+        return;
+    }
+    // What is bound already takes no further room.
+    const bool known =
+        remote_bindings_ && remote_bindings_->binds(r.noun.target, protocol::canonical_path(r.noun, scratch));
+    if (!known && size() >= node_.bounds.bindings) {
+        replies_.fail(r, errc::busy, node_.name + ": too many bindings on this link");
+        return;
+    }
+    if (!remote_bindings_) {
+        remote_bindings_ =
+            std::make_unique<relayed_bindings>(node_.published, bound_, node_.active_router->relayed(), updates_);
+    }
+    set_lease(noun, lease_of(r), now);
+    node_.active_router->bind(r, *remote_bindings_, due, now, from);
+}
+
+void bind_requests::set_lease(std::string_view path, std::chrono::milliseconds lease, time_point now) {
+    if (leases_) {
+        leases_->set(std::string{path}, saturating_add(now, lease));
+    }
+}
+
+void bind_requests::serve(const protocol::request_line& r, time_point due, time_point now, call_factory& from) {
+    std::string scratch;
+    const auto path = protocol::canonical_path(r.noun, scratch);
+    if (r.unbinds()) {
+        if (leases_) {
+            leases_->drop(path);
+        }
+        withdraw(path);
+        bound_.unbind(path);
+        replies_.done(reply_target{r}, {});
+        return;
+    }
+    auto& published = node_.published;
+    if (!node_.tasks.can_bind(r.noun.task) && !published.knows(r.noun.task)) {
+        replies_.fail(r, errc::no_task, node_.name + " has no BIND '" + std::string{r.noun.task} + "'");
+        return;
+    }
+    if (bind_decision::is_needed(node_, r)) {
+        serve_later(r, path, due, now, from);
+        return;
+    }
+    try {
+        ask_bind_handler(node_, peer_, r);
+        auto& t = open(path);
+        replies_.done(reply_target{r}, t.last_body(), head_of(t, r.wants_mark));
+        bound_.bind(t, terms_of(r));
+        set_lease(path, lease_of(r), now);
+    } catch (...) {
+        replies_.fail(r, describe(std::current_exception()));
+    }
+}
+
+topic& bind_requests::open(std::string_view path) {
+    if (!bound_.has(path) && bound_.size() >= node_.bounds.bindings) {
+        throw error(errc::busy, node_.name + ": too many bindings on this link");
+    }
+    // Checked first: a BIND that cannot be answered must not bind.
+    constexpr std::size_t head = 64;
+    const auto* known = node_.published.find(path);
+    if (!out_.reserve((known != nullptr ? known->last_body().size() : 0) + head)) {
+        throw error(errc::busy, no_memory(node_).message);
+    }
+    return node_.published.open(path);
+}
+
+void bind_requests::serve_later(const protocol::request_line& r, std::string_view path, time_point due, time_point now,
+                                call_factory& from) {
+    const auto c = from.make_call(r, due, now);
+    if (!c) {
+        return;
+    }
+    std::erase_if(pending_, [](const asking& a) {
+        const auto waits = a.answers.lock();
+        return !waits || waits->ended();
+    });
+    pending_.push_back({std::string{path}, c});
+    const auto decision = std::make_shared<bind_decision>(
+        shared_node_, [this, c, path = std::string{path}, terms = terms_of(r), lease = lease_of(r),
+                       mark = r.wants_mark](const protocol::failure* why_not) {
+            if (c->ended()) { // `this` may be gone with its link
+                return;
+            }
+            if (why_not != nullptr) {
+                c->fail(*why_not);
+                return;
+            }
+            try {
+                auto& t = open(path);
+                // Bound before the reply, which may set off other requests of the peer; updates follow it later.
+                bound_.bind(t, terms);
+                set_lease(path, lease, node_.time.now());
+                c->set_head(head_of(t, mark));
+                c->done(t.last_body());
+            } catch (...) {
+                c->fail(describe(std::current_exception()));
+            }
+        });
+    c->on_stop([decision] { decision->withdraw(); });
+    decision->ask(r, peer_, due, now);
+}
+
+void bind_requests::withdraw(std::string_view path) {
+    for (const auto& a : std::vector<asking>{pending_}) {
+        if (a.path != path) {
+            continue;
+        }
+        if (const auto c = a.answers.lock(); c && !c->ended()) {
+            c->fail({.code = errc::cancelled, .message = node_.name + ": it was unbound"});
+            c->stop();
+        }
+    }
+}
+
+void ask_bind_handler(const node_state& host, const identity& peer, const protocol::request_line& r) {
+    const auto* h = host.tasks.find(verb::bind, r.noun.task);
+    if (h == nullptr || !h->plain) {
+        return;
+    }
+    std::string decoded;
+    const auto parameters = decode(r.noun, decoded);
+    const cles::detail::request_data data{.verb = r.verb,
+                                          .node = host.name,
+                                          .task = r.noun.task,
+                                          .parameters = {parameters.data(), parameters.size()},
+                                          .peer = &peer,
+                                          .deadline = {}};
+    std::string unused;
+    json_writer w{unused};
+    h->plain(cles::request{data}, w);
+}
+
+bool bind_decision::is_needed(const node_state& host, const protocol::request_line& r) {
+    const auto* h = host.tasks.find(verb::bind, r.noun.task);
+    return h != nullptr && h->start;
+}
+
+void bind_decision::ask(const protocol::request_line& r, const identity& peer, time_point due, time_point now) {
+    const auto self = shared_from_this();
+    asked_ = std::make_unique<local_request>(node_, self, 0);
+    asked_->run(r, peer, due, now);
+}
+
+void bind_decision::withdraw() {
+    const auto keep = shared_from_this();
+    outcome_ = nullptr;
+    if (asked_) {
+        asked_->withdraw();
+    }
+}
+
+void bind_decision::report(const protocol::failure* why_not) {
+    const auto keep = shared_from_this();
+    if (const auto done = std::exchange(outcome_, nullptr)) {
+        done(why_not);
+    }
+}
+
+void bind_decision::on_result(std::size_t, std::string_view) { report(nullptr); }
+
+void bind_decision::on_failure(std::size_t, subrequest_failure why) { report(&why.told); }
+
+} // namespace cles::core

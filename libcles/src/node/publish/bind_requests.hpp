@@ -1,0 +1,104 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+
+#include "node/node_state.hpp"
+#include "node/publish/lease.hpp"
+#include "node/publish/link_bindings.hpp"
+#include "node/routing/local_request.hpp"
+#include "node/routing/relays.hpp"
+#include "node/routing/router.hpp"
+#include "node/routing/subrequest.hpp"
+#include "node/session/line_sink.hpp"
+#include "node/session/reply_writer.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// Asks a handler for BIND that replies later whether a binding is accepted.
+class bind_decision final : public subrequest_events, public std::enable_shared_from_this<bind_decision> {
+  public:
+    /// Null: it is accepted.
+    using outcome = std::function<void(const protocol::failure* why_not)>;
+
+    /// Whether the handler for this noun replies later.
+    static bool is_needed(const node_state& host, const protocol::request_line& request);
+
+    /// \param result is called once, possibly inside `ask`, unless `withdraw` is called first
+    bind_decision(std::shared_ptr<node_state> host, outcome result)
+        : node_(std::move(host)), outcome_(std::move(result)) {}
+
+    /// `peer` must live until the outcome or `withdraw`.
+    void ask(const protocol::request_line& request, const identity& peer, time_point due, time_point now);
+    /// The outcome is not reported any more, and the handler is told to stop.
+    void withdraw();
+
+  private:
+    void on_result(std::size_t which, std::string_view json) override;
+    void on_failure(std::size_t which, subrequest_failure why) override;
+    void on_progress(std::size_t, double, std::string_view) override {}
+    void report(const protocol::failure* why_not);
+
+    std::shared_ptr<node_state> node_;
+    outcome outcome_;
+    std::unique_ptr<local_request> asked_;
+};
+
+/// Calls the handler for BIND of this noun, if there is one that decides at once. It refuses a binding by an exception.
+void ask_bind_handler(const node_state& host, const identity& peer, const protocol::request_line& request);
+
+/// Serves BIND for one link, and holds the resulting bindings.
+class bind_requests {
+  public:
+    bind_requests(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer,
+                  reply_writer& replies);
+
+    void serve(const protocol::request_line& request, time_point due, time_point now, call_factory& from);
+    /// The same for nouns of other nodes, if this one routes.
+    void serve_remote(const protocol::request_line& request, time_point due, time_point now, call_factory& from);
+    void clear();
+    /// Sends pending updates: the link has room again.
+    void drain(time_point now);
+    [[nodiscard]] std::size_t size() const noexcept {
+        return bound_.size() + (remote_bindings_ ? remote_bindings_->size() : 0);
+    }
+    [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+
+  private:
+    struct asking {
+        std::string path;
+        std::weak_ptr<call> answers; // a call counts as running until it is destroyed
+    };
+
+    void drop(const std::string& noun);
+    void serve_later(const protocol::request_line& request, std::string_view path, time_point due, time_point now,
+                     call_factory& from);
+    void withdraw(std::string_view path);
+    /// \throws cles::error if a limit is reached
+    topic& open(std::string_view path);
+    void set_lease(std::string_view path, std::chrono::milliseconds lease, time_point now);
+
+    std::shared_ptr<node_state> shared_node_;
+    node_state& node_;
+    const identity& peer_;
+    line_sink& out_;
+    reply_writer& replies_;
+    subscriber& updates_;
+    link_bindings bound_;
+    std::unique_ptr<relayed_bindings> remote_bindings_; // few links need it
+    std::vector<asking> pending_;                       // whose handlers have not decided yet
+    std::optional<leases> leases_;                      // over datagrams: nothing shows that the peer has gone
+};
+
+} // namespace cles::core

@@ -1,0 +1,334 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/publish/feed_links.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "node/base/deadlines.hpp"
+#include "node/local_node.hpp"
+#include "node/routing/peer_channel.hpp"
+#include "node/session/command.hpp"
+#include "node/session/outbound.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <utility>
+#include <vector>
+
+namespace cles::core {
+namespace {
+
+/// Whether the reply to `PULL self:cles` lists the feature `mark`.
+bool lists_mark(std::string_view description) {
+    json_reader reader{description, detail::answer_depth};
+    bool found = false;
+    std::string_view key;
+    reader.begin_object();
+    while (reader.next_key(key)) {
+        if (key != "features" || reader.peek() != json_reader::kind::array) {
+            reader.skip();
+            continue;
+        }
+        reader.begin_array();
+        while (reader.next_element()) {
+            std::string_view feature;
+            if (reader.peek() != json_reader::kind::string) {
+                reader.skip();
+            } else if (reader.read(feature)) {
+                found = found || feature == "mark";
+            }
+        }
+    }
+    return found;
+}
+
+} // namespace
+
+/// The reply to a request for a feed, which lives as long as its handle.
+class feed_links::feed_reply final : public detail::pending {
+  public:
+    feed_reply(std::weak_ptr<local_node> host, std::weak_ptr<void> handle, reply_function then)
+        : host_(std::move(host)), handle_(std::move(handle)), then_(std::move(then)) {}
+
+    verdict offer(std::string_view json) override { return take(json, {}); }
+    verdict offer_marked(std::string_view json, const update_mark& mark) override { return take(json, mark); }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::string text{message};
+        finish({.code = code, .text = text});
+    }
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
+
+  private:
+    verdict take(std::string_view json, const std::optional<update_mark>& mark) {
+        if (!detail::is_valid_answer(json)) {
+            return verdict::malformed;
+        }
+        finish({.text = json, .mark = mark});
+        return verdict::completed;
+    }
+    void finish(const reply& received) {
+        const std::unique_ptr<feed_reply> self{this};
+        const auto host = host_.lock();
+        const auto alive = handle_.lock();
+        then_(alive ? host.get() : nullptr, received);
+    }
+
+    std::weak_ptr<local_node> host_;
+    std::weak_ptr<void> handle_;
+    reply_function then_;
+};
+
+detail::pending_ptr feed_links::on_reply(const entry& e, reply_function then) {
+    return detail::pending_ptr{new feed_reply(host_.weak_from_this(), e.handle, std::move(then))};
+}
+
+void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked,
+                               marking marks) {
+    auto last = received.text;
+    if (received.code) {
+        if (feed.closed()) {
+            return;
+        }
+        if (!feed.is_bound_without_value(received.code)) {
+            // It may be bound nevertheless, and would receive updates for ever: because the publisher answers late, or
+            // because those that shared its binding have left it to this one.
+            if (received.code == errc::deadline || feed.has_shared()) {
+                unbind(feed);
+            } else {
+                detach(feed);
+            }
+            feed.on_refused(received.code, std::string{received.text}, host_.now());
+            return;
+        }
+        last = "{}";
+    }
+    if (received.mark && marks == marking::up_to_it) {
+        feed.skip_to(*received.mark);
+    }
+    const auto lease = host_.bounds().lease;
+    feed.on_bound(last, marks == marking::as_update ? received.mark : std::nullopt);
+    if (asked) {
+        feed.on_leased(*asked, lease);
+    }
+}
+
+void feed_links::enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms) {
+    feed.set_sharing_key("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
+                         terms.adverbs);
+    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0, {}, ++last_number_});
+}
+
+void feed_links::leave(core::feed_machine& feed) { feeds_.erase(&feed); }
+
+void feed_links::refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why) {
+    core::post(host_.environment(), [host = host_.shared_from_this(), handle = feeds_.at(&feed).handle.lock(), &feed,
+                                     code, why] { feed.on_refused(code, why, host->now()); });
+}
+
+void feed_links::bind(core::feed_machine& feed) {
+    const auto found = feeds_.find(&feed);
+    if (found == feeds_.end()) {
+        return;
+    }
+    if (host_.stopped()) {
+        refuse_later(feed, errc::stopped, "the service has been stopped");
+        return;
+    }
+    boost::system::error_code code;
+    std::string why;
+    auto* r = host_.peer_channels().to(feed.target(), found->second.terms.at, false, code, why);
+    if (r == nullptr) {
+        refuse_later(feed, code, why);
+        return;
+    }
+    found->second.at = r->address();
+    r->connect(feed,
+               [host = host_.shared_from_this(), handle = found->second.handle.lock(), &feed](
+                   const std::shared_ptr<connection>& c, boost::system::error_code failed, std::string_view message) {
+                   if (feed.closed()) {
+                       return;
+                   }
+                   if (c) {
+                       host->feeds().send_bind(feed, c);
+                   } else {
+                       feed.on_refused(failed, message, host->now());
+                   }
+               });
+}
+
+void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
+    auto& e = feeds_.at(&feed);
+    // For an existing binding, the publisher may have queued updates that are older than the value in its reply. (A
+    // reply for `all` comes from several publishers, and has the mark of each value in its body.)
+    const bool joins = !feed.was_bound() && feed.target() != "all" && c->session().bound().has_bound_for(feed);
+    auto marks = e.terms.marked ? marking::as_update : joins ? marking::up_to_it : marking::none;
+    if (marks != marking::none && !c->marks()) {
+        ask_for_features(feed, c);
+        return;
+    }
+    if (marks != marking::none && !*c->marks()) {
+        marks = marking::none;
+    }
+    e.on = c;
+    const auto now = host_.now();
+    const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
+    auto request = bind_request(e, *c);
+    const auto adverbs = e.terms.adverbs + (e.terms.adverbs.empty() ? "mark=yes" : " mark=yes");
+    if (marks != marking::none) {
+        request.adverbs = adverbs;
+    }
+    const auto whole = core::saturating_add(now, time_limit(e.terms.deadline, verb::bind));
+    const auto due = std::exchange(e.due, {}).value_or(whole);
+    c->bind(feed, request, due > now ? due : whole,
+            on_reply(e, [&feed, asked, marks](local_node* host, const reply& received) {
+                if (host != nullptr) {
+                    host->feeds().on_bind_reply(feed, received, asked, marks);
+                }
+            }));
+}
+
+void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
+    auto& e = feeds_.at(&feed);
+    const auto now = host_.now();
+    const auto whole = time_limit(e.terms.deadline, verb::bind);
+    const auto limit = std::min(time_limit({}, verb::pull), whole);
+    e.due = core::saturating_add(now, whole);
+    c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = host_.draw_id()},
+                               core::saturating_add(now, limit), now,
+                               on_reply(e, [&feed, on = std::weak_ptr{c}](local_node* host, const reply& received) {
+                                   if (received.code == errc::unavailable || received.code == errc::busy) {
+                                       if (host != nullptr) {
+                                           feed.on_refused(received.code, std::string{received.text}, host->now());
+                                       }
+                                       return;
+                                   }
+                                   if (const auto link = on.lock()) {
+                                       link->set_marks(!received.code && lists_mark(received.text));
+                                   }
+                                   if (host != nullptr && !feed.closed()) {
+                                       host->feeds().bind(feed);
+                                   }
+                               }));
+}
+
+protocol::outgoing_request feed_links::bind_request(entry& e, const connection& c) {
+    protocol::outgoing_request request{.verb = verb::bind,
+                                       .noun = e.terms.noun,
+                                       .id = host_.draw_id(),
+                                       .every_ms = e.terms.every_ms,
+                                       .keep = e.terms.keep,
+                                       .adverbs = e.terms.adverbs};
+    if (c.datagram() != 0) {
+        request.lease_ms = static_cast<std::uint32_t>(host_.bounds().lease.count());
+        e.asking = request.id;
+    }
+    return request;
+}
+
+void feed_links::renew(core::feed_machine& feed, time_point until) {
+    const auto found = feeds_.find(&feed);
+    if (found == feeds_.end()) {
+        return;
+    }
+    if (const auto c = found->second.on.lock()) { // otherwise its loss has been reported
+        const auto now = host_.now();
+        const auto request = bind_request(found->second, *c);
+        c->session().asking().send(
+            request, until, now, on_reply(found->second, [&feed, now](local_node* host, const reply& received) {
+                if (host == nullptr) {
+                    return;
+                }
+                if (received.code) {
+                    feed.on_renewal_refused(now, received.code, std::string{received.text}, host->now());
+                } else {
+                    feed.on_renewed(now);
+                }
+            }));
+    }
+}
+
+void feed_links::detach(core::feed_machine& feed) {
+    const auto found = feeds_.find(&feed);
+    if (found != feeds_.end()) {
+        if (const auto c = found->second.on.lock()) {
+            c->unbind(feed);
+            if (const auto asking = std::exchange(found->second.asking, 0)) {
+                c->session().asking().drop(asking); // a retransmission would bind again
+            }
+        }
+        found->second.on.reset();
+    }
+}
+
+void feed_links::unbind(core::feed_machine& feed) {
+    const auto found = feeds_.find(&feed);
+    if (found == feeds_.end()) {
+        return;
+    }
+    host_.peer_channels().forget(feed);
+    const auto c = found->second.on.lock();
+    const auto now = host_.now();
+    detach(feed);
+    // Another feed may share the binding.
+    if (c && c->usable() && !host_.stopped() && !c->session().bound().has(feed.target(), feed.path())) {
+        c->session().asking().send(
+            {.verb = verb::bind, .noun = found->second.terms.noun, .id = host_.draw_id(), .lease_ms = 0},
+            core::saturating_add(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new core::discarded_reply});
+    }
+}
+
+void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
+    const std::string where{host_.discovery().address_of(node).value_or(std::string_view{})};
+    struct concern {
+        core::feed_machine* feed;
+        std::weak_ptr<void> handle;
+        bool elsewhere;
+    };
+    std::vector<concern> concerned;
+    for (auto* feed : in_order()) {
+        const auto& e = feeds_.at(feed);
+        if (feed->target() == node && e.terms.at.empty()) {
+            concerned.push_back({feed, e.handle, e.at != where});
+        }
+    }
+    const auto now = host_.now();
+    for (const auto& [feed, handle, elsewhere] : concerned) {
+        const auto alive = handle.lock(); // another feed's handler may have closed this one
+        if (!alive || !feeds_.contains(feed)) {
+            continue;
+        }
+        if (replaced && elsewhere && feed->is_bound()) {
+            detach(*feed);
+            feed->on_lost("another run of " + std::string{node} + " has its name", now);
+        }
+        feed->expedite(now);
+    }
+}
+
+std::vector<core::feed_machine*> feed_links::in_order() const {
+    std::vector<core::feed_machine*> feeds;
+    feeds.reserve(feeds_.size());
+    for (const auto& [feed, e] : feeds_) {
+        feeds.push_back(feed);
+    }
+    std::sort(feeds.begin(), feeds.end(),
+              [this](auto* a, auto* b) { return feeds_.at(a).number < feeds_.at(b).number; });
+    return feeds;
+}
+
+void feed_links::stop() {
+    const auto feeds = feeds_;
+    for (auto* feed : in_order()) {
+        if (const auto handle = feeds.at(feed).handle.lock()) {
+            // Taken out of the feed, which they may own: otherwise neither would be destroyed if the context never runs
+            // again.
+            feed->abandon().fail(host_.completions(), errc::stopped);
+        }
+    }
+}
+
+} // namespace cles::core

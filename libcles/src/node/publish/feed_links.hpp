@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/pending.hpp>
+#include <cles/update_mark.hpp>
+
+#include "node/publish/feed_machine.hpp"
+#include "node/session/connection.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+class local_node;
+
+/// What a feed is bound to, and how.
+struct feed_terms {
+    std::string noun;
+    std::string at;
+    std::chrono::milliseconds deadline{};
+    std::uint32_t every_ms = 0;
+    std::uint32_t keep = 0;
+    std::string adverbs{}; ///< further ones, in wire format
+    bool marked = false;   ///< requests the mark of the last value, if the publisher supports it
+};
+
+/// The feeds of a service and their links: finds a link for each feed, sends its BIND, and unbinds it.
+class feed_links final : public core::feed_host {
+  public:
+    explicit feed_links(local_node& host) noexcept : host_(host) {}
+
+    void enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms);
+    void leave(core::feed_machine& feed);
+    void bind(core::feed_machine& feed) override;
+    void unbind(core::feed_machine& feed) override;
+    void detach(core::feed_machine& feed) override;
+    void renew(core::feed_machine& feed, time_point until) override;
+    /// The node has a new incarnation: feeds that wait to bind there do so at once. `replaced`: feeds that are still
+    /// bound to the previous incarnation are bound again.
+    void on_new_incarnation(std::string_view node, bool replaced);
+    /// Closes all feeds.
+    void stop();
+
+  private:
+    struct entry {
+        std::weak_ptr<void> handle;
+        feed_terms terms;
+        std::weak_ptr<connection> on;
+        std::string at{};                // the URL used last
+        std::uint64_t asking = 0;        // the id of its last BIND by datagram
+        std::optional<time_point> due{}; // the deadline of a BIND that waits for the node's features
+        std::uint64_t number = 0;        // the order of `enter`
+    };
+
+    /// To a request for a feed.
+    struct reply {
+        boost::system::error_code code{}; ///< why it failed
+        std::string_view text;            ///< the body, or the message of the failure
+        std::optional<update_mark> mark{};
+    };
+    /// Null: the feed or its service has been destroyed.
+    using reply_function = std::function<void(local_node* host, const reply&)>;
+    class feed_reply;
+
+    /// What the mark of the last value is used for, if it was requested.
+    enum class marking : std::uint8_t {
+        none,
+        as_update, ///< the value is delivered as an update if it is new
+        up_to_it,  ///< updates up to it are old: they were queued for a shared binding
+    };
+
+    [[nodiscard]] detail::pending_ptr on_reply(const entry& e, reply_function then);
+    /// `asked`: when the BIND was sent by datagram; empty for a stream.
+    void on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked, marking marks);
+    void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
+    void ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c);
+    [[nodiscard]] protocol::outgoing_request bind_request(entry& e, const connection& c);
+    void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
+
+    /// In the order of `enter`, so that it does not depend on addresses.
+    [[nodiscard]] std::vector<core::feed_machine*> in_order() const;
+
+    local_node& host_;
+    std::map<core::feed_machine*, entry> feeds_;
+    std::uint64_t last_number_ = 0;
+};
+
+} // namespace cles::core

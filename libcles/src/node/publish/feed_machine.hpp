@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+#include <cles/limits.hpp>
+#include <cles/pending.hpp>
+#include <cles/update_mark.hpp>
+
+#include "node/base/backoff.hpp"
+#include "node/base/deadlines.hpp"
+#include "node/publish/feed_mailbox.hpp"
+#include "node/publish/lease.hpp"
+#include "node/publish/subscription.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+class feed_machine;
+
+/// What a feed needs of the service.
+class feed_host {
+  public:
+    feed_host() = default;
+    feed_host(const feed_host&) = delete;
+    feed_host& operator=(const feed_host&) = delete;
+    /// Sends a BIND; `on_bound` or `on_refused` follows, and later `on_lost` if its link is lost.
+    virtual void bind(feed_machine& feed) = 0;
+    /// Removes it from its link, and unbinds at the publisher.
+    virtual void unbind(feed_machine& feed) = 0;
+    /// Removes it from its link without notifying the publisher.
+    virtual void detach(feed_machine& feed) = 0;
+    /// Sends the BIND of a leased binding again; `on_renewed` or `on_renewal_refused` follows, the latter with
+    /// `deadline` if there is no reply by `until`.
+    virtual void renew(feed_machine& feed, time_point until) = 0;
+
+  protected:
+    ~feed_host() = default;
+};
+
+/// A feed's state machine: it binds, delivers events, and when the publisher is lost binds again after a pause.
+class feed_machine final : public subscription, private deadline, private renewal::keeper {
+  public:
+    using event_ptr = feed_mailbox::event_ptr;
+
+    feed_machine(feed_host& host, deadline_queue& deadlines, completion_queue& completions, const limits& bounds,
+                 std::string target, std::string path, bool thinned, std::uint32_t seed);
+    ~feed_machine() = default;
+
+    /// Binds for the first time. The operation completes with the reply; if it fails, the feed is closed.
+    void start(detail::pending_ptr bound);
+    /// `mark`: the update that holds the last value, if the publisher says so. If it is new, it is delivered as an
+    /// update too.
+    void on_bound(std::string_view last, const std::optional<update_mark>& mark = {});
+    /// Bound by datagram: the lease counts from the time the BIND was sent, and is renewed from now on.
+    void on_leased(time_point sent_at, std::chrono::milliseconds lease);
+    void on_renewed(time_point sent_at);
+    void on_renewal_refused(time_point sent_at, boost::system::error_code why, std::string_view message,
+                            time_point now);
+    void on_refused(boost::system::error_code why, std::string_view message, time_point now);
+    /// Whether the publisher has bound it again in spite of this error: only its last value does not fit into the
+    /// reply. Then call `on_bound` without that value.
+    [[nodiscard]] bool is_bound_without_value(boost::system::error_code why) const noexcept {
+        return state_ == state::binding && was_bound_ && why == errc::too_large;
+    }
+    void on_lost(std::string_view why, time_point now);
+
+    /// The publisher may be reachable again: ends a pause.
+    void expedite(time_point now);
+
+    /// Its events, until they are fetched.
+    [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
+    void close(errc why);
+
+    /// The operations that wait for a feed.
+    struct waiting {
+        detail::pending_ptr first;
+        event_ptr next;
+        void fail(completion_queue& completions, errc why);
+    };
+    /// Closes the feed; the caller completes the operations.
+    [[nodiscard]] waiting abandon();
+    [[nodiscard]] bool closed() const noexcept { return state_ == state::closed; }
+    [[nodiscard]] bool is_bound() const noexcept override { return state_ == state::bound; }
+    /// Whether it is bound, or was.
+    [[nodiscard]] bool was_bound() const noexcept { return was_bound_; }
+    /// Whether the operation of the first BIND is pending.
+    [[nodiscard]] bool is_starting() const noexcept { return first_ != nullptr; }
+
+  private:
+    enum class state : std::uint8_t { fresh, binding, bound, pausing, closed };
+
+    bool on_event(const detail::raw_event& event, feed_mailbox::hand_over when) override {
+        return mail_.put(event, when);
+    }
+    void on_deadline(time_point now) override;
+    void renew(time_point until) override { host_.renew(*this, until); }
+    void pause(time_point now);
+    void take_marked(const std::string& body, const update_mark& mark);
+
+    feed_host& host_;
+    deadline_queue& deadlines_;
+    std::size_t max_line_; // limits::line
+    completion_queue& completions_;
+    feed_mailbox mail_;
+    backoff backoff_;
+    renewal renewal_;
+    time_point bound_at_{}; // when the BIND was sent from which leases count
+    state state_ = state::fresh;
+    bool was_bound_ = false;
+    detail::pending_ptr first_;
+};
+
+} // namespace cles::core

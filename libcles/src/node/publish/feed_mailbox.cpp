@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/publish/feed_mailbox.hpp"
+
+#include <cles/error.hpp>
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::core {
+
+bool feed_mailbox::put(const detail::raw_event& event, hand_over when) {
+    if (closed_) {
+        return true;
+    }
+    const bool waited_for = waiter_ != nullptr && queue_.empty();
+    if (waited_for && event.kind == feed_event::update && when == hand_over::now) {
+        auto* operation = waiter_.release();
+        bool taken = true; // an exception comes from its handler
+        completions_.now([&] { taken = operation->deliver(event); });
+        if (!taken) {
+            waiter_.reset(operation);
+        }
+        return taken;
+    }
+    if (!event.has_json()) {
+        return false;
+    }
+    if (waited_for) {
+        completions_.deliver(std::move(waiter_), event);
+    } else {
+        queue_.push(event);
+    }
+    return true;
+}
+
+bool feed_mailbox::next(event_ptr operation) {
+    waiter_ = std::move(operation);
+    return !queue_.empty();
+}
+
+void feed_mailbox::pump() {
+    if (waiter_ != nullptr && !queue_.empty()) {
+        auto* operation = waiter_.release();
+        queue_.pop([operation](const detail::raw_event& event) { operation->deliver(event); }); // checked when queued
+    }
+}
+
+void feed_mailbox::cancel() {
+    if (waiter_ != nullptr) {
+        completions_.fail(std::move(waiter_), errc::cancelled, "the wait was cancelled");
+    }
+}
+
+feed_mailbox::event_ptr feed_mailbox::close() {
+    closed_ = true;
+    return std::move(waiter_);
+}
+
+void feed_queue::forget(const entry& e) noexcept {
+    if (is_value(e)) {
+        --values_;
+        bytes_ -= e.body.size();
+    } else if (is_status_event(e)) {
+        --status_events_;
+    }
+}
+
+// A gap before the value goes with it: one gap reports both. A `current` value is not an update, so nothing is missed
+// with it: what the publisher has sent since follows it.
+void feed_queue::drop_oldest_value() {
+    for (auto e = entries_.begin(); e != entries_.end();) {
+        if (is_status_event(*e)) {
+            ++e;
+            continue;
+        }
+        const bool found = is_value(*e);
+        shed_ += e->kind == feed_event::update ? 1 : e->missed;
+        forget(*e);
+        e = entries_.erase(e);
+        if (found) {
+            return;
+        }
+    }
+}
+
+void feed_queue::drop_oldest_status_event() {
+    const auto oldest = std::find_if(entries_.begin(), entries_.end(), is_status_event);
+    forget(*oldest);
+    entries_.erase(oldest);
+}
+
+void feed_queue::push(const detail::raw_event& event) {
+    constexpr std::size_t max_status_events = 16;
+    entries_.push_back({event.kind, std::string{event.body}, std::string{event.publisher}, event.seq, event.missed,
+                        std::string{event.text}});
+    if (is_value(entries_.back())) {
+        ++values_;
+        bytes_ += event.body.size();
+    } else if (is_status_event(entries_.back()) && ++status_events_ > max_status_events) {
+        drop_oldest_status_event();
+    }
+    while (values_ > max_values_ || (bytes_ > max_bytes_ && values_ > 1)) {
+        drop_oldest_value();
+    }
+}
+
+} // namespace cles::core

@@ -1,0 +1,124 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/json_writer.hpp>
+#include <cles/limits.hpp>
+
+#include "node/base/completion_queue.hpp"
+#include "node/base/string_map.hpp"
+#include "node/publish/topic.hpp"
+#include "node/publish/unsent_topics.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace cles::core {
+
+/// The nouns of one task.
+struct task_nouns {
+    using idle_list = boost::intrusive::list<topic, boost::intrusive::constant_time_size<false>>;
+
+    std::size_t count = 0;
+    bool published = false; ///< at least one of them has been published
+    idle_list idle{};       ///< had no subscriber when last used; least recently used first
+};
+
+/// Everything that a node publishes. When a task has reached its limit on nouns or memory, new nouns replace those that
+/// nobody is bound to, least recently used first.
+class publications final : public topic_source {
+  public:
+    publications(topic_context shared, const cles::limits& bounds, completion_queue& completions, std::string publisher,
+                 std::string epoch, unsent_topics& unsent);
+
+    /// Publishes what `write` writes (a body, or a scalar, which is wrapped). The path is canonical.
+    /// \throws cles::error: `too_large`, `busy`, `failed`; what `write` throws. Then nothing is published, but nouns
+    /// may have retired.
+    void publish(std::string_view path, const std::function<void(json_writer&)>& write);
+    /// Publishes JSON that is known to be valid and compact.
+    void publish_body(std::string_view path, std::string_view body);
+    /// Publishes any body now, or once every subscriber has room. Takes the operation, which completes through the
+    /// completion queue. Returns true if published now. \throws as `publish`; then the operation is not taken
+    bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation,
+                           std::uint64_t ticket = 0);
+    /// Cancels an update that waits for room: it is not published, and its operation fails with `cancelled`. False if
+    /// none with this ticket waits.
+    bool cancel(std::uint64_t ticket);
+
+    /// Notified of each new topic, before anything is published there.
+    class observer {
+      public:
+        observer() = default;
+        observer(const observer&) = delete;
+        observer& operator=(const observer&) = delete;
+        virtual void on_opened(topic& made) = 0;
+
+      protected:
+        ~observer() = default;
+    };
+    /// The observer must live until it is removed.
+    void watch(observer& who) { observers_.push_back(&who); }
+    /// Does nothing if it is not registered.
+    void unwatch(observer& who) { std::erase(observers_, &who); }
+
+    /// The topic, or null.
+    [[nodiscard]] topic* find(std::string_view path) noexcept override;
+    /// Whether anything of the task has been published or bound.
+    [[nodiscard]] bool knows(std::string_view task) const noexcept;
+    /// The topic, for a BIND; created if necessary. No other retires for it, since anyone may bind anything. \throws
+    /// cles::error with `busy` if the task has too many nouns
+    topic& open(std::string_view path);
+    /// Whether `open` finds or can create it.
+    [[nodiscard]] bool can_open(std::string_view path) noexcept;
+    /// Whether it can be published, as far as the limit on nouns goes.
+    [[nodiscard]] bool can_publish(std::string_view path) noexcept;
+    /// Forgets the last value, and the noun too if nobody is bound to it. False if there is no value.
+    bool retire(std::string_view path);
+    /// Removes a topic without subscribers, waiters and value; one with a value becomes idle.
+    void remove_if_unused(topic& t);
+    /// A subscriber has gone: publishers that waited for it continue.
+    void release(topic& t) override {
+        admit(t);
+        remove_if_unused(t);
+    }
+
+    /// Publishes the updates that wait for room in this topic, as far as there is some.
+    void admit(topic& t) override;
+
+    /// Removes and returns the operations of all updates that wait for room.
+    [[nodiscard]] std::vector<detail::pending_ptr> take_waiters();
+
+    /// The names of the tasks that have been published.
+    [[nodiscard]] std::vector<std::string> tasks() const;
+
+  private:
+    topic& open(std::string_view path, bool to_publish);
+    [[nodiscard]] static topic* oldest_idle(task_nouns& of) noexcept;
+    void retire(topic& t);
+    void remove(topic& t);
+    static void mark_used(topic& t) noexcept;
+    void take_memory(topic& t);
+    /// What slow subscribers have not taken is kept, whatever memory it needs.
+    void publish_lossless(std::string_view path, std::string_view body);
+    void end(topic& t, std::size_t body_at);
+
+    topic_context shared_;
+    const cles::limits& bounds_;
+    completion_queue& completions_;
+    std::string publisher_;
+    std::string epoch_;
+    unsent_topics& unsent_;
+    std::vector<observer*> observers_;
+    string_map<std::unique_ptr<task_nouns>> nouns_; // per task
+    string_map<std::unique_ptr<topic>> topics_;
+    std::uint64_t highest_retired_ = 0; // the highest `seq` of all nouns that were removed
+    bool lossless_ = false;
+    topic* recent_ = nullptr; // usually the same noun is published again
+};
+
+} // namespace cles::core

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/routing/all_binding.hpp"
+
+#include "node/routing/scatter_gather.hpp"
+#include "node/session/request_checks.hpp"
+
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+namespace cles::core {
+
+all_binding::all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, std::string path,
+                         relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due)
+    : routing_(std::move(by)), task_(r.noun.task), path_(std::move(path)), via_(r.via),
+      adverbs_(forwarded_adverbs(r, routing_->host().name)), may_pass_on_(r.hops != 0), wants_mark_(r.wants_mark),
+      place_(place), wanted_(wanted), call_(std::move(answers)), due_(due) {}
+
+bool all_binding::begin(time_point now) {
+    if (begun_) {
+        return true;
+    }
+    if (routing_->expects_more()) {
+        if (!armed()) {
+            routing_->host().deadlines.arm(*this, stop_waiting_at(due_, now));
+        }
+        return false;
+    }
+    bind_known(now);
+    return true;
+}
+
+void all_binding::bind_known(time_point now) {
+    begun_ = true;
+    if (call_->ended()) { // cancelled while it waited
+        place_.unbind("all", path_);
+        return;
+    }
+    call_->on_stop([weak = weak_from_this()] {
+        if (const auto self = weak.lock(); self && !self->closed_) {
+            self->place_.unbind("all", self->path_);
+        }
+    });
+    routing_->host().deadlines.arm(*this, answer_by(due_, now));
+    follow();
+}
+
+void all_binding::follow() {
+    if (!begun_ || closed_) {
+        return;
+    }
+    const auto self = shared_from_this();
+    joining_ = true;
+    const auto& host = routing_->host();
+    if (!parts_.contains(host.name) && core::offers(host, verb::bind, task_)) {
+        auto& own = parts_[host.name];
+        own.asked = false;
+        if (const auto* t = place_.take_own_part(path_, wanted_)) {
+            own.last = t->last_body();
+            own.mark = t->last_mark();
+        }
+    }
+    if (may_pass_on_) {
+        std::vector<std::string> there;
+        for (const auto& o : routing_->offers(verb::bind, task_)) {
+            if (!is_in_via(via_, o.by->name)) {
+                there.push_back(o.by->name);
+            }
+        }
+        for (const auto& name : there) {
+            if (!parts_.contains(name)) {
+                join(name);
+            }
+        }
+        // A removed node is bound anew when it returns; until it is removed, its feed rebinds by itself.
+        std::erase_if(parts_, [&](const auto& entry) {
+            const auto& [name, p] = entry;
+            return p.failure && !p.bound && name != routing_->host().name &&
+                   std::find(there.begin(), there.end(), name) == there.end();
+        });
+    }
+    joining_ = false;
+    answer_when_whole();
+}
+
+void all_binding::join(const std::string& node) {
+    parts_[node];
+    place_.from()->join(node, path_, adverbs_, weak_from_this(),
+                        [weak = weak_from_this(), node](topic* t, std::string_view last, const protocol::failure& why) {
+                            if (const auto self = weak.lock(); self && !self->closed_) {
+                                self->on_told(node, t, last, why);
+                            }
+                        });
+}
+
+void all_binding::on_told(const std::string& node, topic* t, std::string_view last, const protocol::failure& why) {
+    auto& p = parts_[node];
+    p.asked = false;
+    if (t != nullptr) {
+        if (call_ && call_->hold_more(last.size())) {
+            p.last = last.empty() ? std::string{"{}"} : std::string{last};
+            p.mark = place_.from()->mark_of(*t);
+        } else if (call_) {
+            p.failure = protocol::failure{.code = errc::busy,
+                                          .message = node + ": no memory is left for its last value (limits.memory)"};
+        }
+        p.bound = true;
+        place_.take_part(*t, wanted_);
+    } else {
+        p.failure = why;
+    }
+    answer_when_whole();
+}
+
+void all_binding::answer_when_whole() {
+    const bool whole = std::none_of(parts_.begin(), parts_.end(), [](const auto& entry) { return entry.second.asked; });
+    if (whole && !joining_) {
+        answer();
+    }
+}
+
+void all_binding::on_deadline(time_point now) {
+    if (!begun_) {
+        const auto self = shared_from_this();
+        bind_known(now);
+    } else {
+        answer();
+    }
+}
+
+void all_binding::answer() {
+    const auto c = std::exchange(call_, nullptr);
+    if (!c) {
+        return;
+    }
+    const auto self = shared_from_this();
+    routing_->host().deadlines.disarm(*this);
+    aggregate_reply text;
+    for (const auto& [node, p] : parts_) {
+        if (p.last) {
+            text.add_result(node, p.last->empty() ? "{}" : std::string_view{*p.last});
+            if (wants_mark_) {
+                text.add_mark(node, p.mark);
+            }
+        } else if (p.failure) {
+            text.add_failure(node, *p.failure);
+        } else {
+            text.add_failure(node, late(node));
+        }
+    }
+    for (auto& [node, p] : parts_) { // not needed for the rest of the binding
+        p.last.reset();
+    }
+    c->done(text.whole());
+}
+
+void all_binding::close(const all_binding* heir) {
+    if (std::exchange(closed_, true)) {
+        return;
+    }
+    const auto self = shared_from_this();
+    routing_->host().deadlines.disarm(*this);
+    for (const auto& [node, p] : std::exchange(parts_, {})) {
+        if (heir != nullptr && heir->parts_.contains(node)) {
+            continue;
+        }
+        if (node == routing_->host().name) {
+            place_.leave_own_part(path_);
+        } else {
+            place_.leave_part(node + ":" + path_);
+        }
+    }
+    if (const auto c = std::exchange(call_, nullptr)) {
+        c->fail({.code = errc::cancelled, .message = "it was unbound"});
+    }
+}
+
+} // namespace cles::core

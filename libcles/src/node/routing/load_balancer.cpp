@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/routing/load_balancer.hpp"
+
+#include "node/session/request_checks.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace cles::core {
+
+bool offers(const node_state& n, verb v, std::string_view task) {
+    if (task == "cles") {
+        return v == verb::pull;
+    }
+    if (v == verb::bind) {
+        return n.tasks.can_bind(task) || n.published.knows(task);
+    }
+    return n.tasks.find(v, task) != nullptr;
+}
+
+void load_balancer::gather(const protocol::request_line& r, const std::vector<std::string>& asked, bool may_be_here) {
+    const auto was_asked = [&](std::string_view name) {
+        return std::find(asked.begin(), asked.end(), name) != asked.end();
+    };
+    const bool here = may_be_here && !was_asked(node_.name);
+    if (here) {
+        here_.update_load(node_.load_now()); // before the list is built: the program's function may send requests
+    }
+    all_.clear();
+    if (here) {
+        all_.push_back(&here_);
+    }
+    if (r.hops == 0) {
+        return;
+    }
+    for (const auto& o : others_.offers(r.verb, r.noun.task)) {
+        if (o.by->live && o.by->reachable && (r.via.empty() || !is_in_via(r.via, o.by->name)) &&
+            (asked.empty() || !was_asked(o.by->name))) {
+            all_.push_back(o.by);
+        }
+    }
+}
+
+load_balancer::chosen load_balancer::choose(const protocol::request_line& r, const std::vector<std::string>& asked,
+                                            time_point now) {
+    gather(r, asked, offers(node_, r.verb, r.noun.task));
+    at_once_.clear();
+    std::copy_if(all_.begin(), all_.end(), std::back_inserter(at_once_),
+                 [now](const candidate* c) { return c->avoid_until <= now; });
+    // Work that is given to a node whose workers are occupied may wait there until its deadline.
+    if (std::any_of(at_once_.begin(), at_once_.end(), [](const candidate* c) { return c->is_free(); })) {
+        std::erase_if(at_once_, [](const candidate* c) { return c->is_saturated(); });
+    }
+    auto* found = selector_.select(at_once_.empty() ? all_ : at_once_);
+    if (found == nullptr) {
+        return {};
+    }
+    if (found == &here_) {
+        const auto* h = node_.tasks.find(r.verb, r.noun.task);
+        return {.here = true, .idempotent = h == nullptr || h->info.idempotent};
+    }
+    const auto& list = others_.offers(r.verb, r.noun.task);
+    const auto offer = std::find_if(list.begin(), list.end(), [&](const auto& o) { return o.by == found; });
+    return {.other = offer->by, .idempotent = offer->idempotent};
+}
+
+} // namespace cles::core

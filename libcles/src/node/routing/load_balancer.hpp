@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "node/node_state.hpp"
+#include "node/routing/power_of_two_choices.hpp"
+#include "node/routing/service_registry.hpp"
+#include "protocol/request_line.hpp"
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// Selects the node that serves a request for `any`. This node counts too.
+class load_balancer {
+  public:
+    load_balancer(const node_state& host, const service_registry& others, std::uint32_t seed) noexcept
+        : node_(host), others_(others), selector_(seed) {}
+
+    struct chosen {
+        known_node* other = nullptr; ///< null: this node, or none
+        bool here = false;
+        bool idempotent = false;
+
+        [[nodiscard]] bool nobody() const noexcept { return other == nullptr && !here; }
+    };
+    /// Selects a live node that offers the task, is not in `via` and is not in `asked`. Busy and unreachable nodes are
+    /// selected only if there are no others, and nodes with all workers on long jobs only if no node has a free worker.
+    [[nodiscard]] chosen choose(const protocol::request_line& r, const std::vector<std::string>& asked, time_point now);
+    /// This node has refused work.
+    void avoid_local(time_point until) noexcept { here_.avoid_until = until; }
+
+  private:
+    void gather(const protocol::request_line& r, const std::vector<std::string>& asked, bool may_be_here);
+
+    const node_state& node_;
+    const service_registry& others_;
+    power_of_two_choices selector_;
+    candidate here_;
+    std::vector<candidate*> all_;     // for the current request
+    std::vector<candidate*> at_once_; // of these, the nodes not to be avoided
+};
+
+/// Whether this node offers the task.
+bool offers(const node_state& n, verb v, std::string_view task);
+
+} // namespace cles::core

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+#include <cles/pending.hpp>
+
+#include "node/session/outbound.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+/// Receives the events of a noun that is bound at another node.
+class feed_events {
+  public:
+    feed_events() = default;
+    feed_events(const feed_events&) = delete;
+    feed_events& operator=(const feed_events&) = delete;
+    /// The noun is bound, for the first time or again, with its last value or {}.
+    virtual void on_bound(std::string_view last) = 0;
+    /// The first BIND was refused. It is not repeated, and no event follows.
+    virtual void on_refused(const protocol::failure& why) = 0;
+    /// A new, valid update: its line as received, with the body at the end.
+    virtual void on_update(std::string_view line, std::string_view body) = 0;
+
+  protected:
+    ~feed_events() = default;
+};
+
+/// Sends the requests of a router to other nodes.
+class next_hop {
+  public:
+    next_hop() = default;
+    next_hop(const next_hop&) = delete;
+    next_hop& operator=(const next_hop&) = delete;
+
+    /// Sends a request to the node that its noun names, and gives it an id. The operation never completes inside the
+    /// call. Returns a ticket for `cancel`.
+    virtual std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
+                               outbound::progress_function progress) = 0;
+    /// Cancels a request in progress: its operation completes with `cancelled`, inside the call.
+    virtual void cancel(std::uint64_t ticket) = 0;
+
+    /// Binds a noun of another node, and again whenever the binding is lost, until `unbind`. No event is reported
+    /// inside the call. Returns a ticket for `unbind`.
+    virtual std::uint64_t bind(std::string_view node, std::string_view path, std::string_view adverbs,
+                               feed_events& to) = 0;
+    /// No further events are reported.
+    virtual void unbind(std::uint64_t ticket) = 0;
+
+  protected:
+    ~next_hop() = default;
+};
+
+/// The adverbs of a forwarded request, except those that are members of `outgoing_request`: `hops` less one, `via` with
+/// this node's name, and those that this version does not know.
+std::string forwarded_adverbs(const protocol::request_line& request, std::string_view own_name);
+
+class local_node;
+
+class upstream_feed;
+
+/// Sends the requests of a service's router on its channels.
+class peer_next_hop final : public core::next_hop {
+  public:
+    explicit peer_next_hop(local_node& host) noexcept : host_(host) {}
+    ~peer_next_hop();
+    /// Closes all feeds.
+    void stop();
+
+    std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
+                       outbound::progress_function progress) override;
+    void cancel(std::uint64_t ticket) override;
+    std::uint64_t bind(std::string_view node, std::string_view path, std::string_view adverbs,
+                       core::feed_events& to) override;
+    void unbind(std::uint64_t ticket) override;
+
+  private:
+    local_node& host_;
+    std::map<std::uint64_t, std::shared_ptr<upstream_feed>> feeds_;
+};
+
+} // namespace cles::core

@@ -1,0 +1,274 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/routing/relays.hpp"
+
+#include "node/routing/all_binding.hpp"
+#include "node/session/request_checks.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::core {
+
+class relays::relay final : public feed_events {
+  public:
+    relay(relays& owner, const std::string& noun)
+        : owner_(owner),
+          topic_({owner.node_.deadlines, owner.counts_, owner.node_.bounds.binding_bytes, owner.node_.kept_values},
+                 noun),
+          held_last_(owner.node_.kept_values) {}
+    ~relay() { owner_.node_.unsent_relayed.forget(topic_); }
+    relay(const relay&) = delete;
+    relay& operator=(const relay&) = delete;
+
+    void start(std::string_view node, std::string_view path, std::string_view adverbs) {
+        ticket_ = owner_.out_.bind(node, path, adverbs, *this);
+    }
+    void join(const std::weak_ptr<const void>& whose, told tell) {
+        if (bound_) {
+            tell(&topic_, last_value(), {});
+            return;
+        }
+        if (waiting_.size() == waiting_.capacity()) { // instead of growing: removes those that have given up
+            std::erase_if(waiting_, [](const waiter& w) { return w.whose.expired(); });
+        }
+        waiting_.push_back({whose, std::move(tell)});
+    }
+
+    [[nodiscard]] std::optional<update_mark> mark() const { return fresh_ ? std::nullopt : topic_.last_mark(); }
+    [[nodiscard]] topic& subject() noexcept { return topic_; }
+    [[nodiscard]] std::uint64_t ticket() const noexcept { return ticket_; }
+    [[nodiscard]] bool is_wanted() const noexcept { return topic_.is_bound() || !waiting_.empty() || telling_; }
+
+  private:
+    struct waiter {
+        std::weak_ptr<const void> whose;
+        told tell;
+    };
+
+    void on_bound(std::string_view last) override {
+        bound_ = true;
+        last_ = last;
+        fresh_ = last_ != topic_.last_body(); // a marked last value was already delivered as an update
+        held_last_.resize(last_.size());
+        telling_ = true;
+        for (const auto& w : std::exchange(waiting_, {})) {
+            if (!w.whose.expired()) {
+                w.tell(&topic_, last_, {});
+            }
+        }
+        telling_ = false;
+        if (!fresh_) {
+            forget_last();
+        }
+        if (!is_wanted()) {
+            owner_.close(*this);
+        }
+    }
+    void on_refused(const protocol::failure& why) override {
+        const auto waiting = std::exchange(waiting_, {});
+        const auto held = owner_.all_.extract(topic_.path());
+        for (const auto& w : waiting) {
+            if (!w.whose.expired()) {
+                w.tell(nullptr, {}, why);
+            }
+        }
+    }
+    void on_update(std::string_view line, std::string_view body) override {
+        topic_.begin().append(line);
+        if (!topic_.account_memory()) { // the newest is forwarded anyway: it would not be sent again
+            topic_.shed();
+        }
+        forget_last();
+        topic_.commit(line.size() - body.size());
+        fresh_ = false;
+        owner_.node_.unsent_relayed.mark(topic_);
+    }
+
+    void forget_last() noexcept {
+        std::string{}.swap(last_);
+        held_last_.resize(0);
+    }
+    /// Of the last update, or of the reply to BIND if that is newer.
+    [[nodiscard]] std::string_view last_value() const noexcept { return fresh_ ? last_ : topic_.last_body(); }
+
+    relays& owner_;
+    topic topic_;
+    std::uint64_t ticket_ = 0;
+    bool bound_ = false; // it was bound, and will be again if it is lost
+    bool telling_ = false;
+    bool fresh_ = false;
+    std::string last_;
+    memory_reservation held_last_;
+    std::vector<waiter> waiting_;
+};
+
+relays::relays(node_state& host, next_hop& out) : node_(host), out_(out) {}
+
+relays::~relays() = default;
+
+void relays::join(std::string_view node, std::string_view path, std::string_view adverbs,
+                  const std::weak_ptr<const void>& whose, told tell) {
+    const auto noun = std::string{node} + ":" + std::string{path};
+    auto at = all_.find(noun);
+    if (at != all_.end()) {
+        at->second->join(whose, std::move(tell));
+        return;
+    }
+    if (all_.size() >= node_.bounds.nouns || stopped_) {
+        tell(nullptr, {}, {.code = errc::busy, .message = "as many nouns are passed on as may be"});
+        return;
+    }
+    if (!node_.kept_values->has_room(1)) {
+        tell(nullptr, {}, no_memory(node_));
+        return;
+    }
+    at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
+    at->second->join(whose, std::move(tell));
+    at->second->start(node, path, adverbs);
+}
+
+std::optional<update_mark> relays::mark_of(const topic& t) const {
+    const auto at = all_.find(t.path());
+    return at == all_.end() ? std::nullopt : at->second->mark();
+}
+
+topic* relays::find(std::string_view noun) noexcept {
+    const auto at = all_.find(noun);
+    return at == all_.end() ? nullptr : &at->second->subject();
+}
+
+void relays::release(topic& t) {
+    const auto at = all_.find(t.path());
+    if (at != all_.end() && !at->second->is_wanted()) {
+        close(*at->second);
+    }
+}
+
+void relays::close(relay& r) {
+    const auto held = all_.extract(r.subject().path());
+    if (!stopped_) {
+        out_.unbind(r.ticket());
+    }
+}
+
+namespace {
+
+std::string noun_of(std::string_view node, std::string_view path) { return std::string{node}.append(":").append(path); }
+
+bool has(const std::vector<std::string>& all, std::string_view one) {
+    return std::find(all.begin(), all.end(), one) != all.end();
+}
+
+} // namespace
+
+relayed_bindings::~relayed_bindings() { clear(); }
+
+void relayed_bindings::bind(std::string_view node, std::string_view path, std::string_view adverbs,
+                            binding::terms wanted, bool wants_mark, const std::shared_ptr<call>& c) {
+    std::erase_if(asking_, [](const asking& a) {
+        const auto waits = a.answers.lock();
+        return !waits || waits->ended();
+    });
+    auto noun = noun_of(node, path);
+    asking_.push_back({noun, c});
+    from_->join(node, path, adverbs, c,
+                [this, weak = std::weak_ptr{c}, wanted, wants_mark, noun](topic* t, std::string_view last,
+                                                                          const protocol::failure& why) {
+                    const auto waits = weak.lock();
+                    if (!waits || waits->ended()) { // `this` may have been destroyed with its link
+                        return;
+                    }
+                    if (t == nullptr) {
+                        waits->fail(why);
+                        return;
+                    }
+                    if (!waits->can_answer(last.size())) {
+                        waits->fail(
+                            {.code = errc::busy, .message = "no memory is left for the answer (limits.memory)"});
+                        return;
+                    }
+                    // Bound before the reply, which may trigger other requests of the peer; updates follow the reply
+                    // later.
+                    bound_.bind(*t, wanted);
+                    if (!has(by_name_, noun)) {
+                        by_name_.push_back(noun);
+                    }
+                    if (wants_mark) {
+                        waits->set_head(protocol::mark_text(from_->mark_of(*t)));
+                    }
+                    waits->done(last);
+                });
+}
+
+bool relayed_bindings::binds(std::string_view target, std::string_view path) {
+    return target == "all" ? all_.find(path) != all_.end() : bound_.has(noun_of(target, path));
+}
+
+void relayed_bindings::withdraw(std::string_view noun) {
+    for (const auto& a : std::vector<asking>{asking_}) {
+        if (a.noun != noun) {
+            continue;
+        }
+        if (const auto c = a.answers.lock(); c && !c->ended()) {
+            c->fail({.code = errc::cancelled, .message = "it was unbound"});
+        }
+    }
+}
+
+void relayed_bindings::unbind(std::string_view target, std::string_view path) {
+    if (target == "all") {
+        if (const auto held = all_.extract(std::string{path}); !held.empty()) {
+            held.mapped()->close();
+        }
+        return;
+    }
+    const auto noun = noun_of(target, path);
+    withdraw(noun);
+    std::erase(by_name_, noun);
+    bound_.unbind(noun);
+}
+
+void relayed_bindings::clear() {
+    for (const auto& [path, all] : std::exchange(all_, {})) {
+        all->close();
+    }
+    by_name_.clear();
+    asking_.clear();
+    bound_.clear();
+}
+
+// -- parts of `all` ------------------------------------------------------------------------------------------------
+
+void relayed_bindings::take_part(topic& t, binding::terms wanted) {
+    if (!has(by_name_, t.path())) {
+        bound_.bind(t, wanted);
+    }
+}
+
+void relayed_bindings::leave_part(std::string_view noun) {
+    if (!has(by_name_, noun)) {
+        bound_.unbind(noun);
+    }
+}
+
+topic* relayed_bindings::take_own_part(std::string_view path, binding::terms wanted) {
+    if (!published_.can_open(path)) {
+        return nullptr;
+    }
+    auto& t = published_.open(path);
+    if (!own_.has(path)) {
+        own_by_all_.emplace_back(path);
+    }
+    if (has(own_by_all_, path)) {
+        own_.bind(t, wanted);
+    }
+    return &t;
+}
+
+void relayed_bindings::leave_own_part(std::string_view path) {
+    if (std::erase(own_by_all_, path) != 0) {
+        own_.unbind(path);
+    }
+}
+
+} // namespace cles::core

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/routing/request_router.hpp"
+
+#include "node/routing/all_binding.hpp"
+#include "node/routing/any_request.hpp"
+#include "node/routing/scatter_gather.hpp"
+#include "node/routing/subrequest.hpp"
+
+#include <chrono>
+#include <utility>
+
+namespace cles::core {
+
+request_router::request_router(std::shared_ptr<node_state> host, next_hop& out, std::uint32_t seed,
+                               std::function<void()> wake)
+    : node_(std::move(host)), out_(out), service_registry_(*node_, out, [this] { on_offers(); }),
+      load_balancer_(*node_, service_registry_, seed), relays_(std::make_shared<relays>(*node_, out)),
+      wake_(std::move(wake)) {
+    node_->active_router = this;
+}
+
+request_router::~request_router() { stop(); }
+
+void request_router::stop() {
+    if (!std::exchange(stopped_, true)) {
+        node_->active_router = nullptr;
+        service_registry_.stop();
+        relays_->stop();
+        waiting_.clear();
+        ready_.clear();
+    }
+}
+
+bool request_router::route(const protocol::request_line& r, const identity& peer, time_point due, time_point now,
+                           call_factory& from) {
+    const auto target = r.noun.target;
+    if (target == "any" && !waits_for_discovery_) {
+        const auto chosen = load_balancer_.choose(r, {}, now);
+        if (chosen.here && runs_in_line(r)) {
+            return false;
+        }
+        if (!chosen.nobody()) {
+            if (auto c = from.make_call(r, due, now)) {
+                std::make_shared<any_request>(shared_from_this(), r, peer, std::move(c), due)->ask(chosen, now);
+            }
+            return true;
+        }
+    }
+    auto c = from.make_call(r, due, now);
+    if (!c) {
+        return true;
+    }
+    if (target == "any") {
+        begin(std::make_shared<any_request>(shared_from_this(), r, peer, std::move(c), due), now);
+    } else if (target == "all") {
+        begin(std::make_shared<scatter_gather>(shared_from_this(), r, peer, std::move(c), due), now);
+    } else if (r.hops == 0) {
+        c->fail({.code = errc::no_target,
+                 .message = "it may not be passed on to '" + std::string{target} + "': it bears hops=0"});
+    } else {
+        std::make_shared<forwarding>(std::move(c), std::string{target})->go(out_, r, node_->name, due);
+    }
+    return true;
+}
+
+void request_router::continue_after_busy(const protocol::request_line& r, const identity& peer,
+                                         const protocol::failure& why, time_point due, time_point now,
+                                         call_factory& from) {
+    if (auto c = from.make_call(r, due, now)) {
+        std::make_shared<any_request>(shared_from_this(), r, peer, std::move(c), due)
+            ->continue_after_local_refusal(why);
+    }
+}
+
+void request_router::bind(const protocol::request_line& r, relayed_bindings& place, time_point due, time_point now,
+                          call_factory& from) {
+    const auto c = from.make_call(r, due, now);
+    if (!c) {
+        return;
+    }
+    const binding::terms wanted{.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep};
+    std::string scratch;
+    const std::string path{protocol::canonical_path(r.noun, scratch)};
+    if (r.noun.target == "all") {
+        const auto all = std::make_shared<all_binding>(shared_from_this(), r, path, place, wanted, c, due);
+        const auto before = place.bind_all(path, all);
+        std::erase_if(all_, [](const auto& gone) { return gone.expired(); });
+        all_.push_back(all);
+        begin(all, now);
+        if (before) {
+            before->close(all.get());
+        }
+    } else if (r.noun.target == "any" || r.hops == 0) {
+        c->fail({.code = errc::no_target,
+                 .message = r.hops == 0 ? "it may not be passed on: it bears hops=0"
+                                        : "a binding is of a node's noun, or of that of all"});
+    } else {
+        place.bind(r.noun.target, path, forwarded_adverbs(r, node_->name), wanted, r.wants_mark, c);
+    }
+}
+
+// A handler that replies at once needs no call.
+bool request_router::runs_in_line(const protocol::request_line& r) const {
+    if (r.noun.task == "cles") {
+        return true;
+    }
+    const auto* h = node_->tasks.find(r.verb, r.noun.task);
+    return h != nullptr && h->plain;
+}
+
+void request_router::begin(std::shared_ptr<deferred_request> e, time_point now) {
+    while (!waiting_.empty() && waiting_.front()->over()) {
+        waiting_.pop_front();
+    }
+    if (!e->begin(now)) {
+        waiting_.push_back(std::move(e));
+    }
+}
+
+void request_router::release() {
+    waits_for_discovery_ = false;
+    on_offers();
+}
+
+void request_router::schedule(std::shared_ptr<deferred_request> e) {
+    if (!stopped_) {
+        ready_.push_back(std::move(e));
+        wake_();
+    }
+}
+
+// What a handler makes ready waits for another turn. A handler may also stop this.
+void request_router::begin_ready(time_point now) {
+    for (auto left = ready_.size(); left != 0 && !ready_.empty(); --left) {
+        auto next = std::move(ready_.front());
+        ready_.pop_front();
+        if (!ready_.empty()) {
+            wake_(); // before user code, which may throw
+        }
+        if (!next->over()) {
+            begin(std::move(next), now);
+        }
+    }
+}
+
+// In their order; those for which nothing has changed wait again.
+void request_router::on_offers() {
+    for (auto all = std::exchange(waiting_, {}); !all.empty(); all.pop_front()) {
+        if (!all.front()->over()) {
+            schedule(std::move(all.front()));
+        }
+    }
+    for (const auto& weak : std::vector<std::weak_ptr<all_binding>>{all_}) {
+        if (const auto all = weak.lock(); all && !stopped_) {
+            all->follow();
+        }
+    }
+}
+
+protocol::failure request_router::no_provider(const protocol::request_line& r) const {
+    return {.code = errc::no_target,
+            .message = "nobody that is known offers " + std::string{to_string(r.verb)} + " '" +
+                       std::string{r.noun.task} + "'"};
+}
+
+} // namespace cles::core

@@ -1,0 +1,354 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/routing/service_registry.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+const std::vector<service_registry::offer> nobody;
+
+} // namespace
+
+class service_registry::task_query final : public subrequest_events {
+  public:
+    task_query(std::weak_ptr<service_registry*> by, const known_node& whom)
+        : by_(std::move(by)), name_(whom.name), ticket_(whom.ticket) {}
+
+    void on_result(std::size_t, std::string_view json) override {
+        if (const auto alive = by_.lock()) {
+            (*alive)->on_tasks(name_, ticket_, json);
+        }
+    }
+    void on_failure(std::size_t, subrequest_failure why) override {
+        if (const auto alive = by_.lock()) {
+            (*alive)->on_no_answer(name_, ticket_, why.unreachable);
+        }
+    }
+    void on_progress(std::size_t, double, std::string_view) override {}
+
+  private:
+    std::weak_ptr<service_registry*> by_;
+    std::string name_;
+    std::uint64_t ticket_;
+};
+
+service_registry::service_registry(node_state& host, next_hop& out, std::function<void()> on_offers)
+    : node_(host), out_(out), on_offers_(std::move(on_offers)), alive_(std::make_shared<service_registry*>(this)) {
+    node_.peers.observe([this](std::string_view name) { on_member_seen(name); });
+}
+
+service_registry::~service_registry() { stop(); }
+
+void service_registry::stop() noexcept {
+    if (std::exchange(alive_, nullptr)) {
+        node_.peers.observe(nullptr);
+        node_.deadlines.disarm(*this);
+    }
+}
+
+// -- known nodes ---------------------------------------------------------------------------------------------------
+
+void service_registry::on_member_seen(std::string_view name) {
+    const auto now = node_.time.now();
+    const auto heard = node_.peers.find_member(name);
+    auto at = nodes_.find(name);
+    if (!heard) {
+        if (at != nodes_.end()) {
+            const auto gone = std::move(at->second);
+            nodes_.erase(at);
+            forget(*gone, now);
+        }
+        return;
+    }
+    const bool fresh = at == nodes_.end();
+    if (fresh) {
+        at = nodes_.emplace(std::string{name}, std::make_unique<known_node>()).first;
+        at->second->name = name;
+        all_nodes_.push_back({at->second.get(), true});
+    }
+    auto& known = *at->second;
+    known.update_load(heard->load);
+    const bool can_be_asked = !heard->suspect && !heard->where.empty();
+    const bool could_be_asked = known.live && known.reachable;
+    const bool another = fresh || known.epoch != heard->epoch;
+    const bool moved = known.where != heard->where;
+    known.live = !heard->suspect;
+    known.reachable = !heard->where.empty();
+    if (known.state == known_node::task_knowledge::known && !another && known.digest == heard->tasks && !moved) {
+        return;
+    }
+    if (another) {
+        known.epoch = heard->epoch;
+        known.avoid_until = {};
+    }
+    if (another || known.digest != heard->tasks) {
+        begin_anew(known, heard->tasks, heard->where, now);
+    } else if (moved) {
+        const bool unknown = known.state != known_node::task_knowledge::known;
+        give_up(known);
+        known.where = heard->where;
+        if (unknown) {
+            known.failures = 0;
+            wait_for_turn(known);
+        }
+    } else if (can_be_asked && !could_be_asked) {
+        wait_for_turn(known);
+    } else if (!can_be_asked && could_be_asked && known.state == known_node::task_knowledge::unknown) {
+        give_up(known);
+    } else {
+        return;
+    }
+    ask(now);
+}
+
+known_node* service_registry::find(std::string_view name) noexcept {
+    const auto at = nodes_.find(name);
+    return at == nodes_.end() ? nullptr : at->second.get();
+}
+
+service_registry::digest_group* service_registry::digest_group_of(const known_node& n) noexcept {
+    const auto found = n.digest.empty() ? digest_groups_.end() : digest_groups_.find(n.digest);
+    return found == digest_groups_.end() ? nullptr : &found->second;
+}
+
+// Its tasks are to be queried: it is new, or its digest has changed.
+void service_registry::begin_anew(known_node& of, std::string_view digest, std::string_view where, time_point now) {
+    leave_digest_group(of);
+    of.digest = digest;
+    of.where = where;
+    of.failures = 0;
+    of.state = known_node::task_knowledge::unknown;
+    if (!digest.empty()) {
+        auto& k = digest_groups_[of.digest];
+        k.nodes.emplace(of.name, &of);
+        if (k.tasks) {
+            set_tasks(of, k.tasks);
+            on_offers_();
+            return;
+        }
+    }
+    if (!of.tasks && of.live && of.reachable) {
+        expect(of, now + answer_within);
+    }
+    wait_for_turn(of);
+}
+
+void service_registry::leave_digest_group(known_node& n) {
+    give_up(n);
+    expect(n, {});
+    if (auto* k = digest_group_of(n)) {
+        k->nodes.erase(n.name);
+        if (k->nodes.empty()) {
+            digest_groups_.erase(n.digest);
+        }
+    }
+}
+
+void service_registry::forget(known_node& n, time_point now) {
+    const bool last_expected = n.expected_until && expected_.size() == 1;
+    leave_digest_group(n);
+    forget_offers(n);
+    if (n.tasks || last_expected) {
+        on_offers_();
+    }
+    ask(now);
+}
+
+void service_registry::expect(known_node& n, std::optional<time_point> until) {
+    if (n.expected_until) {
+        expected_.erase({*n.expected_until, n.name});
+    }
+    n.expected_until = until;
+    if (until) {
+        expected_.emplace(*until, n.name);
+    }
+}
+
+// -- queries -------------------------------------------------------------------------------------------------------
+
+void service_registry::wait_for_turn(known_node& n) {
+    if (n.state == known_node::task_knowledge::unknown && n.live && n.reachable) {
+        queries_.enter(n);
+    }
+}
+
+// It is neither queried nor waits to be.
+void service_registry::give_up(known_node& n) {
+    queries_.remove(n);
+    if (n.state == known_node::task_knowledge::asked) {
+        n.state = known_node::task_knowledge::unknown;
+        n.ticket = 0;
+    }
+    if (auto* k = digest_group_of(n)) {
+        k->waiting.erase(n.name);
+        if (k->asked == &n) {
+            wake_next(*k);
+        }
+    }
+}
+
+// Of the nodes with one digest, one at a time is queried: its reply most likely holds for all.
+void service_registry::ask(time_point now) {
+    while (auto* next = queries_.next(now)) {
+        auto& n = static_cast<known_node&>(*next);
+        auto* k = digest_group_of(n);
+        if (k != nullptr && k->asked != nullptr) {
+            queries_.remove(n);
+            k->waiting.emplace(n.name, &n);
+            continue;
+        }
+        if (k != nullptr) {
+            k->asked = &n;
+        }
+        n.state = known_node::task_knowledge::asked;
+        n.ticket = ++last_ticket_;
+        out_.send({.verb = verb::pull, .noun = n.name + ":cles"}, now + answer_within,
+                  detail::pending_ptr{new subrequest(std::make_shared<task_query>(alive_, n), 0)}, {});
+    }
+    follow();
+}
+
+void service_registry::wake_next(digest_group& of) {
+    of.asked = nullptr;
+    if (!of.waiting.empty()) {
+        auto& next = *of.waiting.begin()->second;
+        of.waiting.erase(of.waiting.begin());
+        wait_for_turn(next);
+    }
+}
+
+known_node* service_registry::asked_by(const std::string& name, std::uint64_t ticket) noexcept {
+    auto* known = find(name);
+    return known != nullptr && known->state == known_node::task_knowledge::asked && known->ticket == ticket ? known
+                                                                                                            : nullptr;
+}
+
+void service_registry::on_tasks(const std::string& name, std::uint64_t ticket, std::string_view said) {
+    auto* known = asked_by(name, ticket);
+    if (known == nullptr) {
+        return;
+    }
+    auto list = read_task_list(said, name);
+    if (!list) {
+        on_no_answer(name, ticket, false);
+        return;
+    }
+    const auto now = node_.time.now();
+    queries_.answered(*known);
+    const auto tasks = std::make_shared<const task_list>(std::move(*list));
+    if (auto* k = digest_group_of(*known)) {
+        k->asked = nullptr;
+        k->waiting.clear();
+        k->tasks = tasks;
+        for (const auto& [other, n] : k->nodes) {
+            set_tasks(*n, tasks);
+        }
+    } else {
+        set_tasks(*known, tasks);
+    }
+    ask(now);
+    on_offers_();
+}
+
+void service_registry::on_no_answer(const std::string& name, std::uint64_t ticket, bool unreachable) {
+    auto* known = asked_by(name, ticket);
+    if (known == nullptr) {
+        return;
+    }
+    const auto now = node_.time.now();
+    const bool last_expected = known->expected_until && expected_.size() == 1;
+    known->state = known_node::task_knowledge::unknown;
+    queries_.failed(*known, unreachable, now);
+    if (!known->live || !known->reachable) { // queried again when it is received again
+        queries_.remove(*known);
+    }
+    expect(*known, {});
+    if (auto* k = digest_group_of(*known)) {
+        wake_next(*k);
+    }
+    ask(now);
+    if (last_expected) {
+        on_offers_();
+    }
+}
+
+void service_registry::follow() {
+    auto due = queries_.due();
+    if (!expected_.empty()) {
+        due = std::min(due.value_or(time_point::max()), expected_.begin()->first);
+    }
+    if (due) {
+        node_.deadlines.arm(*this, *due);
+    } else {
+        node_.deadlines.disarm(*this);
+    }
+}
+
+void service_registry::on_deadline(time_point now) {
+    const bool expected = expects_more();
+    while (!expected_.empty() && expected_.begin()->first <= now) {
+        expect(*find(expected_.begin()->second), {});
+    }
+    ask(now);
+    if (expected && !expects_more()) {
+        on_offers_();
+    }
+}
+
+// -- offers --------------------------------------------------------------------------------------------------------
+
+const std::vector<service_registry::offer>& service_registry::offers(verb v, std::string_view task) const {
+    if (task == "cles") {
+        return v == verb::pull ? all_nodes_ : nobody;
+    }
+    const auto found = offers_.find(task);
+    return found == offers_.end() ? nobody : found->second[static_cast<std::size_t>(v)];
+}
+
+void service_registry::set_tasks(known_node& of, std::shared_ptr<const task_list> tasks) {
+    queries_.remove(of);
+    expect(of, {});
+    of.state = known_node::task_knowledge::known;
+    of.failures = 0;
+    if (of.tasks == tasks) {
+        return;
+    }
+    if (of.tasks) {
+        forget_offers(of);
+        all_nodes_.push_back({&of, true});
+    }
+    of.tasks = std::move(tasks);
+    offer_all(of);
+}
+
+void service_registry::offer_all(const known_node& of) {
+    auto* by = find(of.name);
+    for (const auto& e : of.tasks->entries) {
+        auto& list = offers_[e.task][static_cast<std::size_t>(e.verb)];
+        if (std::none_of(list.begin(), list.end(), [by](const offer& o) { return o.by == by; })) {
+            list.push_back({by, e.idempotent});
+        }
+    }
+}
+
+void service_registry::forget_offers(const known_node& of) {
+    const auto from = [&of](const offer& o) { return o.by == &of; };
+    std::erase_if(all_nodes_, from);
+    if (!of.tasks) {
+        return;
+    }
+    for (const auto& e : of.tasks->entries) {
+        const auto found = offers_.find(e.task);
+        if (found == offers_.end()) {
+            continue;
+        }
+        std::erase_if(found->second[static_cast<std::size_t>(e.verb)], from);
+        if (std::all_of(found->second.begin(), found->second.end(), [](const auto& list) { return list.empty(); })) {
+            offers_.erase(found);
+        }
+    }
+}
+
+} // namespace cles::core

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "node/base/deadlines.hpp"
+#include "node/base/string_map.hpp"
+#include "node/node_state.hpp"
+#include "node/routing/next_hop.hpp"
+#include "node/routing/power_of_two_choices.hpp"
+#include "node/routing/query_scheduler.hpp"
+#include "node/routing/subrequest.hpp"
+#include "node/routing/task_list.hpp"
+
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace cles::core {
+
+/// Another node and its tasks.
+struct known_node : candidate, query_target {
+    std::string name;
+    bool live = true;      ///< received recently
+    bool reachable = true; ///< at an address usable from here
+    std::uint32_t epoch = 0;
+    std::string digest; ///< of its tasks, as announced
+
+    enum class task_knowledge : std::uint8_t { unknown, asked, known };
+    task_knowledge state = task_knowledge::unknown;
+    std::uint64_t ticket = 0;                 ///< of its last query
+    std::optional<time_point> expected_until; ///< its tasks may become known at any moment until then
+    std::shared_ptr<const task_list> tasks;
+};
+
+/// Which other nodes offer which tasks: follows `membership`, and queries the tasks of a node when its announced digest
+/// changes. Nodes with the same digest offer the same tasks, and only one of them is queried. The cost of an
+/// announcement or of a failed query does not depend on the number of known nodes.
+class service_registry final : private deadline {
+  public:
+    struct offer {
+        known_node* by = nullptr;
+        bool idempotent = false;
+    };
+
+    static constexpr std::chrono::milliseconds answer_within{1'000};
+
+    /// `on_offers` is called when offers have been added or removed, or no more are expected.
+    service_registry(node_state& host, next_hop& out, std::function<void()> on_offers);
+    ~service_registry();
+    /// Sends no more queries.
+    void stop() noexcept;
+
+    /// For the task `cles`: all nodes. Valid until the next change.
+    [[nodiscard]] const std::vector<offer>& offers(verb v, std::string_view task) const;
+    /// Whether the tasks of nodes received within the last second may still become known at any moment.
+    [[nodiscard]] bool expects_more() const noexcept { return !expected_.empty(); }
+    /// Null if it is not known.
+    [[nodiscard]] known_node* find(std::string_view name) noexcept;
+    [[nodiscard]] std::size_t size() const noexcept { return nodes_.size(); }
+    /// The cost of the queries; see `query_scheduler::steps`.
+    [[nodiscard]] std::uint64_t steps() const noexcept { return queries_.steps(); }
+
+  private:
+    class task_query; // queries the tasks of one node
+    /// The nodes with one digest.
+    struct digest_group {
+        std::map<std::string_view, known_node*> nodes{}; // by name
+        std::shared_ptr<const task_list> tasks{};        // null: not known
+        const known_node* asked = nullptr;               // the others wait for its reply
+        std::map<std::string_view, known_node*> waiting{};
+    };
+
+    void on_member_seen(std::string_view name);
+    void on_deadline(time_point now) override;
+    void begin_anew(known_node& of, std::string_view digest, std::string_view where, time_point now);
+    void leave_digest_group(known_node& n);
+    void forget(known_node& n, time_point now);
+    void expect(known_node& n, std::optional<time_point> until);
+    void wait_for_turn(known_node& n);
+    void give_up(known_node& n);
+    void ask(time_point now);
+    void on_tasks(const std::string& name, std::uint64_t ticket, std::string_view said);
+    void on_no_answer(const std::string& name, std::uint64_t ticket, bool unreachable);
+    void wake_next(digest_group& of);
+    void follow();
+    void set_tasks(known_node& of, std::shared_ptr<const task_list> tasks);
+    void forget_offers(const known_node& of);
+    void offer_all(const known_node& of);
+    [[nodiscard]] digest_group* digest_group_of(const known_node& n) noexcept;
+    [[nodiscard]] known_node* asked_by(const std::string& name, std::uint64_t ticket) noexcept;
+
+    node_state& node_;
+    next_hop& out_;
+    std::function<void()> on_offers_;
+    std::map<std::string, std::unique_ptr<known_node>, std::less<>> nodes_;
+    using by_verb = std::array<std::vector<offer>, verb_count>;
+    string_map<by_verb> offers_;
+    std::vector<offer> all_nodes_;
+    std::map<std::string, digest_group, std::less<>> digest_groups_; // by digest
+    query_scheduler queries_;
+    std::set<std::pair<time_point, std::string_view>> expected_; // until when, and the name
+    std::uint64_t last_ticket_ = 0;
+    std::shared_ptr<service_registry*> alive_; // for replies that arrive after its destruction
+};
+
+} // namespace cles::core

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/session/call.hpp"
+
+#include "node/node_state.hpp"
+#include "node/session/handler_failure.hpp"
+#include "node/session/request_checks.hpp"
+
+#include <algorithm>
+#include <exception>
+#include <utility>
+
+namespace cles::core {
+
+call::call(std::shared_ptr<node_state> host, call_owner& owner, terms wanted, time_point started)
+    : node_(std::move(host)), owner_(&owner), terms_(std::move(wanted)), started_(started) {
+    ++node_->counts.handlers_running;
+    node_->counts.routed += terms_.routed ? 1 : 0;
+}
+
+call::~call() {
+    --node_->counts.handlers_running;
+    node_->counts.routed -= terms_.routed ? 1 : 0;
+}
+
+call::terms call::terms_of(const protocol::request_line& r) {
+    terms result{r.carried()};
+    result.verb = r.verb;
+    result.id = r.id;
+    result.wants_reply = r.wants_reply;
+    result.wants_progress = r.wants_progress;
+    return result;
+}
+
+std::shared_ptr<call> call::begin(const std::shared_ptr<node_state>& host, call_owner& owner, terms wanted,
+                                  const std::shared_ptr<memory_account>& memory, std::size_t text, time_point due,
+                                  time_point now) {
+    constexpr std::size_t around = 512; // itself and its handler's part, about
+    auto c = std::make_shared<call>(host, owner, std::move(wanted), now);
+    c->held_ = memory_reservation{memory};
+    if (!c->held_.try_resize(text + c->terms_.publish_body.size() + around)) {
+        return nullptr;
+    }
+    host->deadlines.arm(*c, due);
+    return c;
+}
+
+void call::done(std::string_view json) {
+    if (owner_ == nullptr) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    if (!terms_.publish_path.empty()) {
+        try {
+            node_->published.publish_body(terms_.publish_path, terms_.publish_body);
+        } catch (...) {
+            auto why = after_run(describe(std::current_exception()));
+            why.ran = why.ran || why.code == errc::busy; // which promises otherwise that the handler has not run
+            end().refuse(*this, why);
+            return;
+        }
+    }
+    end().answer(*this, json);
+}
+
+void call::fail(protocol::failure why) {
+    if (owner_ == nullptr) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    if (!terms_.routed) {
+        why = after_run(std::move(why));
+    }
+    end().refuse(*this, why);
+}
+
+void call::abort(protocol::failure why) {
+    const auto keep = shared_from_this();
+    fail(std::move(why));
+    stop();
+}
+
+// Called once, since the owner is gone afterwards.
+call_owner& call::end() {
+    auto& owner = *owner_;
+    detach();
+    if (!terms_.routed) { // that time is other nodes'
+        node_->handler_time.record(node_->time.now() - started_);
+    }
+    return owner;
+}
+
+bool call::progress(double fraction, std::string_view json) {
+    if (owner_ == nullptr || !terms_.wants_progress) {
+        return false;
+    }
+    reported_ = std::max(reported_, std::clamp(fraction, 0.0, 1.0));
+    return owner_->report(*this, reported_, json);
+}
+
+void call::write_log(log_level level, std::string_view text) const {
+    node_->write_log(level, {text, owner_ != nullptr ? owner_->peer_address() : std::string_view{}, terms_.id});
+}
+
+void call::on_stop(std::function<void()> callback) {
+    if (stopped_) {
+        callback();
+    } else if (owner_ != nullptr) {
+        on_stop_ = std::move(callback);
+    }
+}
+
+void call::detach() noexcept {
+    owner_ = nullptr;
+    node_->deadlines.disarm(*this);
+}
+
+void call::stop() {
+    stopped_ = true;
+    if (const auto callback = std::exchange(on_stop_, nullptr)) {
+        callback();
+    }
+}
+
+void call::on_deadline(time_point) {
+    abort({.code = errc::deadline, .message = node_->name + " did not finish in time"});
+}
+
+bool may_have_started(const protocol::failure& why) noexcept { return why.code != errc::busy || why.ran; }
+
+} // namespace cles::core

@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/session/connection.hpp"
+
+#include "node/base/deadlines.hpp"
+#include "node/local_node.hpp"
+#include "node/publish/feed_machine.hpp"
+
+#include <chrono>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+constexpr unsigned lines_per_write = 32;
+constexpr std::size_t udp_over_v4 = 28; // bytes of headers
+constexpr std::size_t udp_over_v6 = 48;
+constexpr std::size_t update_backpressure_limit = 65536; // unsent bytes beyond which updates stay in their topics
+constexpr std::size_t idle_buffer_limit = 32768;         // bytes that an idle link may keep
+constexpr std::chrono::seconds idle_after{2};
+
+} // namespace
+
+connection::connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number)
+    : host_(std::move(host)), link_(std::move(carrier)), from_(from), number_(number),
+      memory_(std::make_shared<core::memory_account>(host_->node().memory)),
+      session_(host_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
+    if (link_->datagram() == 0) {
+        monitor_.emplace(static_cast<core::link_monitor::owner&>(*this), host_->deadlines(), host_->bounds(),
+                         host_->now());
+        if (from_ == origin::accepted) {
+            monitor_->expect_line();
+        }
+        return;
+    }
+    const bool came_in = from_ == origin::accepted || from_ == origin::refused;
+    const auto unverified_address = came_in ? host_->unverified_address(link_->peer()) : std::string{};
+    const bool is_v6 = unverified_address.find(':') != std::string::npos;
+    datagrams_.emplace(host_->node(), link_->datagram(), unverified_address, is_v6 ? udp_over_v6 : udp_over_v4);
+    if (from_ == origin::accepted) {
+        idle_timer_.emplace(static_cast<core::idle_timer::keeper&>(*this), host_->deadlines(), host_->now());
+    }
+}
+
+connection::~connection() = default;
+
+void connection::start() { link_->start(shared_from_this()); }
+
+time_point connection::now() { return now_ ? *now_ : *(now_ = host_->now()); }
+
+// -- from the link -------------------------------------------------------------------------------------------------
+
+bool connection::accept_input(std::string_view text) {
+    if (from_ == origin::refused) {
+        session_.reject(text);
+        return false;
+    }
+    if (idle_timer_) {
+        idle_timer_->on_datagram(now());
+    } else if (monitor_ && !text.empty()) {
+        monitor_->on_line(now());
+    }
+    return true;
+}
+
+void connection::on_line(std::string_view line) {
+    if (!accept_input(line)) {
+        return;
+    }
+    session_.on_line(line, now());
+    // In a long batch, the first replies leave early: with many requests in flight, neither end then waits for the
+    // other.
+    if (++lines_ % lines_per_write == 0 || link_->output().size() > host_->bounds().unread) {
+        flush();
+    }
+    rethrow_handler_exception();
+}
+
+// A handler's exception passes through the link, which delivers the remaining lines later and may not end this batch.
+void connection::rethrow_handler_exception() {
+    if (host_->completions().has_thrown()) {
+        const auto keep = shared_from_this();
+        now_.reset();
+        host_->flush_scheduler().flush_soon(*this);
+        host_->completions().rethrow();
+    }
+}
+
+void connection::on_overlong(std::string_view head) {
+    if (!accept_input(head)) {
+        return;
+    }
+    session_.on_overlong(head, now());
+}
+
+void connection::on_cut(std::string_view rest) { session_.on_cut(rest, now()); }
+
+void connection::on_batch() {
+    const auto keep = shared_from_this();
+    flush();
+    lines_ = 0;
+    now_.reset();
+    host_->check_shutdown();
+    if (from_ == origin::refused) {
+        abandon("there are as many links as there may be");
+    }
+}
+
+void connection::on_end() {
+    usable_ = false;
+    lose_feeds("the publisher ended the link");
+    session_.on_end(now());
+    if (monitor_ && !finished_ && !gone_) {
+        monitor_->on_end(now());
+    }
+}
+
+void connection::on_lost(boost::system::error_code why) {
+    host_->connections().on_closed_gracefully(*link_);
+    end("the link was lost: " + why.message());
+}
+
+void connection::on_room() {
+    const auto keep = shared_from_this();
+    session_.serving().drain(host_->now());
+    flush();
+    host_->check_shutdown();
+}
+
+// -- from the session ----------------------------------------------------------------------------------------------
+
+void connection::wake() {
+    if (!now_) { // during a batch, `on_batch` flushes
+        host_->flush_scheduler().flush_soon(*this);
+    }
+}
+
+bool connection::is_behind() const { return link_->unsent() > host_->bounds().unread; }
+
+void connection::pause(bool stop) {
+    pause_for_queue_ = stop;
+    link_->pause(pause_for_queue_ || pause_for_backlog_);
+}
+
+void connection::finish() {
+    usable_ = false;
+    finished_ = true;
+    if (monitor_) {
+        monitor_->stop();
+    }
+    link_->finish();
+}
+
+void connection::close() {
+    if (!gone_) {
+        send_output(); // send the replies to earlier requests
+    }
+    abandon("the link was closed");
+}
+
+bool connection::takes_updates() const {
+    // If nothing is pending, one update is always accepted: no later event would ask for it again.
+    const auto unsent = link_->unsent();
+    const bool takes = unsent < update_backpressure_limit && (unsent == 0 || memory_->has_room(unsent));
+    updates_wait_ = updates_wait_ || !takes;
+    return takes;
+}
+
+void connection::put_updates(std::string_view lines) {
+    if (datagrams_) {
+        datagrams_->append_updates(link_->output(), lines);
+    } else {
+        link_->output().append(lines);
+    }
+    host_->flush_scheduler().flush_soon(*this);
+}
+
+// -- output --------------------------------------------------------------------------------------------------------
+
+void connection::flush() {
+    if (gone_) {
+        return;
+    }
+    serve_more();
+    if (gone_) { // a handler ended it
+        return;
+    }
+    send_output();
+    update_backpressure();
+    if (may_serve_more()) {
+        host_->flush_scheduler().flush_soon(*this);
+    }
+    if (updates_wait_ && !host_->stopped() && link_->unsent() < update_backpressure_limit) {
+        // The link sent everything at once, so it will not call `on_room`.
+        updates_wait_ = false;
+        session_.serving().drain(host_->now());
+    }
+}
+
+bool connection::write() {
+    if (gone_) {
+        return true;
+    }
+    send_output();
+    update_backpressure();
+    return !updates_wait_ && !may_serve_more();
+}
+
+void connection::send_output() {
+    if (datagrams_) {
+        datagrams_->limit(link_->output(), now_ ? *now_ : host_->now());
+    }
+    link_->flush();
+}
+
+bool connection::may_serve_more() {
+    return session_.serving().has_more() && !host_->stopped() && link_->unsent() < host_->bounds().unread;
+}
+
+void connection::serve_more() {
+    if (may_serve_more()) {
+        const auto keep = shared_from_this();
+        session_.serving().serve_more(host_->now());
+    }
+}
+
+// Stops reading from a peer that does not read its replies, and watches for one that takes nothing for too long.
+void connection::update_backpressure() {
+    const auto unsent = link_->unsent();
+    held_output_.resize(unsent);
+    const auto& bounds = host_->bounds();
+    const bool too_much = unsent > (pause_for_backlog_ ? bounds.unread / 2 : bounds.unread);
+    if (too_much != pause_for_backlog_) {
+        pause_for_backlog_ = too_much;
+        link_->pause(pause_for_queue_ || pause_for_backlog_);
+    }
+    if (unsent != 0 && !stall_.armed()) {
+        stall_.sent = link_->sent();
+        host_->deadlines().arm(stall_, core::saturating_add(host_->now(), bounds.stall));
+    }
+    schedule_buffer_release();
+}
+
+// Most links are idle most of the time: the buffers of a large message are released if no other follows soon.
+void connection::schedule_buffer_release() {
+    if (!idle_.armed() && link_->buffered() > idle_buffer_limit) {
+        idle_.moved = link_->received() + link_->sent();
+        host_->deadlines().arm(idle_, host_->now() + idle_after);
+    }
+}
+
+void connection::on_idle(time_point now) {
+    const auto moved = link_->received() + link_->sent();
+    if (std::exchange(idle_.moved, moved) == moved) {
+        link_->shrink();
+    } else {
+        host_->deadlines().arm(idle_, now + idle_after);
+    }
+}
+
+void connection::on_stall(time_point now) {
+    const auto keep = shared_from_this();
+    if (gone_ || link_->unsent() == 0) {
+        return;
+    }
+    if (link_->sent() != stall_.sent) {
+        stall_.sent = link_->sent();
+        host_->deadlines().arm(stall_, core::saturating_add(now, host_->bounds().stall));
+        return;
+    }
+    host_->post_log(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address,
+                    link_->peer().address);
+    abandon("the peer took nothing for too long");
+}
+
+// The idle timer of a source of datagrams has expired.
+void connection::on_quiet() { abandon("nothing came for a while"); }
+
+void connection::on_silence() {
+    const auto keep = shared_from_this();
+    host_->post_log(log_level::debug, "closed a link that brought no line: " + link_->peer().address,
+                    link_->peer().address);
+    close_after_flush("no line came in time");
+}
+
+// Output that is pending anyway also shows whether the peer exists.
+void connection::on_probe() {
+    if (!gone_ && link_->unsent() == 0) {
+        link_->output().push_back('\n');
+        send_output();
+        update_backpressure();
+    }
+}
+
+// -- feeds ---------------------------------------------------------------------------------------------------------
+
+void connection::bind(core::feed_machine& feed, protocol::outgoing_request request, time_point deadline,
+                      detail::pending_ptr operation) {
+    session_.bound().add(feed);
+    feeds_.push_back(&feed);
+    session_.asking().send(request, deadline, host_->now(), std::move(operation));
+}
+
+void connection::unbind(core::feed_machine& feed) {
+    session_.bound().remove(feed);
+    std::erase(feeds_, &feed);
+}
+
+void connection::lose_feeds(std::string_view why) {
+    const std::string reason{why};
+    const auto at = host_->now();
+    while (!feeds_.empty()) {
+        auto* feed = feeds_.back();
+        unbind(*feed);
+        feed->on_lost(reason, at);
+    }
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+// A peer that has sent nothing gets the same reply as a refused one: its first request may be on its way.
+void connection::evict() {
+    ++host_->node().counts.links_evicted;
+    if (!monitor_->has_received()) {
+        session_.send_busy();
+    }
+    close_after_flush("others needed the room");
+}
+
+// Ends the connection now; the link sends its output and takes its time to close.
+void connection::close_after_flush(std::string_view why) {
+    if (!gone_) {
+        const auto keep = shared_from_this();
+        host_->connections().close_gracefully(link_);
+        end(why);
+    }
+}
+
+void connection::abandon(std::string_view why) {
+    if (!gone_) {
+        const auto keep = shared_from_this();
+        link_->close();
+        end(why);
+    }
+}
+
+void connection::end(std::string_view why) {
+    if (gone_) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    gone_ = true;
+    usable_ = false;
+    host_->deadlines().disarm(stall_);
+    host_->deadlines().disarm(idle_);
+    idle_timer_.reset();
+    if (monitor_) {
+        monitor_->stop();
+    }
+    held_output_.resize(0);
+    host_->forget(*this, link_->received(), link_->sent());
+    lose_feeds(why);
+    session_.on_lost(why);
+    now_.reset();
+    host_->check_shutdown();
+}
+
+} // namespace cles::core

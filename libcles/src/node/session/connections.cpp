@@ -1,0 +1,263 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/session/connections.hpp"
+
+#include "node/base/ip_network.hpp"
+#include "node/local_node.hpp"
+#include "node/membership/reachable_endpoints.hpp"
+#include "node/session/request_checks.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+// The holder whose share a link counts against: a host, or a local user.
+std::string address_of(const identity& peer) {
+    if (peer.uid) {
+        return "user " + std::to_string(*peer.uid);
+    }
+    const auto host = core::host_of(peer);
+    return host.empty() ? peer.transport : core::share_of_address(host);
+}
+
+// How many links may close gracefully at a time: each holds a descriptor for up to `limits::discard`.
+std::size_t max_closing_links(const limits& bounds) { return std::max<std::size_t>(64, bounds.links / 4); }
+
+} // namespace
+
+/// The owner of a refused link: ignores its input, and waits until the link has closed.
+class connections::refused final : public link_events {
+  public:
+    refused(std::weak_ptr<local_node> host, const link& which) noexcept : host_(std::move(host)), which_(which) {}
+    void on_line(std::string_view) override {}
+    void on_overlong(std::string_view) override {}
+    void on_batch() override {}
+    void on_end() override {}
+    void on_room() override {}
+    void on_lost(boost::system::error_code) override {
+        if (const auto host = host_.lock()) {
+            host->connections().on_closed_gracefully(which_);
+        }
+    }
+
+  private:
+    std::weak_ptr<local_node> host_;
+    const link& which_; // owns this object
+};
+
+void connections::start() { admission_.emplace(host_.bounds()); }
+
+void connections::stop() {
+    for (const auto& [key, parting] : std::exchange(closing_links_, {})) {
+        parting->close();
+    }
+}
+
+void connections::close_gracefully(link_ptr parting) {
+    parting->flush();
+    if (parting->unsent() != 0 || closing_links_.size() >= max_closing_links(host_.bounds())) {
+        parting->close(); // do not wait for a peer that does not read
+        return;
+    }
+    closing_links_.emplace(parting.get(), parting);
+    parting->finish();
+}
+
+void connections::on_closed_gracefully(const link& parting) { closing_links_.erase(&parting); }
+
+void connections::on_accepted(link_ptr arrived, bool counted) {
+    if (host_.stopped()) {
+        arrived->close();
+        return;
+    }
+    if (counted && !has_room(*arrived)) {
+        reject(std::move(arrived));
+        return;
+    }
+    if (counted) {
+        ++host_.node().counts.links_accepted;
+    }
+    adopt(std::move(arrived), counted ? connection::origin::accepted : connection::origin::local);
+}
+
+bool connections::has_room(const link& arrived) {
+    const auto most = host_.bounds().links;
+    if (arrived.datagram() == 0) {
+        return admission_->make_room(address_of(arrived.peer()), host_.now());
+    }
+    if (sources_ >= most) {
+        drop_idle_sources();
+    }
+    return sources_ < most;
+}
+
+// All at once, so that many new sources do not cost a search each.
+void connections::drop_idle_sources() {
+    for (const auto& c : all()) {
+        if (c->is_source() && c->is_idle()) {
+            c->abandon("others needed the room");
+        }
+    }
+}
+
+void connections::reject(link_ptr arrived) {
+    ++host_.node().counts.links_refused;
+    if (arrived->datagram() != 0) { // the request to refuse follows, with the id for the reply
+        adopt(std::move(arrived), connection::origin::refused);
+        return;
+    }
+    protocol::append_failure(arrived->output(), core::link_limit_reached(host_.node()));
+    arrived->output().push_back('\n');
+    // The link is read until it closes: closing it with unread input would send a reset, which could discard the line.
+    arrived->start(std::make_shared<refused>(host_.weak_from_this(), *arrived));
+    close_gracefully(std::move(arrived));
+}
+
+std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin from) {
+    const bool counted = from == connection::origin::accepted;
+    const auto address = counted ? address_of(made->peer()) : std::string{};
+    auto c = std::make_shared<connection>(host_.shared_from_this(), std::move(made), from, ++last_number_);
+    open_.emplace(c->number(), c);
+    if (counted) {
+        if (c->datagram() != 0) {
+            ++sources_;
+        } else {
+            admission_->enter(*c, address);
+        }
+    }
+    ++host_.node().counts.links_open;
+    if (from == connection::origin::dialled && c->datagram() == 0) {
+        c->session().expect_refusal();
+    }
+    if (host_.closing()) {
+        refuse_new_requests(*c);
+    }
+    c->start();
+    return c;
+}
+
+void connections::refuse_new_requests() {
+    for (const auto& [key, c] : open_) {
+        refuse_new_requests(*c);
+    }
+}
+
+// This process's own handlers may still send requests: they need them to complete.
+void connections::refuse_new_requests(connection& c) {
+    if (c.from() != connection::origin::local) {
+        c.session().serving().refuse_new_requests();
+    }
+}
+
+bool connections::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
+    if (open_.erase(c.number()) == 0) {
+        return false;
+    }
+    if (c.from() == connection::origin::accepted) {
+        if (c.datagram() != 0) {
+            --sources_;
+        } else {
+            admission_->leave(c);
+        }
+    }
+    auto& counts = host_.node().counts;
+    --counts.links_open;
+    ++counts.links_lost;
+    counts.bytes_received += received;
+    counts.bytes_sent += sent;
+    return true;
+}
+
+bool connections::cancel(std::uint64_t id) {
+    for (const auto& [key, c] : open_) {
+        const auto held = c;
+        if (held->session().asking().cancel(id)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+std::vector<std::shared_ptr<connection>> connections::all() const {
+    std::vector<std::shared_ptr<connection>> result;
+    result.reserve(open_.size());
+    for (const auto& [key, c] : open_) {
+        result.push_back(c);
+    }
+    return result;
+}
+
+void listeners::start(acceptor& made, bool counted) {
+    made.start([weak = host_.weak_from_this(), counted](link_ptr arrived) {
+        if (const auto host = weak.lock()) {
+            host->connections().on_accepted(std::move(arrived), counted);
+        } else {
+            arrived->close();
+        }
+    });
+}
+
+std::string listeners::listen(std::string_view where, bool insecure) {
+    const auto address = parse_url(where);
+    auto& environment = host_.environment();
+    if (!environment.has_transport(address.scheme)) {
+        throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
+    }
+    if (!insecure && environment.is_exposed(address)) {
+        throw error(errc::insecure_listen, "'" + std::string{where} +
+                                               "' can be reached from other hosts, and nobody proves who they are; "
+                                               "say 'insecure' if that is meant");
+    }
+    std::unique_ptr<acceptor> made;
+    try {
+        made = environment.listen(address, host_.bounds());
+    } catch (const boost::system::system_error& e) {
+        throw error(e.code(), "cannot listen on '" + std::string{where} + "': " + e.code().message());
+    }
+    start(*made, true);
+    auto local = to_string(made->local());
+    open_.push_back(std::move(made));
+    return local;
+}
+
+std::string listeners::self_endpoint() const {
+    return "self/" + std::to_string(reinterpret_cast<std::uintptr_t>(&host_));
+}
+
+std::string listeners::shared_endpoint(std::string_view name) const {
+    return host_.environment().local_scope() + "/" + std::string{name};
+}
+
+void listeners::open_local_endpoints() {
+    for (const auto& endpoint : {self_endpoint(), shared_endpoint(host_.node().name)}) {
+        try {
+            auto made = host_.environment().listen({.scheme = "inproc", .host = endpoint, .port = 0, .path = {}},
+                                                   host_.bounds());
+            start(*made, false);
+            local_acceptors_.push_back(std::move(made));
+        } catch (const boost::system::system_error&) {
+            host_.write_log(log_level::warning,
+                            "another '" + host_.node().name + "' in this process is the one that others find here");
+        }
+    }
+}
+
+void listeners::close() {
+    open_.clear();
+    local_acceptors_.clear();
+}
+
+void listeners::reject() {
+    for (const auto& each : open_) {
+        each->accept_waiting();
+    }
+    std::erase_if(open_, [](const auto& each) { return each->local().scheme != "udp"; });
+}
+
+} // namespace cles::core

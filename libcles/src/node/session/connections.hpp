@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/line_link.hpp>
+
+#include "node/session/connection.hpp"
+#include "node/session/link_admission.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+class local_node;
+
+/// The endpoints at which a service accepts links.
+class listeners {
+  public:
+    explicit listeners(local_node& host) noexcept : host_(host) {}
+
+    /// Listens at a URL and returns the actual one, with its port. \throws cles::error
+    std::string listen(std::string_view where, bool insecure);
+    /// Opens the endpoints at which services of the same process and context, this one included, reach it without a
+    /// socket.
+    void open_local_endpoints();
+    void close();
+    /// Accepts no more streams from other processes. UDP stays open, so that its sources can be answered.
+    void reject();
+
+    /// The endpoint of this service only.
+    [[nodiscard]] std::string self_endpoint() const;
+    /// The endpoint at which services of this context look for a node of that name.
+    [[nodiscard]] std::string shared_endpoint(std::string_view name) const;
+
+  private:
+    void start(acceptor& made, bool counted);
+
+    local_node& host_;
+    std::vector<std::unique_ptr<acceptor>> open_;
+    std::vector<std::unique_ptr<acceptor>> local_acceptors_; // in-process
+};
+
+class local_node;
+
+/// All connections of a service: admits them within the limits, owns them, and closes them.
+///
+/// Sources of datagrams have their own limit: they can be forged, and must not use up the links'.
+class connections {
+  public:
+    explicit connections(local_node& host) noexcept : host_(host) {}
+    /// \pre the local node has its state
+    void start();
+
+    /// A new link. `counted`: it comes from another process and counts against the limit.
+    void on_accepted(link_ptr arrived, bool counted);
+    std::shared_ptr<connection> adopt(link_ptr made, connection::origin from);
+    /// From now on, requests of other processes are refused, on open and on future connections.
+    void refuse_new_requests();
+    /// Returns false if it does not own the connection (any more).
+    bool forget(connection& c, std::uint64_t received, std::uint64_t sent);
+    /// Cancels a request that waits for its reply. False if there is none with that id.
+    bool cancel(std::uint64_t id);
+    [[nodiscard]] std::vector<std::shared_ptr<connection>> all() const;
+    /// Finishes a link that is no longer needed, and keeps it until it has closed.
+    void close_gracefully(link_ptr parting);
+    void on_closed_gracefully(const link& parting);
+    /// Closes the links that are closing gracefully.
+    void stop();
+
+  private:
+    class refused;
+
+    [[nodiscard]] bool has_room(const link& arrived);
+    void reject(link_ptr arrived);
+    static void refuse_new_requests(connection& c);
+    void drop_idle_sources();
+
+    local_node& host_;
+    std::map<std::uint64_t, std::shared_ptr<connection>> open_; // by number, for a deterministic order
+    std::uint64_t last_number_ = 0;
+    std::map<const link*, link_ptr> closing_links_;
+    std::optional<core::link_admission> admission_;
+    std::size_t sources_ = 0;
+};
+
+} // namespace cles::core

@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/session/request_checks.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "protocol/grammar.hpp"
+
+#include <exception>
+#include <string>
+#include <utility>
+
+namespace cles::core {
+
+decoded_parameters decode(const protocol::noun_view& noun, std::string& storage) {
+    decoded_parameters result;
+    storage.clear();
+    storage.reserve(noun.path.size());
+    for (const auto raw : noun.parameters) {
+        if (raw.find('%') == std::string_view::npos) {
+            result.push_back(raw);
+            continue;
+        }
+        const auto start = storage.size();
+        protocol::decode_parameter(raw, storage);
+        result.push_back(std::string_view{storage}.substr(start));
+    }
+    return result;
+}
+
+void shrink_if_large(std::string& decoded) {
+    constexpr std::size_t kept = 4096;
+    if (decoded.capacity() > kept) {
+        std::string{}.swap(decoded);
+    }
+}
+
+bool is_in_via(std::string_view via, std::string_view name) {
+    while (!via.empty()) {
+        const auto comma = via.find(',');
+        if (via.substr(0, comma) == name) {
+            return true;
+        }
+        via.remove_prefix(comma == std::string_view::npos ? via.size() : comma + 1);
+    }
+    return false;
+}
+
+namespace {
+
+// Access rules that throw deny access.
+bool evaluate_access_rules(const node_state& n, const access& asked, std::uint64_t id) {
+    try {
+        return n.authorise(asked);
+    } catch (const std::exception& thrown) {
+        const auto why = std::string{"denied, since the access rules threw: "} + thrown.what();
+        n.write_log(log_level::error, {why, asked.peer.address, id});
+    } catch (...) {
+        n.write_log(log_level::error, {"denied, since the access rules threw", asked.peer.address, id});
+    }
+    return false;
+}
+
+} // namespace
+
+bool allows(const node_state& n, const identity& peer, const protocol::request_line& r) {
+    if (!n.authorise) {
+        return true;
+    }
+    std::string scratch;
+    const auto path = protocol::canonical_path(r.noun, scratch);
+    return evaluate_access_rules(n, {peer, r.verb, r.noun.task, path}, r.id);
+}
+
+bool is_local_target(const node_state& n, const protocol::request_line& r) {
+    return r.noun.target == "self" || r.noun.target == n.name;
+}
+
+std::optional<protocol::failure> refusal_reason(const node_state& n, const identity& peer,
+                                                const protocol::request_line& r) {
+    const auto object = [](errc code, std::string message) {
+        return protocol::failure{.code = code, .message = std::move(message)};
+    };
+    if (!allows(n, peer, r)) {
+        return object(errc::denied, n.name + " does not allow " + std::string{to_string(r.verb)} + " '" +
+                                        std::string{r.noun.task} + "'");
+    }
+    // A request for the reserved task other than PULL concerns the link it arrives on, such as an id to cancel.
+    const bool stays = n.active_router == nullptr || (r.noun.task == "cles" && r.verb != verb::pull);
+    if (stays && !is_local_target(n, r)) {
+        const auto target = protocol::quoted(r.noun.target);
+        if (n.active_router != nullptr) {
+            return object(errc::no_target, n.name + " forwards PULL of 'cles' only, and this is for " + target);
+        }
+        return object(errc::no_target,
+                      n.name + " does not route, and so asks nobody for " + target +
+                          (protocol::is_reserved_target(r.noun.target)
+                               ? ": give it cles::routing() as service_options::routing, or ask a node that routes, "
+                                 "as clesd does"
+                               : ": ask that node itself, or a node that routes, as clesd does"));
+    }
+    if (is_in_via(r.via, n.name)) {
+        return object(errc::no_target, n.name + " has forwarded this request for " + protocol::quoted(r.noun.target) +
+                                           " before: the nodes in 'via' pass it round");
+    }
+    std::string why;
+    if (!r.body.empty() && !is_valid_json(r.body, n.bounds.depth, &why)) {
+        return object(errc::bad_request, n.name + ": the body is not valid JSON: " + why);
+    }
+    if (r.verb == verb::update && protocol::begins_with_error(r.body)) {
+        return object(errc::bad_request, n.name + ": an update's first key cannot be 'error'");
+    }
+    return std::nullopt;
+}
+
+bool is_leave_notice(const protocol::request_line& r) noexcept {
+    return r.verb == verb::push && !r.wants_reply && r.noun.target == "self" && r.noun.path == "cles/leaving";
+}
+
+protocol::failure shutting_down(const node_state& n) {
+    return {.code = errc::busy, .message = n.name + " is shutting down", .retry_ms = 1000};
+}
+
+protocol::failure link_limit_reached(const node_state& n) {
+    return {.code = errc::busy, .message = n.name + " has as many links as it may", .retry_ms = 1000};
+}
+
+std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun) {
+    if (noun.task != "cles" || noun.parameters.size() != 2 || noun.parameters[0] != "cancel") {
+        return std::nullopt;
+    }
+    return protocol::number_between(noun.parameters[1], 1, protocol::max_id);
+}
+
+protocol::failure busy(std::string message) { return {.code = errc::busy, .message = std::move(message)}; }
+
+protocol::failure no_memory(const node_state& n) {
+    return busy(n.name + ": too much waits or runs for this link or all of them (limits.memory)");
+}
+
+protocol::failure no_such_task(const node_state& n, const protocol::request_line& r) {
+    return {.code = errc::no_task,
+            .message = n.name + " has no " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} + "'"};
+}
+
+protocol::failure overlong(const node_state& n, std::size_t datagram) {
+    if (datagram != 0) {
+        return {.code = errc::too_large,
+                .message = n.name + ": a datagram has at most " + std::to_string(datagram) + " bytes: use TCP"};
+    }
+    return {.code = errc::too_large,
+            .message = n.name + ": a line has at most " + std::to_string(n.bounds.line) + " bytes"};
+}
+
+std::optional<protocol::failure> no_room_to_run(const node_state& n) {
+    if (n.counts.handlers_running < n.bounds.running) {
+        return std::nullopt;
+    }
+    return busy(n.name + " runs as many handlers as it may");
+}
+
+protocol::failure after_run(protocol::failure why) {
+    why.ran = why.code == errc::too_large;
+    return why;
+}
+
+std::string failure_text(const protocol::failure& why) {
+    std::string text;
+    protocol::append_failure(text, why);
+    return text;
+}
+
+} // namespace cles::core

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+
+#include "node/node_state.hpp"
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <boost/container/static_vector.hpp>
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+/// The failures that refuse requests.
+
+namespace cles::core {
+
+protocol::failure busy(std::string message);
+/// The memory limit is reached, of the node or of this peer.
+protocol::failure no_memory(const node_state& n);
+protocol::failure no_such_task(const node_state& n, const protocol::request_line& request);
+/// A line over the limit. `datagram`: the maximum size of one, 0 for a stream.
+protocol::failure overlong(const node_state& n, std::size_t datagram);
+/// `busy` if the node runs as many handlers as it may, else nothing.
+std::optional<protocol::failure> no_room_to_run(const node_state& n);
+/// The failure once the handler has run: `too_large` says so, since repeating the request would repeat its effect.
+protocol::failure after_run(protocol::failure why);
+
+std::string failure_text(const protocol::failure& why);
+
+} // namespace cles::core
+
+/// The checks before a request is served.
+
+namespace cles::core {
+
+using decoded_parameters = boost::container::static_vector<std::string_view, protocol::max_parameters>;
+
+/// The decoded parameters: those with escapes are stored in `storage`, the others are views of the line.
+decoded_parameters decode(const protocol::noun_view& noun, std::string& storage);
+
+/// Releases the scratch space that a link reuses for each request's noun, if it has become unusually large.
+void shrink_if_large(std::string& decoded);
+
+/// Whether `name` is in the comma-separated list `via`.
+bool is_in_via(std::string_view via, std::string_view name);
+
+/// Whether the access rules allow the request.
+bool allows(const node_state& n, const identity& peer, const protocol::request_line& request);
+
+/// Whether the target is this node, by name or as `self`.
+bool is_local_target(const node_state& n, const protocol::request_line& request);
+
+/// Why a node does not serve a request, whatever its task: access, target or body. Nothing if it may.
+std::optional<protocol::failure> refusal_reason(const node_state& n, const identity& peer,
+                                                const protocol::request_line& request);
+
+/// Whether the peer announces that it leaves: what it has not answered by then, it has not started (docs/protocol.md,
+/// "Leaving").
+bool is_leave_notice(const protocol::request_line& request) noexcept;
+
+/// The reply of a node that shuts down to new requests.
+protocol::failure shutting_down(const node_state& n);
+
+/// The reply to a link beyond the limit.
+protocol::failure link_limit_reached(const node_state& n);
+
+/// The id in "cles/cancel/<id>"; nothing for other nouns or an invalid id.
+std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun);
+
+} // namespace cles::core

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/session/session.hpp"
+
+#include "node/session/request_checks.hpp"
+#include "protocol/line.hpp"
+#include "protocol/request_line.hpp"
+
+#include <algorithm>
+#include <string>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+// Whether any of its lines is HTTP: a request, or a similar message (such as UPnP), has several.
+bool is_web_datagram(std::string_view datagram) {
+    while (!datagram.empty()) {
+        const auto end = std::min(datagram.find('\n'), datagram.size());
+        if (protocol::is_http(protocol::trim(datagram.substr(0, end)))) {
+            return true;
+        }
+        datagram.remove_prefix(std::min(end + 1, datagram.size()));
+    }
+    return false;
+}
+
+} // namespace
+
+session::session(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer)
+    : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {}
+
+void session::on_line(std::string_view line, time_point now) {
+    line = protocol::trim(line);
+    if (line.empty() || closed_) {
+        return;
+    }
+    if (is_datagram() && protocol::has_many_lines(line)) {
+        if (!is_web_datagram(line)) {
+            refuse(line, "a datagram holds one line", now);
+        }
+        return;
+    }
+    if (refusal_ != refusal::ruled_out) {
+        note_refusal(line);
+    }
+    if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
+        on_update(found);
+        return;
+    }
+    if (protocol::is_reply(line)) {
+        on_reply(line);
+        return;
+    }
+    if (protocol::is_http(line)) {
+        if (is_datagram()) { // web pages cannot send datagrams
+            return;
+        }
+        node_->write_log(log_level::warning, {"a web client was turned away: " + peer_.address, peer_.address});
+        on_lost("the peer speaks HTTP");
+        out_.close();
+        return;
+    }
+    protocol::request_line request;
+    protocol::malformed_request malformed;
+    if (!protocol::parse_request(line, request, malformed)) {
+        inbound_.on_malformed(line, malformed, now);
+    } else if (request.is_update()) {
+        on_update(subscriptions_.find(line, request));
+    } else if (!is_datagram() && is_leave_notice(request)) {
+        on_leaving();
+    } else {
+        inbound_.on_request(line, request, now);
+    }
+}
+
+// A `busy` without id refuses the link if it is the only line that ever arrives.
+void session::note_refusal(std::string_view line) {
+    const bool first = refusal_ == refusal::possible;
+    refusal_ = refusal::ruled_out;
+    refusal_text_.clear();
+    protocol::failure why;
+    if (first && protocol::is_failure(line) && protocol::parse_failure(line, why) && why.code == errc::busy &&
+        !why.ran) {
+        refusal_ = refusal::received;
+        refusal_text_ = line;
+    }
+}
+
+void session::lose_requests(std::string_view why) {
+    if (refusal_ == refusal::received) {
+        outbound_.refuse(refusal_text_);
+    } else {
+        outbound_.lose(errc::unavailable, why);
+    }
+}
+
+void session::on_reply(std::string_view line) {
+    protocol::reply_line reply;
+    if (protocol::parse_reply(line, reply) && reply.id != 0) {
+        outbound_.on_reply(reply);
+    } else {
+        ++node_->counts.replies_dropped;
+    }
+}
+
+void session::on_update(const subscriptions::match& found) {
+    const auto& update = *found.update;
+    if (found.whose == nullptr || protocol::begins_with_error(update.body) || !subscriptions_.deliver(found)) {
+        ++node_->counts.updates_dropped;
+    } else {
+        ++node_->counts.updates_received;
+    }
+}
+
+void session::on_leaving() {
+    ++node_->counts.requests[static_cast<std::size_t>(verb::push)];
+    out_.retire();
+    outbound_.refuse(failure_text({.code = errc::busy,
+                                   .message = "the node at " + peer_.address + " is leaving, and has not begun this",
+                                   .retry_ms = 1000}));
+}
+
+void session::send_leave_notice() {
+    if (!is_datagram() && !std::exchange(closed_, true)) {
+        protocol::append_request(out_.output(),
+                                 {.verb = verb::push, .noun = "self:cles/leaving", .wants_reply = false});
+        out_.finish();
+    }
+}
+
+// The id for the reply is in the first line.
+void session::refuse(std::string_view text, const char* why, time_point now) {
+    if (protocol::is_reply(text)) {
+        ++node_->counts.replies_dropped;
+        return;
+    }
+    auto meant = protocol::salvage(protocol::trim(text.substr(0, text.find('\n'))));
+    meant.why = why;
+    inbound_.on_malformed(text, meant, now);
+}
+
+void session::reject(std::string_view line) {
+    line = protocol::trim(line);
+    const auto meant = protocol::salvage(line);
+    if (!line.empty() && !protocol::is_reply(line) && meant.wants_reply) {
+        auto& out = out_.output();
+        protocol::append_reply_head(out, meant.id);
+        protocol::append_failure(out, link_limit_reached(*node_));
+        out.push_back('\n');
+    }
+}
+
+void session::send_busy() {
+    auto& out = out_.output();
+    protocol::append_failure(out, link_limit_reached(*node_));
+    out.push_back('\n');
+}
+
+void session::on_overlong(std::string_view head, time_point now) {
+    refusal_ = refusal::ruled_out;
+    head = protocol::trim(head);
+    if (is_datagram() && is_web_datagram(head)) {
+        return;
+    }
+    if (!protocol::is_reply(head)) {
+        inbound_.on_overlong(head, now);
+        return;
+    }
+    if (is_datagram()) {
+        ++node_->counts.replies_dropped;
+        return;
+    }
+    protocol::reply_line reply;
+    protocol::parse_reply(head, reply);
+    if (reply.id != 0) {
+        outbound_.on_overlong(reply);
+    }
+    ++node_->counts.replies_dropped;
+    closed_ = true;
+    out_.finish();
+}
+
+// The line may be incomplete, so it is not run.
+void session::on_cut(std::string_view rest, time_point now) {
+    rest = protocol::trim(rest);
+    if (!rest.empty() && !closed_) {
+        refuse(rest, "the last line is not ended by LF", now);
+    }
+}
+
+void session::on_end(time_point now) {
+    inbound_.end(now);
+    lose_requests("the peer ended the link before it answered");
+}
+
+void session::on_lost(std::string_view why) {
+    closed_ = true;
+    inbound_.lose();
+    lose_requests(why);
+}
+
+} // namespace cles::core

@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/identity.hpp>
+
+#include "node/node_state.hpp"
+#include "node/publish/subscriptions.hpp"
+#include "node/session/inbound.hpp"
+#include "node/session/line_sink.hpp"
+#include "node/session/outbound.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+/// The protocol on one link, whatever its transport: requests and replies in both directions. Lines and time are the
+/// input; the output goes to the line sink.
+class session {
+  public:
+    session(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer);
+
+    void on_line(std::string_view line, time_point now);
+    void on_overlong(std::string_view head, time_point now);
+    /// The peer has ended in the middle of this line.
+    void on_cut(std::string_view rest, time_point now);
+    /// The peer sends no more.
+    void on_end(time_point now);
+    /// The link is gone; `why` is the reason.
+    void on_lost(std::string_view why);
+
+    /// Whether no state is kept for the peer, and no reply or update is expected from it.
+    [[nodiscard]] bool is_idle() const noexcept {
+        return inbound_.is_idle() && outbound_.in_flight() == 0 && subscriptions_.empty();
+    }
+    /// Sends the last line of this node, which leaves, and ends the link. Everything that it started for the peer has
+    /// been answered. Does nothing over datagrams.
+    void send_leave_notice();
+    /// Answers a line with `busy`, and does nothing else.
+    void reject(std::string_view line);
+    /// Sends a `busy` that answers no request: the node has no room for this link.
+    void send_busy();
+    [[nodiscard]] inbound& serving() noexcept { return inbound_; }
+    [[nodiscard]] outbound& asking() noexcept { return outbound_; }
+    [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }
+    /// This node opened the link: the peer may refuse it as a whole, with a `busy` that answers no request.
+    void expect_refusal() noexcept { refusal_ = refusal::possible; }
+
+  private:
+    [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
+    void refuse(std::string_view text, const char* why, time_point now);
+    void on_reply(std::string_view line);
+    void note_refusal(std::string_view line);
+    void lose_requests(std::string_view why);
+    void on_leaving();
+    void on_update(const subscriptions::match& found);
+
+    std::shared_ptr<node_state> node_;
+    line_sink& out_;
+    const identity& peer_;
+    inbound inbound_;
+    outbound outbound_;
+    subscriptions subscriptions_;
+    enum class refusal : std::uint8_t { ruled_out, possible, received } refusal_ = refusal::ruled_out;
+    std::string refusal_text_; // the line that refused the link
+    bool closed_ = false;
+};
+
+} // namespace cles::core

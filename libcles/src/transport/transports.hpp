@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include <memory>
+#include <string>
+
+namespace cles::transport {
+
+/// The maximum number of lines per turn of one link, so that a flooded one leaves others their turn.
+inline constexpr int lines_per_turn = 1024;
+
+/// `unix:///path` (a socket file, for its owner only; one on which nothing listens any more is replaced) and
+/// `unix://@name` (abstract). The kernel reports the peer's user id.
+std::unique_ptr<link_transport> make_unix();
+
+/// `udp://host:port`: requests, replies and updates as one datagram each.
+std::unique_ptr<link_transport> make_udp();
+
+/// `inproc://name`: services of one process, each on an executor of its own or all on one.
+std::unique_ptr<link_transport> make_inproc();
+
+/// Whether a service of this process listens at that name.
+bool is_open(const std::string& name);
+
+/// `tcp://host:port`. Nagle's algorithm is off, keep-alive on. A host name at which to listen is looked up by a call
+/// that may block.
+std::unique_ptr<link_transport> make_tcp();
+
+} // namespace cles::transport

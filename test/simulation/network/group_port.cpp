@@ -1,0 +1,164 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/network/group_port.hpp"
+
+#include "protocol/datagram.hpp"
+#include "simulation/world/group_watch.hpp"
+#include "simulation/world/node_run.hpp"
+
+#include <chrono>
+#include <utility>
+
+namespace cles::simulation {
+namespace {
+
+constexpr unsigned first_port = 40'000;
+constexpr unsigned room_in_system = 24;
+constexpr std::chrono::milliseconds until_room{1};
+
+bool is_announcement(std::string_view line) {
+    return line.starts_with("UPDATE ") && line.find(":cles ") != std::string_view::npos;
+}
+bool is_farewell(std::string_view line) {
+    return is_announcement(line) && line.find("\"leaving\":true") != std::string_view::npos;
+}
+
+core::group_source source_of(const endpoint& where) noexcept {
+    return {.address = address_of(where.host), .port = static_cast<std::uint16_t>(where.port)};
+}
+
+} // namespace
+
+// One run in two sends from where the one before it did.
+group_port::group_port(network& net, node_run& process)
+    : net_(net),
+      process_(std::static_pointer_cast<node_run>(process.shared_from_this())), local_{process.host(),
+                                                                                       first_port +
+                                                                                           process.run_number() / 2},
+      source_(source_of(local_)) {}
+
+void group_port::start(core::group_listener& owner) {
+    owner_ = &owner;
+    net_.join(shared_from_this());
+}
+
+void group_port::close() {
+    owner_ = nullptr;
+    waiting_.clear();
+    unsent_ = 0;
+}
+
+// -- sending ---------------------------------------------------------------------------------------------------------
+
+core::lines_done group_port::send(std::string_view lines) {
+    if (owner_ == nullptr) {
+        return {.bytes = lines.size()};
+    }
+    core::lines_done taken;
+    while (taken.bytes < lines.size()) {
+        const auto line = lines.substr(taken.bytes, lines.find('\n', taken.bytes) + 1 - taken.bytes);
+        if (!put(line)) {
+            break;
+        }
+        ++taken.lines;
+        taken.bytes += line.size();
+    }
+    return taken;
+}
+
+// What a planted fault loses.
+bool group_port::is_swallowed(std::string_view line) {
+    constexpr std::uint64_t enough = 10;
+    switch (net_.fault()) {
+    case planted::announcements_end:
+        return local_.host == 1 && is_announcement(line) && !is_farewell(line) && ++announcements_ > enough;
+    case planted::repeat_swallowed:
+        return line.starts_with("UPDATE ") && line.find(":beacon ") != std::string_view::npos;
+    case planted::lease_lapses:
+        return line.starts_with("BIND ") && !line.ends_with(":cles\n") && !bound_.emplace(line).second;
+    default: return false;
+    }
+}
+
+// False where as much waits as may.
+bool group_port::put(std::string_view line) {
+    if (silent_ || is_swallowed(line)) {
+        return true;
+    }
+    const auto process = process_.lock();
+    const bool twice =
+        net_.fault() == planted::group_sends_twice && line.starts_with("UPDATE ") && !is_announcement(line);
+    for (int times = twice ? 2 : 1; times != 0; --times) {
+        if (waiting_.empty() && in_system_ < room_in_system) {
+            pass_on(line);
+        } else if (unsent_ + line.size() > max_waiting) {
+            return false;
+        } else {
+            unsent_ += line.size();
+            waiting_.emplace_back(line);
+        }
+        if (process && process->judge() != nullptr) {
+            process->judge()->on_group_sent(*process, line);
+        }
+    }
+    return true;
+}
+
+void group_port::pass_on(std::string_view line) {
+    const auto process = process_.lock();
+    if (owner_ == nullptr || !process) {
+        return;
+    }
+    net_.watcher().saw(to_string(local_), "==>", line);
+    net_.multicast(local_, line);
+    if (in_system_++ == 0) {
+        process->later(until_room, [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->drain();
+            }
+        });
+    }
+}
+
+void group_port::drain() {
+    in_system_ = 0;
+    const bool waited = !waiting_.empty();
+    while (!waiting_.empty() && in_system_ < room_in_system) {
+        const auto line = std::move(waiting_.front());
+        waiting_.pop_front();
+        unsent_ -= line.size();
+        pass_on(line);
+    }
+    if (waited && waiting_.empty() && owner_ != nullptr) {
+        owner_->on_room();
+    }
+}
+
+// -- receiving -------------------------------------------------------------------------------------------------------
+
+void group_port::receive(const endpoint& from, const std::string& datagram) {
+    constexpr std::size_t most_unread = 256; // what the system keeps for a process that does not fetch it
+    if (const auto process = process_.lock(); process && process->waiting() < most_unread) {
+        process->run([weak = weak_from_this(), from, datagram] {
+            if (const auto self = weak.lock(); self && self->owner_ != nullptr) {
+                self->hand_over(from, datagram);
+            }
+        });
+    }
+}
+
+void group_port::hand_over(const endpoint& from, const std::string& datagram) {
+    const auto process = process_.lock();
+    const auto sender = source_of(from);
+    net_.watcher().saw(process->name(), "<==", datagram);
+    if (process->judge() != nullptr) {
+        process->judge()->on_group_heard(*process, sender, datagram);
+    }
+    if (net_.fault() == planted::farewell_unheard && is_farewell(datagram)) {
+        return;
+    }
+    protocol::request_line read;
+    const bool good = protocol::parse_group_message(datagram, read);
+    owner_->on_datagram({sender, datagram, good ? &read : nullptr});
+}
+
+} // namespace cles::simulation

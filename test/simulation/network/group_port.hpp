@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "port/group_port.hpp"
+#include "simulation/network/network.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <set>
+#include <string>
+#include <string_view>
+
+namespace cles::simulation {
+
+class node_run;
+
+/// A node's place in the simulated multicast group. The system takes a number of datagrams at once; the rest waits.
+class group_port final : public core::group_port, public std::enable_shared_from_this<group_port> {
+  public:
+    group_port(network& net, node_run& process);
+
+    void start(core::group_listener& owner) override;
+    core::lines_done send(std::string_view lines) override;
+    [[nodiscard]] std::size_t unsent() const noexcept override { return unsent_; }
+    void close() override;
+    [[nodiscard]] const core::group_source& source() const noexcept override { return source_; }
+
+    [[nodiscard]] const endpoint& local() const noexcept { return local_; }
+    /// A datagram has arrived at the host.
+    void receive(const endpoint& from, const std::string& datagram);
+    /// Loses all that is sent from now on.
+    void fall_silent() noexcept { silent_ = true; }
+
+    static constexpr std::size_t max_waiting = 1U << 16U;
+
+  private:
+    [[nodiscard]] bool is_swallowed(std::string_view line);
+    [[nodiscard]] bool put(std::string_view line);
+    void pass_on(std::string_view line);
+    void drain();
+    void hand_over(const endpoint& from, const std::string& datagram);
+
+    network& net_;
+    std::weak_ptr<node_run> process_;
+    endpoint local_;
+    core::group_source source_;
+    core::group_listener* owner_ = nullptr; // null: not started, or closed
+    std::deque<std::string> waiting_;
+    std::size_t unsent_ = 0;
+    unsigned in_system_ = 0;
+    bool silent_ = false;
+    std::uint64_t announcements_ = 0;          // for planted faults
+    std::set<std::string, std::less<>> bound_; // likewise
+};
+
+} // namespace cles::simulation

@@ -1,0 +1,235 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/network/network.hpp"
+
+#include <cles/error.hpp>
+
+#include "port/group_source.hpp"
+#include "protocol/datagram.hpp"
+#include "simulation/network/datagram_port.hpp"
+#include "simulation/network/group_port.hpp"
+#include "simulation/network/stream_half.hpp"
+
+#include <algorithm>
+
+namespace cles::simulation {
+namespace {
+
+constexpr std::chrono::microseconds much_later{400'000};
+constexpr unsigned group_lane = 1U << 16U; // so that what the group carries changes nothing of what else is carried
+
+} // namespace
+
+std::string to_string(const endpoint& where) {
+    return to_text(
+        core::group_source{.address = address_of(where.host), .port = static_cast<std::uint16_t>(where.port)});
+}
+
+std::string url_of(unsigned host, carrier by) {
+    return by == carrier::datagram ? "udp://" + to_string(endpoint{host, datagram_door})
+                                   : "tcp://" + to_string(endpoint{host, stream_door});
+}
+
+endpoint endpoint_of(const url& where) {
+    const auto read = core::parse_group_source(where.host + ":" + std::to_string(where.port)).value();
+    return {read.address - address_of(0), read.port};
+}
+
+// -- the weather ---------------------------------------------------------------------------------------------------
+
+void network::part(unsigned a, unsigned b, time_point until) {
+    mute(a, b, until);
+    mute(b, a, until);
+}
+
+void network::mute(unsigned from, unsigned to, time_point until) {
+    auto& held = parted_[{from, to}];
+    held = std::max(held, until);
+    disturbed_ = std::max(disturbed_, until);
+}
+
+void network::calm() {
+    weather_ = {};
+    stormy_ = false;
+    disturbed_ = time_.now();
+    if (fault_ != planted::partition_stays) {
+        parted_.clear();
+    } else if (!parted_.empty()) {
+        const auto [a, b] = parted_.begin()->first;
+        part(a, b, time_point::max());
+    }
+}
+
+bool network::reaches(unsigned from, unsigned to) const {
+    const auto held = parted_.find({from, to});
+    return held == parted_.end() || held->second <= time_.now();
+}
+
+dice& network::chance_between(unsigned from, unsigned to) {
+    return chances_.try_emplace({from, to}, seed_ ^ (std::uint64_t{from} << 32U | to)).first->second;
+}
+
+time_point network::arrival(unsigned from, unsigned to) {
+    auto& chance = chance_between(from, to);
+    const auto way = weather_.least + chance.within(weather_.spread);
+    const auto held = parted_.find({from, to});
+    auto leaves = time_.now();
+    if (held != parted_.end() && held->second > leaves) {
+        if (held->second == time_point::max()) {
+            return held->second;
+        }
+        leaves = held->second + chance.within(std::chrono::milliseconds{300}); // sent again then
+    } else if (chance.chance(weather_.lost)) {
+        leaves += std::chrono::milliseconds{200}; // likewise
+    }
+    return leaves + way;
+}
+
+unsigned network::free_port(unsigned host) {
+    for (unsigned port = 1000;; ++port) { // those of a run that is over are given again
+        const auto held = ports_.find({host, port});
+        if (held == ports_.end() || held->second.expired()) {
+            return port;
+        }
+    }
+}
+
+void network::close_doors(unsigned host) {
+    doors_.erase({host, stream_door});
+    std::erase_if(ports_, [host](const auto& each) { return each.first.host == host; });
+}
+
+// -- streams -------------------------------------------------------------------------------------------------------
+
+void network::listen(endpoint where, const std::shared_ptr<place>& at, const limits& bounds, on_link arrived) {
+    doors_.insert_or_assign(where, door{at, bounds, std::move(arrived)});
+}
+
+void network::dial(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, on_dialled done) {
+    if (!reaches(from->host(), to.host)) {
+        from->later(bounds.connect, [done = std::move(done)] { done(make_error_code(errc::unavailable), nullptr); });
+        return;
+    }
+    const auto there = arrival(from->host(), to.host);
+    time_.at(there, [this, weak = std::weak_ptr{from}, to, bounds, done = std::move(done)] {
+        if (const auto self = weak.lock()) {
+            join(self, to, bounds, done);
+        }
+    });
+}
+
+void network::join(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, const on_dialled& done) {
+    const auto back = arrival(to.host, from->host());
+    const auto found = doors_.find(to);
+    const auto at = found == doors_.end() ? nullptr : found->second.at.lock();
+    if (!at) {
+        from->at_true(back, [done] { done(make_error_code(errc::unavailable), nullptr); });
+        return;
+    }
+    const auto [near, far] = stream_half::make(*this, from, bounds, at, found->second.bounds);
+    std::erase_if(streams_, [](const auto& each) { return each.first.expired(); });
+    streams_.push_back({near, {from->host(), to.host}});
+    at->run([arrived = found->second.arrived, far = far] { arrived(far); });
+    const auto too_late = time_.now() + bounds.connect;
+    from->at_true(std::min(back, too_late), [done, near = near, too_late, back] {
+        if (!near->is_open() || back > too_late) {
+            near->close();
+            done(make_error_code(errc::unavailable), nullptr);
+        } else {
+            done({}, near);
+        }
+    });
+}
+
+void network::cut(unsigned host, unsigned which) {
+    disturbed_ = std::max(disturbed_, time_.now());
+    std::vector<std::shared_ptr<stream_half>> its;
+    for (const auto& [weak, hosts] : streams_) {
+        if (const auto half = weak.lock(); half && (hosts.first == host || hosts.second == host)) {
+            its.push_back(half);
+        }
+    }
+    if (!its.empty()) {
+        its[which % its.size()]->cut();
+    }
+}
+
+// -- datagrams -----------------------------------------------------------------------------------------------------
+
+void network::send(const endpoint& from, const endpoint& to, std::string_view datagram) {
+    inspect(from, datagram);
+    carry(from.host, to.host, chance_between(from.host, to.host), datagram,
+          [&](const std::string& bytes, std::chrono::microseconds after, bool copy) {
+              auto source = from;
+              if (copy && fault_ == planted::source_swapped) {
+                  source.port += 500;
+              }
+              deliver(source, to, bytes, after);
+          });
+}
+
+void network::join(const std::shared_ptr<group_port>& port) {
+    std::erase_if(group_, [](const auto& each) { return each.expired(); });
+    group_.push_back(port);
+}
+
+void network::multicast(const endpoint& from, std::string_view datagram) {
+    inspect(from, datagram);
+    for (const auto& weak : group_) {
+        const auto port = weak.lock();
+        if (!port) {
+            continue;
+        }
+        const auto to = port->local().host;
+        carry(from.host, to, chance_between(from.host + group_lane, to), datagram,
+              [&](const std::string& bytes, std::chrono::microseconds after, bool) {
+                  time_.at(time_.now() + after, [weak, from, bytes] {
+                      if (const auto there = weak.lock()) {
+                          there->receive(from, bytes);
+                      }
+                  });
+              });
+    }
+}
+
+void network::inspect(const endpoint& from, std::string_view datagram) {
+    ++datagrams_;
+    if (datagram.size() > protocol::datagram_bytes || !datagram.ends_with('\n') ||
+        protocol::has_many_lines(datagram.substr(0, datagram.size() - 1))) {
+        watcher_.broken(rule::well_formed, "a datagram of " + std::to_string(datagram.size()) + " bytes from " +
+                                               to_string(from) + ": " + std::string{datagram.substr(0, 80)});
+    }
+}
+
+void network::carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver) {
+    if (!reaches(from, to) || chance.chance(weather_.lost)) {
+        watcher_.saw("net", "loses", datagram);
+        return;
+    }
+    std::string bytes{datagram};
+    if (chance.chance(200)) { // its LF is optional
+        bytes.pop_back();
+    }
+    const auto way = [&] {
+        auto span = weather_.least + chance.within(weather_.spread);
+        if (chance.chance(weather_.late)) {
+            span += chance.within(much_later);
+        }
+        return span;
+    };
+    deliver(bytes, way(), false);
+    if (chance.chance(weather_.doubled)) {
+        deliver(bytes, way(), true);
+    }
+}
+
+void network::deliver(const endpoint& from, const endpoint& to, const std::string& datagram,
+                      std::chrono::microseconds after) {
+    time_.at(time_.now() + after, [this, from, to, datagram] {
+        const auto found = ports_.find(to);
+        if (const auto port = found == ports_.end() ? nullptr : found->second.lock()) {
+            port->receive(from, datagram);
+        }
+    });
+}
+
+} // namespace cles::simulation

@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/line_link.hpp>
+#include <cles/url.hpp>
+
+#include "simulation/network/agenda.hpp"
+#include "simulation/network/dice.hpp"
+#include "simulation/network/place.hpp"
+#include "simulation/network/planted.hpp"
+#include "simulation/network/tampering.hpp"
+#include "simulation/world/witness.hpp"
+
+#include <chrono>
+#include <compare>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace cles::simulation {
+
+class stream_half;
+class datagram_port;
+class group_port;
+
+/// An address and port.
+struct endpoint {
+    unsigned host = 0;
+    unsigned port = 0;
+
+    auto operator<=>(const endpoint&) const = default;
+};
+std::string to_string(const endpoint& where);
+
+/// A host's IPv4 address.
+constexpr std::uint32_t address_of(unsigned host) noexcept { return 0x0A000001U + host; }
+
+inline constexpr unsigned stream_door = 1;   ///< where nodes listen
+inline constexpr unsigned datagram_door = 2; ///< likewise
+
+/// How a request travels.
+enum class carrier : std::uint8_t {
+    stream,
+    datagram,
+    urgent, ///< by a stream of its own
+    name,   ///< wherever the node of that name announces itself
+};
+/// Where the node of a host listens.
+std::string url_of(unsigned host, carrier by);
+endpoint endpoint_of(const url& where);
+
+/// What the network does to what crosses it. Of a thousand datagrams so many.
+struct weather {
+    unsigned lost = 0;
+    unsigned doubled = 0;
+    unsigned late = 0; ///< much later than others, and so overtaken
+    std::chrono::microseconds least{100};
+    std::chrono::microseconds spread{200};
+};
+
+/// The network between the hosts: carries streams and datagrams, each in its own way, and is cut and mended.
+class network {
+  public:
+    network(agenda& time, witness& watcher, std::uint64_t seed, planted fault)
+        : tampered(fault), time_(time), watcher_(watcher), seed_(seed), fault_(fault) {}
+    network(const network&) = delete;
+    network& operator=(const network&) = delete;
+
+    void set(const weather& now) noexcept {
+        weather_ = now;
+        stormy_ = true;
+    }
+    /// Two hosts do not reach each other: datagrams are lost, streams wait.
+    void part(unsigned a, unsigned b, time_point until);
+    /// Nothing that one sends reaches the other one, which is heard well.
+    void mute(unsigned from, unsigned to, time_point until);
+    /// Nothing is in the way any more.
+    void calm();
+    [[nodiscard]] bool reaches(unsigned from, unsigned to) const;
+    /// Whether everybody has reached everybody in good time since then.
+    [[nodiscard]] bool undisturbed_since(time_point when) const noexcept { return !stormy_ && disturbed_ <= when; }
+    /// When bytes of a stream that leave now are there, if nothing went before them.
+    time_point arrival(unsigned from, unsigned to);
+    /// Each direction has a chance of its own, so that less of what happens is changed by what else happens.
+    [[nodiscard]] dice& chance_between(unsigned from, unsigned to);
+    [[nodiscard]] planted fault() const noexcept { return fault_; }
+    [[nodiscard]] witness& watcher() noexcept { return watcher_; }
+    [[nodiscard]] agenda& time() noexcept { return time_; }
+    /// A port of the host that nobody has.
+    unsigned free_port(unsigned host);
+
+    using on_link = std::function<void(link_ptr)>;
+    using on_dialled = std::function<void(boost::system::error_code, std::shared_ptr<stream_half>)>;
+    void listen(endpoint where, const std::shared_ptr<place>& at, const limits& bounds, on_link arrived);
+    /// Nobody listens there any more.
+    void shut(endpoint where) { doors_.erase(where); }
+    /// `done` is called at the place that dials, later.
+    void dial(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, on_dialled done);
+    /// Resets one of the streams of a host, if it has one.
+    void cut(unsigned host, unsigned which);
+
+    void open(const endpoint& where, const std::shared_ptr<datagram_port>& port) { ports_[where] = port; }
+    void send(const endpoint& from, const endpoint& to, std::string_view datagram);
+    void join(const std::shared_ptr<group_port>& port);
+    /// To all who have joined; each copy has a fate of its own.
+    void multicast(const endpoint& from, std::string_view datagram);
+    /// Nobody listens at the host any more.
+    void close_doors(unsigned host);
+
+    /// What has crossed, for those who want to know how much was simulated.
+    [[nodiscard]] std::uint64_t datagrams() const noexcept { return datagrams_; }
+    std::uint64_t stream_bytes = 0;
+    tampering tampered; ///< what a planted fault does to streams
+
+  private:
+    struct door {
+        std::weak_ptr<place> at;
+        limits bounds;
+        on_link arrived;
+    };
+
+    using delivery = std::function<void(const std::string& datagram, std::chrono::microseconds after, bool copy)>;
+    void inspect(const endpoint& from, std::string_view datagram);
+    void carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver);
+    void deliver(const endpoint& from, const endpoint& to, const std::string& datagram,
+                 std::chrono::microseconds after);
+    void join(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, const on_dialled& done);
+
+    agenda& time_;
+    witness& watcher_;
+    std::uint64_t seed_;
+    std::map<std::pair<unsigned, unsigned>, dice> chances_;
+    planted fault_;
+    weather weather_;
+    bool stormy_ = false;
+    std::map<std::pair<unsigned, unsigned>, time_point> parted_; // from and to
+    time_point disturbed_{};                                     // until when, the last time
+    std::map<endpoint, door> doors_;
+    std::map<endpoint, std::weak_ptr<datagram_port>> ports_;
+    std::vector<std::weak_ptr<group_port>> group_;
+    std::vector<std::pair<std::weak_ptr<stream_half>, std::pair<unsigned, unsigned>>> streams_;
+    std::uint64_t datagrams_ = 0;
+};
+
+} // namespace cles::simulation

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "port/environment.hpp"
+#include "simulation/network/dice.hpp"
+#include "simulation/network/network.hpp"
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::simulation {
+
+class group_port;
+class node_run;
+class stream_half;
+
+/// The environment of one simulated node: virtual time, the simulated network, and chance from a seed.
+///
+/// It ends with the process. From then on nothing is sent, received or run, and no timer goes off.
+class virtual_environment final : public core::environment {
+  public:
+    /// `strangers`: sources of datagrams are not on this host, so what is sent to them is limited.
+    virtual_environment(network& net, node_run& process, std::uint64_t seed, bool strangers)
+        : net_(net), process_(&process), chance_(seed), strangers_(strangers) {}
+
+    [[nodiscard]] time_point now() const override;
+    std::uint32_t random() override { return static_cast<std::uint32_t>(chance_.next()); }
+    void post(std::shared_ptr<core::task> next) override;
+
+    void start_timer(std::function<void()> due) override { on_due_ = std::move(due); }
+    void set_timer(time_point due) override;
+    void stop_timer() override { on_due_ = nullptr; }
+
+    [[nodiscard]] bool has_transport(std::string_view scheme) const override;
+    [[nodiscard]] bool is_exposed(const url&) const override { return true; }
+    std::unique_ptr<acceptor> listen(const url& where, const limits& bounds) override;
+    std::function<void()> dial(const url& where, const limits& bounds, dial_callback done) override;
+
+    [[nodiscard]] std::string local_scope() const override { return "simulation"; }
+    [[nodiscard]] bool is_open(const std::string&) const override { return false; }
+
+    std::vector<core::network_interface> interfaces() override { return {find_interface("net0")}; }
+    core::network_interface find_interface(const std::string& name) override;
+    std::shared_ptr<core::group_port> join(const core::network_interface& by, const multicast_options& where) override;
+
+    // For the simulation.
+    /// The process is gone: the system closes what was open, and peers notice nothing else.
+    void end();
+    [[nodiscard]] bool has_ended() const noexcept { return process_ == nullptr; }
+    /// Drops the tasks that did not run before `end`, and all that follow.
+    void discard_tasks();
+    /// The clock has jumped: a timer that is due by now goes off.
+    void on_jump() { arm_timer(); }
+    /// The most bytes that a link which others opened holds for its peer.
+    [[nodiscard]] std::size_t most_held() const;
+    /// Null where the node takes no part in multicast.
+    [[nodiscard]] group_port* group() const noexcept { return group_.get(); }
+
+  private:
+    class local_acceptor;
+    class stream_acceptor;
+    class datagram_acceptor;
+
+    void run_next();
+    void arm_timer();
+    void on_timer();
+    void accepted(const std::function<void(link_ptr)>& on_link, const link_ptr& made);
+    void remember(const link_ptr& made);
+
+    network& net_;
+    node_run* process_; // null: it has ended
+    dice chance_;
+    bool strangers_;
+    std::deque<std::shared_ptr<core::task>> tasks_;
+    bool discards_ = false;
+    std::function<void()> on_due_;
+    std::optional<time_point> due_;
+    std::uint64_t timer_ = 0;         // the one that counts
+    std::optional<time_point> shown_; // the time as a planted fault shows it
+    std::vector<std::weak_ptr<link>> links_;
+    std::vector<std::weak_ptr<stream_half>> streams_in_; // that others opened
+    std::shared_ptr<group_port> group_;
+};
+
+} // namespace cles::simulation

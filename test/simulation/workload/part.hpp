@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "node/membership/membership.hpp"
+#include "port/group_source.hpp"
+#include "simulation/world/plan.hpp"
+
+#include <string_view>
+
+namespace cles::simulation {
+
+class node_run;
+
+/// A part of what the simulated world does: one kind of life in it, with what has to hold of it. To simulate more, add
+/// a deed (plan.hpp), have the planner think of it (make_plan.cpp), and a part that does it and judges what comes of it
+/// (world.cpp lists them).
+class part {
+  public:
+    part() = default;
+    part(const part&) = delete;
+    part& operator=(const part&) = delete;
+    virtual ~part() = default;
+
+    /// Does it, where it is one of its own.
+    virtual void perform(const action& what) = 0;
+    /// A node has begun: what it offers.
+    virtual void on_start(node_run&) {}
+    /// A node is about to leave in order.
+    virtual void on_leaving(node_run&) {}
+    /// A node is about to be gone with all that it held.
+    virtual void on_crash(node_run&) {}
+    /// What happens in the multicast group (group_watch.hpp).
+    virtual void on_group_heard(node_run&, const core::group_source&, std::string_view) {}
+    virtual void on_group_sent(node_run&, std::string_view) {}
+    virtual void on_neighbour(node_run&, std::string_view, core::membership::change) {}
+    /// The trouble is over, just now.
+    virtual void on_calm() {}
+    /// The trouble is over, and was for a while: tries what has to work again; later it is judged whether it did.
+    virtual void probe() {}
+    virtual void judge_probe() {}
+    /// All that goes on by itself ends.
+    virtual void wind_down() {}
+    /// All has been quiet for long.
+    virtual void judge_rest() {}
+};
+
+} // namespace cles::simulation

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/workload/talker.hpp"
+
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+#include "simulation/workload/asking.hpp"
+#include "simulation/world/world.hpp"
+
+#include <utility>
+
+namespace cles::simulation {
+
+using std::chrono::milliseconds;
+
+talker::talker(network& net, unsigned host, dice style, manner how, const limits& bounds)
+    : place(net.time(), host, "c" + std::to_string(host)), net_(net), style_(style), how_(how), bounds_(bounds),
+      is_greedy_(style_.chance(250)) {}
+
+void talker::start() {
+    const auto self = shared_from_this();
+    net_.dial(self, {how_.to, stream_door}, bounds_,
+              [this](boost::system::error_code code, std::shared_ptr<stream_half> made) {
+                  if (code) {
+                      over_ = true;
+                      return;
+                  }
+                  link_ = std::move(made);
+                  link_->start(std::static_pointer_cast<talker>(shared_from_this()));
+                  if (how_.slow.count() != 0) {
+                      link_->pause(true);
+                      later(how_.slow, [this] { link_->pause(false); });
+                  }
+                  say_next();
+              });
+}
+
+// -- saying --------------------------------------------------------------------------------------------------------
+
+void talker::say(const std::string& line, kind what, std::string noun) {
+    expected_.push_back({what, how_.first_op + said_, std::move(noun)});
+    link_->output().append(line);
+}
+
+void talker::say_next() {
+    if (over_) {
+        return;
+    }
+    if (said_ == how_.lines) {
+        end_talk();
+        return;
+    }
+    ++said_;
+    const auto op = std::to_string(how_.first_op + said_);
+    const auto node = world::name_of(how_.to);
+    if (is_greedy_) {
+        constexpr unsigned long_answer = 1500;
+        say("PULL " + node + ":echo/" + op + "/" + std::to_string(long_answer + style_.below(300)) + "\n",
+            kind::result);
+    } else {
+        say_any(op, node);
+    }
+    if (how_.gap.count() == 0 && said_ < how_.lines) {
+        say_next();
+        return;
+    }
+    link_->flush();
+    later(how_.gap, [this] { say_next(); });
+}
+
+void talker::say_any(const std::string& op, const std::string& node) {
+    switch (style_.below(12)) {
+    case 0: say("PUSH " + node + ":store/" + op + "\n", kind::result); break;
+    case 1:
+        say("DELEGATE " + node + ":work/" + op + "/" + std::to_string(style_.below(100)) + " deadline=2000\n",
+            kind::result);
+        break;
+    case 2: say("DELEGATE " + node + ":work/" + op + "/10/0/1 deadline=2000\n", kind::failure); break;
+    case 3: say("DELEGATE self:work/" + op + "/10/0/2 deadline=150\n", kind::result); break;
+    case 4: say("PULL " + node + "\n", kind::malformed); break;
+    case 5: say("PULL " + node + ":unknown." + op + "\n", kind::unknown); break;
+    case 6: say("PUSH " + node + ":keep/" + op + "/5 {\"op\":" + op + "}\r\n", kind::result); break;
+    case 7:
+        if (how_.end != ending::half_closes) { // what is bound would keep the link open
+            const auto noun = "fix/" + std::to_string(style_.below(3));
+            say("BIND " + node + ":" + noun + "\n", kind::bound, noun);
+            break;
+        }
+        [[fallthrough]];
+    default:
+        say("PULL " + node + ":echo/" + op + "/" + std::to_string(style_.chance(200) ? style_.below(1800) : 0) + "\n",
+            kind::result);
+    }
+}
+
+void talker::end_talk() {
+    if (how_.end == ending::half_closes) {
+        if (style_.chance(300)) { // in the middle of a line
+            ++said_;
+            say("PULL self:echo/1", kind::malformed);
+        }
+        link_->half_close();
+    } else if (how_.end == ending::leaves) {
+        over_ = true;
+        link_->close();
+    }
+}
+
+// -- hearing -------------------------------------------------------------------------------------------------------
+
+void talker::on_line(std::string_view line) {
+    // The node looks whether this is still there, or is about to leave.
+    if (line.empty() || line.starts_with("PUSH self:cles/leaving")) {
+        return;
+    }
+    if (!protocol::is_reply(line)) {
+        on_update(line);
+        return;
+    }
+    if (line.starts_with("{\"error\":\"busy\"") && line.find("many links") != std::string_view::npos) {
+        excused_ = true;
+        return;
+    }
+    if (expected_.empty()) {
+        complain(rule::reply_order, "an answer that was not asked for: " + std::string{line});
+        return;
+    }
+    const auto next = std::move(expected_.front());
+    expected_.pop_front();
+    on_answer(next, line);
+}
+
+void talker::on_answer(const expected& e, std::string_view line) {
+    const auto unlike = [&] {
+        complain(rule::reply_order, "to request " + std::to_string(e.op) + " came " + std::string{line.substr(0, 120)});
+    };
+    if (!protocol::is_failure(line)) {
+        if (e.what == kind::bound) {
+            bound_.try_emplace(e.noun, 0);
+            if (line.find("\"op\":") != std::string_view::npos) {
+                unlike();
+            }
+        } else if (e.what != kind::result || !speaks_of(line, e.op)) {
+            unlike();
+        }
+        return;
+    }
+    protocol::failure why;
+    protocol::parse_failure(line, why);
+    const bool any_time = why.code == errc::busy || why.code == errc::deadline || why.code == errc::too_large;
+    const bool fits = e.what == kind::malformed ? why.code == errc::bad_request
+                      : e.what == kind::unknown
+                          ? why.code == errc::no_task && why.message.find(std::to_string(e.op)) != std::string::npos
+                      : e.what == kind::failure
+                          ? why.code == errc::failed && why.message.find(std::to_string(e.op)) != std::string::npos
+                          : false;
+    if (!fits && !(any_time && e.what != kind::malformed)) {
+        unlike();
+    }
+}
+
+void talker::on_update(std::string_view line) {
+    protocol::request_line update;
+    protocol::malformed_request why;
+    if (!protocol::parse_request(line, update, why) || !update.is_update()) {
+        complain(rule::well_formed, "what came is no update: " + std::string{line});
+        return;
+    }
+    const auto bound = bound_.find(std::string{update.noun.path});
+    if (bound == bound_.end()) {
+        complain(rule::update_order, "an update came before it was bound: " + std::string{line});
+    } else if (*update.seq <= bound->second) {
+        complain(rule::update_order, "an update came after a later one: " + std::string{line});
+    } else {
+        bound->second = *update.seq;
+    }
+}
+
+void talker::on_overlong(std::string_view head) {
+    complain(rule::well_formed, "a line is too long: " + std::string{head.substr(0, 80)});
+}
+
+void talker::on_end() {
+    // Whoever was asked without ids answers all before it ends.
+    if (!expected_.empty() && !excused_ && !link_->was_cut()) {
+        complain(rule::reply_order, std::to_string(expected_.size()) + " requests were not answered before the end");
+    }
+    over_ = true;
+    link_->close();
+}
+
+void talker::on_lost(boost::system::error_code) {
+    over_ = true;
+    excused_ = excused_ || link_->was_cut();
+    if (!expected_.empty() && !excused_) {
+        complain(rule::reply_order, std::to_string(expected_.size()) + " requests were not answered before the loss");
+    }
+}
+
+void talker::judge_and_leave() {
+    if (link_ == nullptr) {
+        return;
+    }
+    if (!over_ && !expected_.empty() && !excused_) {
+        complain(rule::ends_in_time, std::to_string(expected_.size()) + " requests have not been answered");
+    }
+    if (!over_ && how_.end == ending::half_closes && !excused_) {
+        complain(rule::ends_in_time, "the node has not ended the link");
+    }
+    over_ = true;
+    link_->close();
+}
+
+} // namespace cles::simulation

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/world/node_run.hpp"
+
+#include "simulation/network/group_port.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+namespace cles::simulation {
+namespace {
+
+std::string_view name_of(core::membership::change what) noexcept {
+    constexpr std::array<std::string_view, 8> names{"finds",        "finds elsewhere", "hears nothing of",
+                                                    "hears again",  "sees leaving",    "gives up",
+                                                    "hears two of", "gives way to"};
+    return names[static_cast<std::size_t>(what)];
+}
+
+} // namespace
+
+node_run::node_run(network& net, unsigned host, unsigned run, std::string name, options how)
+    : place(net.time(), host, std::move(name)), net_(net), run_(run), judge_(how.judge),
+      environment_(std::make_shared<virtual_environment>(net, *this, how.seed, how.strangers)),
+      local_(std::make_shared<core::local_node>(
+          environment_,
+          core::local_node_options{.node = {.name = this->name(), .bounds = how.bounds, .load = std::move(how.load)},
+                                   .insecure = true,
+                                   .multicast = {.interface = how.multicast ? "net0" : ""},
+                                   .routing = how.routing})),
+      told_(local_->discovery().membership_watcher()) {
+    local_->node().peers.watch(this);
+}
+
+node_run::~node_run() { crash(); }
+
+void node_run::start() {
+    run([this] { local_->start({url_of(host(), carrier::stream), url_of(host(), carrier::datagram)}); });
+}
+
+void node_run::stop() {
+    watcher().saw(name(), "stops");
+    run([this] { local_->stop(); });
+}
+
+// What the node does when its process is gone is seen by nobody; it lets go of what it holds.
+void node_run::crash() {
+    if (environment_->has_ended()) {
+        return;
+    }
+    watcher().saw(name(), "crashes");
+    environment_->end();
+    local_->stop();
+    environment_->discard_tasks();
+}
+
+void node_run::fall_silent() {
+    group()->fall_silent();
+    local_->discovery().leave();
+}
+
+std::uint64_t node_run::ask(unsigned to, carrier by, const request_order& what, detail::pending_ptr operation,
+                            core::outbound::progress_function progress) {
+    return local_->send(what.verb, what.noun, what.body,
+                        call_options{}
+                            .deadline(what.deadline)
+                            .at(by == carrier::name ? "" : url_of(to, by))
+                            .urgent(by == carrier::urgent)
+                            .on_progress(std::move(progress)),
+                        std::move(operation));
+}
+
+void node_run::on_peer(std::string_view node, core::membership::change what, std::string_view where) {
+    watcher().saw(name(), name_of(what), node);
+    if (judge_ != nullptr && (what != core::membership::change::clash || fault() != planted::clash_kept)) {
+        judge_->on_neighbour(*this, node, what);
+    }
+    told_.on_peer(node, what, where);
+}
+
+// -- judging ---------------------------------------------------------------------------------------------------------
+
+void node_run::check_bounds() {
+    const auto& b = bounds();
+    auto& n = *node();
+    constexpr std::size_t largest_datagram = 1500;
+    if (n.remembered.used > b.remembered + b.running * largest_datagram) {
+        complain(rule::bounded, "remembers " + std::to_string(n.remembered.used) + " bytes of datagrams");
+    }
+    if (n.counts.handlers_running > b.running) {
+        complain(rule::bounded, "runs " + std::to_string(n.counts.handlers_running) + " handlers");
+    }
+    if (n.peers.size() > b.peers || n.counts.group_leases > b.group_leases) {
+        complain(rule::bounded, "knows " + std::to_string(n.peers.size()) + " nodes and holds " +
+                                    std::to_string(n.counts.group_leases) + " leases of the group");
+    }
+    if (group() != nullptr && group()->unsent() > group_port::max_waiting) {
+        complain(rule::bounded, "holds " + std::to_string(group()->unsent()) + " bytes for the group");
+    }
+    // What may be unread, what one turn answers beyond it, what runs, and updates, which come in pieces. What the node
+    // asks by itself nobody bounds.
+    constexpr std::size_t piece = 65536;
+    constexpr std::size_t lines_per_write = 32;
+    const auto longest = std::min<std::size_t>(b.line, 4096);
+    const auto most_unsent = b.unread + (lines_per_write + b.in_flight) * longest + 2 * piece;
+    if (const auto held = environment_->most_held(); held > most_unsent) {
+        complain(rule::bounded, "holds " + std::to_string(held) + " bytes for a link");
+    }
+    for (const auto& c : local_->connections().all()) {
+        const auto& serving = c->session().serving();
+        if (serving.bindings() > b.bindings) {
+            complain(rule::bounded, "holds " + std::to_string(serving.bindings()) + " bindings");
+        }
+        if (serving.in_flight() > b.in_flight + b.waiting / 2) {
+            complain(rule::bounded, "has " + std::to_string(serving.in_flight()) + " in flight");
+        }
+    }
+}
+
+void node_run::check_rest() {
+    const auto expect_none = [&](std::size_t count, const char* what) {
+        if (count != 0) {
+            complain(rule::at_rest, std::to_string(count) + " " + what);
+        }
+    };
+    auto& n = *node();
+    expect_none(n.deadlines.size(), "deadlines");
+    expect_none(n.remembered.used, "bytes remembered");
+    expect_none(n.kept_requests->used(), "bytes of requests that wait for a link");
+    expect_none(n.counts.handlers_running, "handlers that run");
+    expect_none(n.peers.size(), "nodes that are known though all are silent");
+    expect_none(n.counts.group_leases, "leases of the group");
+    expect_none(group() != nullptr ? group()->unsent() : 0, "bytes that wait for the group");
+    for (const auto& c : local_->connections().all()) {
+        expect_none(c->is_source() ? 1 : 0, "source that is kept");
+        expect_none(c->session().serving().in_flight(), "requests in flight");
+        expect_none(c->session().serving().bindings(), "bindings");
+        expect_none(c->session().asking().in_flight(), "requests that wait for an answer");
+        expect_none(c->is_idle() ? 0 : 1, "link that is not at rest");
+    }
+    expect_none(n.published.take_waiters().size(), "publications that wait");
+}
+
+} // namespace cles::simulation

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/pending.hpp>
+#include <cles/verb.hpp>
+
+#include "node/local_node.hpp"
+#include "node/membership/membership.hpp"
+#include "node/session/outbound.hpp"
+#include "simulation/network/network.hpp"
+#include "simulation/network/place.hpp"
+#include "simulation/network/virtual_environment.hpp"
+#include "simulation/world/group_watch.hpp"
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::simulation {
+
+/// A request as a simulated program sends it.
+struct request_order {
+    cles::verb verb = verb::pull;
+    std::string_view noun;
+    std::string_view body{};
+    std::chrono::milliseconds deadline{0};
+};
+
+/// One run of a node, from its start to its end or crash: the library's node in an environment of virtual time.
+class node_run final : public place, private core::membership::watcher {
+  public:
+    struct options {
+        std::uint64_t seed = 0; ///< of its own chance
+        limits bounds{};
+        bool strangers = false;       ///< sources of datagrams are sent little
+        bool multicast = false;       ///< it takes part in the group
+        group_watch* judge = nullptr; ///< of what it makes of the group; null: nobody
+        std::function<node_load()> load{};
+        const detail::routing_part* routing = nullptr;
+    };
+
+    node_run(network& net, unsigned host, unsigned run, std::string name, options how);
+    ~node_run() override;
+
+    /// Listens, and joins the group. To be called once, when it is owned.
+    void start();
+    /// Ends it as `service::stop` does; `crash` is to follow.
+    void stop();
+    /// Ends the process at once: the system closes what was open.
+    void crash();
+
+    [[nodiscard]] core::node_state* node() noexcept { return &local_->node(); }
+    [[nodiscard]] core::local_node& local() noexcept { return *local_; }
+    [[nodiscard]] const std::shared_ptr<core::local_node>& shared_local() const noexcept { return local_; }
+    [[nodiscard]] const limits& bounds() const noexcept { return local_->bounds(); }
+    [[nodiscard]] network& net() noexcept { return net_; }
+    [[nodiscard]] witness& watcher() noexcept { return net_.watcher(); }
+    [[nodiscard]] planted fault() const noexcept { return net_.fault(); }
+    [[nodiscard]] group_watch* judge() const noexcept { return judge_; }
+    /// Which run of its host it is, from 1.
+    [[nodiscard]] unsigned run_number() const noexcept { return run_; }
+    /// Null where it takes no part in multicast.
+    [[nodiscard]] group_port* group() const noexcept { return environment_->group(); }
+    /// Announces itself no more, and says no farewell that anybody hears.
+    void fall_silent();
+
+    /// Asks the node of a host, wherever the name in the noun leads.
+    std::uint64_t ask(unsigned to, carrier by, const request_order& what, detail::pending_ptr operation,
+                      core::outbound::progress_function progress = {});
+    void cancel(std::uint64_t id) { local_->cancel(id); }
+
+    /// Looks whether its memory is within its limits.
+    void check_bounds();
+    /// Looks whether nothing is kept, when all has been quiet for long.
+    void check_rest();
+
+  private:
+    void after_jump() override { environment_->on_jump(); }
+    void on_peer(std::string_view node, core::membership::change what, std::string_view where) override;
+    void complain(rule which, const std::string& what) { watcher().broken(which, name() + ": " + what); }
+
+    network& net_;
+    unsigned run_;
+    group_watch* judge_;
+    std::shared_ptr<virtual_environment> environment_;
+    std::shared_ptr<core::local_node> local_;
+    core::membership::watcher& told_; // the node's own
+};
+
+} // namespace cles::simulation

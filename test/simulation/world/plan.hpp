@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::simulation {
+
+/// What can happen. Parts of the simulation carry it out (part.hpp).
+enum class deed : std::uint8_t {
+    ask,
+    cancel,
+    follow,
+    hold,
+    leave,
+    publish,
+    offer,
+    talk,
+    crash,
+    freeze,
+    part,
+    cut,
+    weather,
+    gather,
+    namesake,
+    depart,
+    mute,
+    jump,
+    retire,
+};
+
+/// The numbers that a deed has, by name.
+std::span<const std::string_view> fields_of(deed what) noexcept;
+std::string_view to_string(deed what) noexcept;
+
+/// Something that happens at a time, from the outside: a program asks for it, or trouble comes.
+struct action {
+    static constexpr std::size_t most_fields = 10;
+
+    std::uint32_t at_ms = 0;
+    deed what = deed::ask;
+    std::array<std::uint32_t, most_fields> numbers{};
+
+    [[nodiscard]] std::uint32_t operator[](std::string_view field) const;
+    bool operator==(const action&) const = default;
+};
+
+/// All that a simulation needs to know: what happens from the outside, and the seed of the network's chance. Two runs
+/// of a plan are the same to the last byte.
+struct plan {
+    std::uint64_t seed = 1;
+    unsigned hosts = 3;
+    bool small_limits = true; ///< so that they are reached
+    bool strangers = false;   ///< sources of datagrams are sent little
+    bool group = false;       ///< nodes take part in multicast
+    std::vector<action> actions{};
+
+    bool operator==(const plan&) const = default;
+};
+
+/// A plan as a text that people read and files keep; one action a line.
+std::string to_text(const plan& p);
+/// \throws std::runtime_error naming the line that is none
+plan plan_from(std::string_view text);
+
+/// Makes the plan of a seed, with so many actions.
+plan make_plan(std::uint64_t seed, unsigned actions);
+
+} // namespace cles::simulation

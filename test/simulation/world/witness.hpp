@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "simulation/network/agenda.hpp"
+#include "simulation/world/rule.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::simulation {
+
+/// A rule that was broken.
+struct violation {
+    rule broken;
+    std::string what;
+};
+
+/// Sees all that happens: keeps its hash, tells it to who wants to read it, and writes down what must not be.
+class witness {
+  public:
+    using reader = std::function<void(const std::string&)>;
+
+    explicit witness(const agenda& time) : time_(time) {}
+
+    void read_by(reader who) { reader_ = std::move(who); }
+    /// Something happened, which belongs to the trace.
+    void saw(std::string_view who, std::string_view what, std::string_view text = {}) {
+        mix(static_cast<std::uint64_t>(time_.now().time_since_epoch().count()));
+        mix(who);
+        mix(what);
+        mix(text);
+        if (reader_) {
+            tell(who, what, text);
+        }
+    }
+    void broken(rule which, std::string what) {
+        saw("!", to_string(which), what);
+        constexpr std::size_t enough = 64;
+        if (violations_.size() < enough) {
+            violations_.push_back({which, std::move(what)});
+        }
+    }
+
+    [[nodiscard]] std::uint64_t hash() const noexcept { return hash_; }
+    [[nodiscard]] const std::vector<violation>& violations() const noexcept { return violations_; }
+
+  private:
+    void mix(std::uint64_t value) noexcept {
+        hash_ = (hash_ ^ value) * 0x100000001b3U; // FNV-1a, eight bytes at once
+        hash_ ^= hash_ >> 29U;
+    }
+    void mix(std::string_view text) noexcept {
+        mix(text.size());
+        while (!text.empty()) {
+            std::uint64_t eight = 0;
+            const auto size = std::min<std::size_t>(8, text.size());
+            for (std::size_t i = 0; i < size; ++i) {
+                eight |= std::uint64_t{static_cast<unsigned char>(text[i])} << (8U * i);
+            }
+            mix(eight);
+            text.remove_prefix(size);
+        }
+    }
+    void tell(std::string_view who, std::string_view what, std::string_view text) const {
+        const auto us = std::chrono::duration_cast<std::chrono::microseconds>(time_.now().time_since_epoch()).count() -
+                        3'600'000'000;
+        auto at = std::to_string(us % 1'000'000);
+        at.insert(0, 6 - at.size(), '0');
+        std::string line = std::to_string(us / 1'000'000) + "." + at + " ";
+        line.append(who).append(" ").append(what);
+        if (!text.empty()) {
+            line.append(" ").append(text.substr(0, text.find_last_not_of('\n') + 1));
+        }
+        reader_(line);
+    }
+
+    const agenda& time_;
+    std::uint64_t hash_ = 0xcbf29ce484222325U;
+    std::vector<violation> violations_;
+    reader reader_;
+};
+
+} // namespace cles::simulation

@@ -1,0 +1,297 @@
+// SPDX-License-Identifier: BSL-1.0
+#include <cles/convert.hpp>
+
+#include "support/converted.hpp"
+
+#include <boost/describe.hpp>
+#include <boost/test/unit_test.hpp>
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <random>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace convert_types {
+
+enum class gear { park, drive, reverse };
+BOOST_DESCRIBE_ENUM(gear, park, drive, reverse)
+
+struct point {
+    double lat = 0;
+    double lon = 0;
+};
+BOOST_DESCRIBE_STRUCT(point, (), (lat, lon))
+
+struct plan {
+    std::string name;
+    std::vector<point> route;
+    std::optional<std::uint8_t> lanes;
+    gear first = gear::park;
+    std::map<std::string, std::int32_t> limits;
+};
+BOOST_DESCRIBE_STRUCT(plan, (), (name, route, lanes, first, limits))
+
+struct stamped {
+    std::int64_t utc = 0;
+};
+BOOST_DESCRIBE_STRUCT(stamped, (), (utc))
+
+struct stamped_point : stamped, point {
+    bool good = false;
+};
+BOOST_DESCRIBE_STRUCT(stamped_point, (stamped, point), (good))
+
+struct nothing {};
+BOOST_DESCRIBE_STRUCT(nothing, (), ())
+
+struct celsius {
+    double degrees = 0;
+};
+
+} // namespace convert_types
+
+template <>
+struct cles::converter<convert_types::celsius> {
+    static void write(json_writer& w, const convert_types::celsius& value) { w.value(value.degrees); }
+    static bool read(json_reader& r, convert_types::celsius& value) { return r.read(value.degrees); }
+};
+
+namespace convert {
+namespace {
+
+using namespace convert_types;
+using cles::from_json;
+using cles::to_json;
+using cles::test::round_trip;
+using cles::test::why;
+
+} // namespace
+} // namespace convert
+
+BOOST_AUTO_TEST_SUITE(convert)
+
+BOOST_AUTO_TEST_SUITE(scalars)
+
+BOOST_AUTO_TEST_CASE(scalars_are_written_and_read) {
+    BOOST_TEST(to_json(true) == "true");
+    BOOST_TEST(to_json(-5) == "-5");
+    BOOST_TEST(to_json(45.1) == "45.1");
+    BOOST_TEST(to_json(std::string{"a\"b"}) == "\"a\\\"b\"");
+    BOOST_TEST(to_json("literal") == "\"literal\"");
+    BOOST_TEST(to_json(std::string_view{"view"}) == "\"view\"");
+    BOOST_TEST(from_json<bool>(" true ") == true);
+    BOOST_TEST(from_json<int>("-5") == -5);
+    BOOST_TEST(from_json<double>("45.1") == 45.1);
+    BOOST_TEST(from_json<std::string>("\"a\\\"b\"") == "a\"b");
+}
+
+BOOST_AUTO_TEST_CASE(an_integer_that_does_not_fit_its_type_is_an_error) {
+    BOOST_TEST(from_json<std::uint8_t>("255") == 255);
+    BOOST_TEST(why<std::uint8_t>("256") == "an integer out of range");
+    BOOST_TEST(why<std::uint8_t>("-1").starts_with("an integer out of range"));
+    BOOST_TEST(from_json<std::int8_t>("-128") == -128);
+    BOOST_TEST(why<std::int8_t>("-129") == "an integer out of range");
+    BOOST_TEST(why<std::int32_t>("2147483648") == "an integer out of range");
+    BOOST_TEST(why<int>("1.0") == "expected an integer");
+    BOOST_TEST(why<int>("1e2") == "expected an integer");
+}
+
+BOOST_AUTO_TEST_CASE(a_double_reads_any_number_and_round_trips_exactly) {
+    BOOST_TEST(from_json<double>("7") == 7.0);
+    std::mt19937_64 random{61};
+    for (int i = 0; i < 100'000; ++i) {
+        const auto d = std::bit_cast<double>(random());
+        if (std::isfinite(d)) {
+            BOOST_REQUIRE(std::bit_cast<std::uint64_t>(round_trip(d)) == std::bit_cast<std::uint64_t>(d));
+        }
+        const auto f = std::bit_cast<float>(static_cast<std::uint32_t>(random()));
+        if (std::isfinite(f)) {
+            BOOST_REQUIRE(std::bit_cast<std::uint32_t>(round_trip(f)) == std::bit_cast<std::uint32_t>(f));
+        }
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_number_that_is_not_finite_becomes_null_and_reads_as_nan) {
+    BOOST_TEST(to_json(std::numeric_limits<double>::infinity()) == "null");
+    BOOST_TEST(std::isnan(from_json<double>("null")));
+}
+
+BOOST_AUTO_TEST_CASE(a_value_of_another_kind_is_an_error) {
+    BOOST_TEST(why<bool>("1") == "expected true or false, got a number");
+    BOOST_TEST(why<int>("\"5\"") == "expected a number, got a string");
+    BOOST_TEST(why<double>("[]") == "expected a number, got an array");
+    BOOST_TEST(why<std::string>("5") == "expected a string, got a number");
+    BOOST_TEST(why<int>("null") == "expected a number, got null");
+    BOOST_TEST(why<int>("5 x") == "more text after the value");
+    BOOST_TEST(why<int>("") == "expected a number, but the text ends");
+}
+
+BOOST_AUTO_TEST_CASE(an_enum_is_written_as_its_names) {
+    BOOST_TEST(to_json(gear::drive) == "\"drive\"");
+    BOOST_CHECK(from_json<gear>("\"reverse\"") == gear::reverse);
+    BOOST_TEST(why<gear>("\"fly\"") == "expected one of park, drive, reverse");
+    BOOST_TEST(why<gear>("1") == "expected a string, got a number");
+    BOOST_TEST(to_json(static_cast<gear>(17)) == "17"); // a value without a name
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE(containers)
+
+BOOST_AUTO_TEST_CASE(vectors_and_arrays_are_arrays) {
+    BOOST_TEST(to_json(std::vector<int>{}) == "[]");
+    BOOST_TEST(to_json(std::vector<std::vector<int>>{{1, 2}, {}}) == "[[1,2],[]]");
+    BOOST_TEST(to_json(std::vector<bool>{true, false}) == "[true,false]");
+    BOOST_TEST(to_json(std::array<int, 3>{1, 2, 3}) == "[1,2,3]");
+    BOOST_TEST(from_json<std::vector<int>>("[1, 2]") == (std::vector<int>{1, 2}), boost::test_tools::per_element());
+    BOOST_TEST((from_json<std::vector<bool>>("[true,false]") == std::vector<bool>{true, false}));
+    BOOST_TEST((from_json<std::array<int, 2>>("[1,2]") == std::array<int, 2>{1, 2}));
+}
+
+BOOST_AUTO_TEST_CASE(reading_a_vector_replaces_what_was_there) {
+    std::vector<int> values{7, 8, 9};
+    BOOST_TEST(from_json("[1]", values));
+    BOOST_TEST(values == std::vector<int>{1}, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(an_array_has_its_size) {
+    BOOST_TEST((why<std::array<int, 2>>("[1]") == "fewer than 2 elements"));
+    BOOST_TEST((why<std::array<int, 2>>("[1,2,3]") == "more than 2 elements"));
+}
+
+BOOST_AUTO_TEST_CASE(a_map_is_an_object) {
+    using map = std::map<std::string, std::vector<int>>;
+    BOOST_TEST(to_json(map{{"b", {1}}, {"a\"", {}}}) == "{\"a\\\"\":[],\"b\":[1]}");
+    const map expected{{"a", {1}}, {"b", {}}};
+    BOOST_TEST((from_json<map>("{\"b\":[],\"a\":[1]}") == expected));
+    BOOST_TEST((why<map>("{\"a\":[1,\"x\"]}") == "a[1]: expected a number, got a string"));
+    BOOST_TEST((why<map>("[]") == "expected an object, got an array"));
+}
+
+BOOST_AUTO_TEST_CASE(an_optional_is_its_value_or_null) {
+    BOOST_TEST(to_json(std::optional<int>{5}) == "5");
+    BOOST_TEST(to_json(std::optional<int>{}) == "null");
+    BOOST_TEST(from_json<std::optional<int>>("5").value() == 5);
+    BOOST_TEST(!from_json<std::optional<int>>("null").has_value());
+    std::optional<int> full{7};
+    BOOST_TEST(from_json("null", full));
+    BOOST_TEST(!full.has_value());
+    BOOST_TEST(why<std::optional<int>>("\"x\"") == "expected a number, got a string");
+}
+
+BOOST_AUTO_TEST_CASE(json_text_is_copied_without_white_space) {
+    BOOST_TEST(to_json(cles::json_text{}) == "{}");
+    BOOST_TEST(to_json(cles::json_text{" { \"a b\" : 1 } "}) == "{\"a b\":1}");
+    BOOST_TEST(from_json<cles::json_text>(" [1, 2] ").text == "[1, 2]");
+    BOOST_TEST(!from_json<std::vector<cles::json_text>>("[{\"a\":1},5]").empty());
+    BOOST_CHECK_THROW(to_json(cles::json_text{"{\"a\":"}), cles::error);
+    BOOST_CHECK_THROW(to_json(cles::json_text{""}), cles::error);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE(structs)
+
+BOOST_AUTO_TEST_CASE(a_described_struct_is_an_object_of_its_members_in_their_order) {
+    BOOST_TEST(to_json(point{45.1, -7.5}) == "{\"lat\":45.1,\"lon\":-7.5}");
+    const auto p = from_json<point>("{\"lat\":45.1,\"lon\":-7.5}");
+    BOOST_TEST(p.lat == 45.1);
+    BOOST_TEST(p.lon == -7.5);
+    BOOST_TEST(to_json(nothing{}) == "{}");
+    from_json<nothing>("{\"a\":1}");
+}
+
+BOOST_AUTO_TEST_CASE(members_may_come_in_any_order_and_with_white_space_and_escapes) {
+    for (const std::string_view text :
+         {"{\"lon\":2,\"lat\":1}", " { \"lat\" : 1 , \"lon\" : 2 } ", "{\"l\\u0061t\":1,\"lon\":2}",
+          "{\"lat\":1, \"lon\":2}", "{\"lon\":2 ,\"lat\":1}", "{\"lat\":1,\"x\":[{}],\"lon\":2}"}) {
+        const auto p = from_json<point>(text);
+        BOOST_TEST(p.lat == 1.0, text);
+        BOOST_TEST(p.lon == 2.0, text);
+    }
+}
+
+BOOST_AUTO_TEST_CASE(unknown_members_are_ignored) {
+    const auto p = from_json<point>("{\"alt\":{\"x\":[1,2,\"}\"]},\"lat\":1,\"lat_\":9,\"lon\":2,\"z\":null}");
+    BOOST_TEST(p.lat == 1.0);
+    BOOST_TEST(p.lon == 2.0);
+    BOOST_TEST(why<point>("{\"lat\":1,\"lon\":2,\"z\":}") == "expected a value, got something that is not JSON");
+}
+
+BOOST_AUTO_TEST_CASE(of_duplicate_members_the_last_counts) {
+    BOOST_TEST(from_json<point>("{\"lat\":1,\"lon\":2,\"lat\":3}").lat == 3.0);
+}
+
+BOOST_AUTO_TEST_CASE(a_missing_member_is_an_error_that_names_it_unless_it_is_optional) {
+    BOOST_TEST(why<point>("{\"lat\":1}") == "lon: is missing");
+    BOOST_TEST(why<point>("{}") == "lat: is missing");
+    const std::string rest = "\"name\":\"x\",\"route\":[],\"first\":\"park\",\"limits\":{}";
+    BOOST_TEST(!from_json<plan>("{" + rest + "}").lanes.has_value());
+    BOOST_TEST(!from_json<plan>("{" + rest + ",\"lanes\":null}").lanes.has_value());
+    BOOST_TEST(int{from_json<plan>("{" + rest + ",\"lanes\":3}").lanes.value()} == 3);
+}
+
+BOOST_AUTO_TEST_CASE(an_empty_optional_member_is_not_written) {
+    BOOST_TEST(to_json(plan{"x", {{1, 2}}, {}, gear::drive, {{"a", 1}}}) ==
+               "{\"name\":\"x\",\"route\":[{\"lat\":1,\"lon\":2}],\"first\":\"drive\",\"limits\":{\"a\":1}}");
+    BOOST_TEST(to_json(plan{"x", {}, 3, gear::park, {}}) ==
+               "{\"name\":\"x\",\"route\":[],\"lanes\":3,\"first\":\"park\",\"limits\":{}}");
+}
+
+BOOST_AUTO_TEST_CASE(an_error_names_the_path_to_what_does_not_fit) {
+    const auto with = [](std::string_view route) {
+        return "{\"name\":\"x\",\"route\":" + std::string{route} +
+               ",\"first\":\"park\",\"limits\":{\"a\":1,\"b\":2.5}}";
+    };
+    BOOST_TEST(why<plan>(with("[{\"lat\":1,\"lon\":2},{\"lat\":\"x\",\"lon\":2}]")) ==
+               "route[1].lat: expected a number, got a string");
+    BOOST_TEST(why<plan>(with("[{\"lat\":1}]")) == "route[0].lon: is missing");
+    BOOST_TEST(why<plan>(with("5")) == "route: expected an array, got a number");
+    BOOST_TEST(why<plan>(with("[]")) == "limits.b: expected an integer");
+    BOOST_TEST(why<point>("[]") == "expected an object, got an array");
+    BOOST_TEST((why<std::vector<std::vector<int>>>("[[1],[2,null]]") == "[1][1]: expected a number, got null"));
+}
+
+BOOST_AUTO_TEST_CASE(described_bases_belong_to_the_struct) {
+    stamped_point p;
+    p.utc = 17;
+    p.lat = 1.5;
+    p.good = true;
+    const auto text = to_json(p);
+    for (const std::string_view part : {"\"utc\":17", "\"lat\":1.5", "\"lon\":0", "\"good\":true"}) {
+        BOOST_TEST(text.find(part) != std::string::npos, text);
+    }
+    const auto back = from_json<stamped_point>(text);
+    BOOST_TEST(back.utc == 17);
+    BOOST_TEST(back.lat == 1.5);
+    BOOST_TEST(back.good);
+    BOOST_TEST(why<stamped_point>("{\"lat\":1,\"lon\":2,\"good\":true}") == "utc: is missing");
+}
+
+BOOST_AUTO_TEST_CASE(a_user_type_is_supported_by_a_specialisation) {
+    BOOST_TEST(to_json(std::vector<celsius>{{21.5}, {22}}) == "[21.5,22]");
+    BOOST_TEST(from_json<std::vector<celsius>>("[21.5]").at(0).degrees == 21.5);
+}
+
+BOOST_AUTO_TEST_CASE(the_whole_text_must_be_read) {
+    BOOST_TEST(why<point>("{\"lat\":1,\"lon\":2} x") == "more text after the value");
+    BOOST_CHECK_EXCEPTION(from_json<point>("{}"), cles::error, [](const cles::error& e) {
+        return e.code() == cles::errc::conversion && e.message().starts_with("lat: is missing");
+    });
+}
+
+BOOST_AUTO_TEST_CASE(depth_is_limited_while_reading) {
+    const auto deep = std::string(33, '[') + std::string(33, ']');
+    BOOST_TEST(why<cles::json_text>(deep) == "deeper than 32 brackets");
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE_END()
