@@ -54,8 +54,12 @@ class Shell:
         return line
 
     def list(self, typed):
-        """What TAB, and TAB again, shows below the line."""
-        self.send(typed + "\t\t")
+        """What TAB, and TAB again, shows below the line.
+
+        A node announces itself at most every 100 ms, and TAB waits for less. So of two in a row that the shell handles at
+        once only one may find the node, and bash shows the list for none but the second: a third finds it then.
+        """
+        self.send(typed + "\t\t\t")
         self.send(SHOW)
         end = time.monotonic() + PATIENCE
         while not SHOWN.search(self.seen) and time.monotonic() < end:
