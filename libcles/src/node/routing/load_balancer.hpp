@@ -1,17 +1,35 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "node/base/backoff.hpp"
 #include "node/node_state.hpp"
-#include "node/routing/power_of_two_choices.hpp"
 #include "node/routing/service_registry.hpp"
 #include "protocol/request_line.hpp"
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace cles::core {
+
+/// Whether one more piece of work is probably done sooner by `a` than by `b`.
+[[nodiscard]] bool is_better(const candidate& a, const candidate& b) noexcept;
+
+/// Selects the node for a piece of work: draws two at random and takes the better one. This keeps the longest queue
+/// short although loads are outdated; if all took the best one, they would overload the same node (Mitzenmacher, The
+/// Power of Two Choices in Randomized Load Balancing, 2001).
+class power_of_two_choices {
+  public:
+    explicit power_of_two_choices(std::uint32_t seed) noexcept : draws_(seed) {}
+
+    /// Null if there are none.
+    [[nodiscard]] candidate* select(std::span<candidate* const> all) noexcept;
+
+  private:
+    jitter draws_;
+};
 
 /// Selects the node that serves a request for `any`. This node counts too.
 class load_balancer {

@@ -1,14 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/limits.hpp>
+#include <cles/peer.hpp>
+#include <cles/verb.hpp>
+
 #include "node/base/deadlines.hpp"
 #include "node/base/string_map.hpp"
 #include "node/node_state.hpp"
 #include "node/routing/next_hop.hpp"
-#include "node/routing/power_of_two_choices.hpp"
 #include "node/routing/query_scheduler.hpp"
 #include "node/routing/subrequest.hpp"
-#include "node/routing/task_list.hpp"
 
 #include <array>
 #include <chrono>
@@ -25,6 +27,51 @@
 #include <vector>
 
 namespace cles::core {
+
+inline constexpr std::size_t max_tasks_of_a_node = 4096;
+
+/// The tasks of a node, as it reports them.
+struct task_list {
+    struct entry {
+        cles::verb verb = verb::pull;
+        std::string task;
+        bool idempotent = false;
+    };
+    std::vector<entry> entries;
+
+    [[nodiscard]] const entry* find(cles::verb verb, std::string_view task) const noexcept;
+};
+
+/// Reads the reply to `PULL self:cles`. Nothing if it is malformed, or of another node.
+std::optional<task_list> read_task_list(std::string_view description, std::string_view node);
+
+/// A node that can be given work.
+struct candidate {
+    node_load load;                    ///< as last reported
+    std::uint32_t given = 0;           ///< this node's requests in progress there
+    std::uint32_t given_at_report = 0; ///< of these, in progress when the load was reported
+    time_point avoid_until{};          ///< it was busy or unreachable, and is not asked before
+
+    /// The estimated work it has now.
+    [[nodiscard]] std::uint64_t estimated_work() const noexcept {
+        const auto known = std::uint64_t{load.queued} + load.running + given;
+        return known > given_at_report ? known - given_at_report : 0;
+    }
+    /// Whether more work would probably start at once.
+    [[nodiscard]] bool is_free() const noexcept {
+        return load.workers == 0 ? !is_saturated() : estimated_work() < load.workers;
+    }
+    /// Whether all its workers are occupied and not likely to finish soon. If all are stuck, it reports no workers.
+    [[nodiscard]] bool is_saturated() const noexcept {
+        constexpr std::uint32_t long_us = 100'000;
+        return load.running != 0 && load.running >= load.workers && load.service_us >= long_us;
+    }
+    /// Applies a reported load.
+    void update_load(const node_load& now) noexcept {
+        load = now;
+        given_at_report = given;
+    }
+};
 
 /// Another node and its tasks.
 struct known_node : candidate, query_target {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/routing/power_of_two_choices.hpp"
+#include "node/routing/load_balancer.hpp"
 
 #include <boost/test/unit_test.hpp>
 

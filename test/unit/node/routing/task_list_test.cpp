@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/routing/task_list.hpp"
+#include "node/routing/service_registry.hpp"
 
 #include <boost/test/unit_test.hpp>
 
