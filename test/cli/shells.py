@@ -54,10 +54,10 @@ class Shell:
         return line
 
     def list(self, typed):
-        """What TAB, and TAB again, shows below the line.
+        """What several TABs show below the line.
 
-        A node announces itself at most every 100 ms, and TAB waits for less. So of two in a row that the shell handles at
-        once only one may find the node, and bash shows the list for none but the second: a third finds it then.
+        Nodes announce themselves at most every 100 ms, and a completion waits 80 ms. So a TAB that follows at once upon a
+        successful one may find no node. bash lists from the second TAB on: here that one or the third finds it.
         """
         self.send(typed + "\t\t\t")
         self.send(SHOW)
