@@ -59,8 +59,3 @@ foreach(expected IN LISTS EXPECTED_TARGETS)
         message(SEND_ERROR "there is no target ${expected}, though it was asked for")
     endif()
 endforeach()
-
-# The library is compiled anew here. One precompiled header and no optimisation, which is this project's choice to make,
-# keep that short.
-target_precompile_headers(cles PRIVATE <boost/asio.hpp> <functional> <map> <memory> <string> <vector>)
-target_compile_options(cles PRIVATE -fpch-preprocess) # ccache needs it
