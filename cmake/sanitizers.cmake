@@ -38,9 +38,10 @@ function(cles_target_tests_only target)
     endif()
 endfunction()
 
-# CLES_TEST_LAUNCHER: the prefix of a test's command. g++ 12's thread sanitizer cannot start where the kernel
-# spreads addresses over more than 28 bits, so there the tests run with that turned off.
-set(CLES_TEST_LAUNCHER)
+# CLES_TEST_LAUNCHER: the prefix of a test's command. Each test runs in a network namespace of its own. And g++ 12's thread
+# sanitizer cannot start where the kernel spreads addresses over more than 28 bits, so there the tests run with that turned
+# off.
+set(CLES_TEST_LAUNCHER "${PROJECT_SOURCE_DIR}/test/support/isolated")
 if("thread" IN_LIST CLES_SANITIZE AND EXISTS /proc/sys/vm/mmap_rnd_bits)
     file(READ /proc/sys/vm/mmap_rnd_bits cles_rnd_bits)
     string(STRIP "${cles_rnd_bits}" cles_rnd_bits)
@@ -49,7 +50,7 @@ if("thread" IN_LIST CLES_SANITIZE AND EXISTS /proc/sys/vm/mmap_rnd_bits)
     if(cles_rnd_bits GREATER 28 AND CLES_SETARCH)
         execute_process(COMMAND ${CLES_SETARCH} -R true RESULT_VARIABLE cles_setarch_result OUTPUT_QUIET ERROR_QUIET)
         if(cles_setarch_result EQUAL 0)
-            set(CLES_TEST_LAUNCHER ${CLES_SETARCH} -R)
+            list(APPEND CLES_TEST_LAUNCHER ${CLES_SETARCH} -R)
         endif()
     endif()
 endif()

@@ -110,8 +110,9 @@ class Cluster:
         self.started = []  # every process
         self.daemons = {}
         self.urls = {}
-        # Without the user's settings for CLES.
+        # Without the user's settings for CLES, and without the other nodes of this host.
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith("CLES_") and k != "NOTIFY_SOCKET"}
+        self.environment["CLES_MULTICAST"] = "off"
 
     def start(self, name):
         config = self.config_of(name)

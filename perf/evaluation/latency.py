@@ -124,10 +124,10 @@ class Link:
         """Runs the far end only meanwhile, because its publications would wake a core during the others' turns."""
         words = [kind] if kind.startswith("icd-") else ["car"]
         if kind == "update-multicast":
-            words += ["--multicast", self.hosts.interfaces["far"]]
+            words += ["--multicast", self.hosts.groups["far"]]
         with self.hosts.running("far", self.timing, "serve", *words, f"tcp://{self.hosts.addresses['far']}:0",
                                 *self.pace) as url:
-            where = self.hosts.interfaces["near"] if kind == "update-multicast" else url
+            where = self.hosts.groups["near"] if kind == "update-multicast" else url
             return run(self.hosts.command("near", self.timing, "time", kind, where, "--count", str(count), *self.pace))
 
     def __enter__(self):

@@ -5,7 +5,16 @@ its loopback interface."""
 import contextlib
 import os
 import shutil
+import socket
 import subprocess
+
+
+def free_group():
+    """A multicast group on loopback at a port of its own, separate from all other nodes of this host."""
+    with socket.socket(type=socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"lo,239.255.25.37:{probe.getsockname()[1]}"
+
 
 def why_not():
     """What is missing for it; empty if nothing is."""
@@ -29,7 +38,7 @@ class OneHost:
         cores = sorted(os.sched_getaffinity(0))
         self.cores = {"near": cores[0], "far": cores[-1]}
         self.addresses = {"near": "127.0.0.1", "far": "127.0.0.1"}
-        self.interfaces = {"near": "lo", "far": "lo"}
+        self.groups = dict.fromkeys(("near", "far"), free_group())
 
     def command(self, end, *words):
         """The command that runs this at one end."""
@@ -91,7 +100,7 @@ class LinkedHosts(OneHost):
                 devices = ("v0", "v1")
                 self._ip(near, "link", "add", "v0", "type", "veth", "peer", "name", "v1", "netns", str(far))
             self._address(devices)
-            self.interfaces = dict(zip(("near", "far"), devices))
+            self.groups = dict(zip(("near", "far"), devices))
         except BaseException:
             self.close()
             raise

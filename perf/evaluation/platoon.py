@@ -15,7 +15,6 @@ import argparse
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -23,17 +22,11 @@ from pathlib import Path
 
 import platoon_plot
 from interval import summary
+from linked_hosts import free_group
 from provenance import command, date, machine
 from result_file import write
 
 MOST_RATIO, MOST_P999_MS, BUDGET_MS = 1.02, 2, 100
-
-
-def free_group():
-    """A group of its own, separate from other platoons."""
-    with socket.socket(type=socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"lo,239.255.25.37:{probe.getsockname()[1]}"
 
 
 def asked(program, *arguments):

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "fan_out_exchange.hpp"
 
+#include "feed_reader.hpp"
+
 #include <boost/asio/awaitable.hpp>
 #include <boost/asio/co_spawn.hpp>
 #include <boost/asio/redirect_error.hpp>
@@ -137,54 +139,9 @@ class fan_out_pass {
     std::exception_ptr failure_;
 };
 
-class binder {
+class binder : public feed_reader<binder, publication, fan_out_pass> {
   public:
-    binder(fan_out_pass& all, const fan_out_binding& binding) : all_(all), binding_(binding) {}
-
-    void start(asio::io_context& io, cles::service& client) {
-        asio::co_spawn(io, bind(client), [this](std::exception_ptr failure) {
-            if (failure) {
-                all_.fail(std::move(failure));
-            }
-        });
-    }
-
-    void close() { feed_.close(); }
-
-  private:
-    asio::awaitable<void> bind(cles::service& client) {
-        bind_options options;
-        if (binding_.keep != 0) {
-            options.keep(binding_.keep);
-        }
-        options.multicast(binding_.multicast);
-        feed_ = co_await client.async_bind<publication>("car1:localization", options);
-        all_.bound();
-        if (binding_.style == handler_style::callback) {
-            next();
-            co_return;
-        }
-        for (bool more = true; more;) {
-            const auto item = co_await feed_.async_next();
-            more = take(item);
-        }
-    }
-
-    void next() {
-        feed_.async_next([this](boost::system::error_code code, const feed_item<publication>& item) {
-            if (code) {
-                all_.fail(std::make_exception_ptr(cles::error(code, "a feed failed")));
-                return;
-            }
-            try {
-                if (take(item)) {
-                    next();
-                }
-            } catch (...) {
-                all_.fail(std::current_exception());
-            }
-        });
-    }
+    using feed_reader::feed_reader;
 
     /// False when the last update has arrived, or is known to be lost.
     bool take(const feed_item<publication>& item) {
@@ -208,9 +165,7 @@ class binder {
         return false;
     }
 
-    fan_out_pass& all_;
-    const fan_out_binding& binding_;
-    feed<publication> feed_;
+  private:
     bool reached_ = false;
     std::uint64_t seen_ = 0;
 };
@@ -233,25 +188,10 @@ fan_out_tally take_fan_out(asio::io_context& io, const std::vector<cles::service
     fan_out_pass all{io, *clients.front(), order, binding.multicast, record};
     std::vector<std::unique_ptr<binder>> binders;
     for (std::uint64_t i = 0; i < order.binders; ++i) {
-        binders.push_back(std::make_unique<binder>(all, binding));
+        binders.push_back(std::make_unique<binder>(all, binding.style, binding.keep, binding.multicast));
         binders.back()->start(io, *clients[i % clients.size()]);
     }
-    io.restart();
-    run(io, binding.how);
-    // Operations in progress refer to the binders.
-    if (all.failure()) {
-        for (auto* const each : clients) {
-            each->stop();
-        }
-    }
-    for (auto& each : binders) {
-        each->close();
-    }
-    io.restart();
-    io.poll();
-    if (all.failure()) {
-        std::rethrow_exception(all.failure());
-    }
+    run_pass(io, binding.how, all, clients, binders);
     return all.all.tally();
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "update_exchange.hpp"
 
+#include "feed_reader.hpp"
 #include "perf/support/localization.hpp"
 
 #include <boost/asio/awaitable.hpp>
@@ -67,12 +68,8 @@ class update_pass {
         io_.stop();
     }
 
-    [[nodiscard]] bool failed() const noexcept { return failure_ != nullptr; }
-
-    update_tally result() const {
-        rethrow(failure_);
-        return tally_;
-    }
+    [[nodiscard]] const std::exception_ptr& failure() const noexcept { return failure_; }
+    [[nodiscard]] const update_tally& tally() const noexcept { return tally_; }
 
   private:
     asio::io_context& io_;
@@ -86,53 +83,9 @@ class update_pass {
 };
 
 template <class T>
-class binder {
+class binder : public feed_reader<binder<T>, T, update_pass> {
   public:
-    explicit binder(update_pass& all) : all_(all) {}
-
-    void start(asio::io_context& io, cles::service& client) {
-        asio::co_spawn(io, bind(client), [this](std::exception_ptr failure) {
-            if (failure) {
-                all_.fail(std::move(failure));
-            }
-        });
-    }
-
-    void close() { feed_.close(); }
-
-  private:
-    asio::awaitable<void> bind(cles::service& client) {
-        bind_options options;
-        if (all_.load().keep != 0) {
-            options.keep(all_.load().keep);
-        }
-        feed_ = co_await client.async_bind<T>("car1:localization", options);
-        all_.bound();
-        if (all_.load().style == handler_style::callback) {
-            next();
-            co_return;
-        }
-        for (bool more = true; more;) {
-            const auto item = co_await feed_.async_next();
-            more = take(item);
-        }
-    }
-
-    void next() {
-        feed_.async_next([this](boost::system::error_code code, const feed_item<T>& item) {
-            if (code) {
-                all_.fail(std::make_exception_ptr(cles::error(code, "a feed failed")));
-                return;
-            }
-            try {
-                if (take(item)) {
-                    next();
-                }
-            } catch (...) {
-                all_.fail(std::current_exception());
-            }
-        });
-    }
+    explicit binder(update_pass& all) : feed_reader<binder, T, update_pass>(all, all.load().style, all.load().keep) {}
 
     /// False when the last update has arrived.
     bool take(const feed_item<T>& item) {
@@ -154,15 +107,15 @@ class binder {
             ++delivered_;
         }
         const auto missed = std::max(missed_, holes_);
-        if (delivered_ + missed < all_.load().updates) {
+        auto& all = this->all_;
+        if (delivered_ + missed < all.load().updates) {
             return true;
         }
-        all_.complete(delivered_, missed);
+        all.complete(delivered_, missed);
         return false;
     }
 
-    update_pass& all_;
-    feed<T> feed_;
+  private:
     std::uint64_t delivered_ = 0;
     std::uint64_t missed_ = 0;
     std::uint64_t holes_ = 0;
@@ -178,20 +131,8 @@ update_tally take(asio::io_context& io, const std::vector<std::unique_ptr<cles::
         binders.push_back(std::make_unique<binder<T>>(all));
         binders.back()->start(io, *clients[i]);
     }
-    io.restart();
-    run(io, load.how);
-    // Operations in progress refer to the binders.
-    if (all.failed()) {
-        for (const auto& each : clients) {
-            each->stop();
-        }
-    }
-    for (auto& each : binders) {
-        each->close();
-    }
-    io.restart();
-    io.poll();
-    return all.result();
+    run_pass(io, load.how, all, clients, binders);
+    return all.tally();
 }
 
 } // namespace

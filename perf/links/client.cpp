@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/multicast.hpp>
 #include <cles/service.hpp>
 
 #include "ends.hpp"
@@ -140,9 +141,9 @@ std::vector<double> time_updates(const std::string& url, pace how) {
     return ages;
 }
 
-std::vector<double> time_updates_by_multicast(const std::string& interface, pace how) {
+std::vector<double> time_updates_by_multicast(const std::string& group, pace how) {
     std::vector<double> ages;
-    by_cles({.insecure = true, .multicast = {.interface = interface}},
+    by_cles({.insecure = true, .multicast = parse_multicast(group)},
             [&](cles::service& client) { return take_updates(client, cles::bind_options{}.multicast(), how, ages); });
     return ages;
 }

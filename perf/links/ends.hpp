@@ -17,8 +17,8 @@ namespace cles::perf {
 using announcement = std::function<void(std::string_view)>;
 
 /// By the library: a node "car1" that answers PULL of "localization", and publishes it at each interval.
-/// \param interface the interface for multicast; empty: no multicast
-void serve_car(std::string_view url, std::string_view interface, std::chrono::milliseconds interval,
+/// \param group where to take part in multicast, as `parse_multicast` reads it
+void serve_car(std::string_view url, std::string_view group, std::chrono::milliseconds interval,
                const announcement& announce);
 /// By hand: answers each request.
 void serve_replies_by_hand(std::string_view url, const announcement& announce);
@@ -40,7 +40,7 @@ std::vector<double> time_pulls(const std::string& url, pace how);
 /// One way, from the publication to the values.
 std::vector<double> time_updates_by_hand(const std::string& url, pace how);
 std::vector<double> time_updates(const std::string& url, pace how);
-/// From the node that is found by multicast at that interface. Lost updates are ignored.
-std::vector<double> time_updates_by_multicast(const std::string& interface, pace how);
+/// From the node that is found in that group. Lost updates are ignored.
+std::vector<double> time_updates_by_multicast(const std::string& group, pace how);
 
 } // namespace cles::perf

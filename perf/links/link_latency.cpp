@@ -21,7 +21,7 @@ namespace {
 struct settings {
     std::string what;
     std::string url;
-    std::string interface {};
+    std::string group = "off";
     int interval_ms = 20;
     std::size_t count = 100;
 };
@@ -30,7 +30,7 @@ void print(std::string_view url) { std::cout << url << std::endl; }
 
 void serve(const settings& given, std::chrono::milliseconds interval) {
     if (given.what == "car") {
-        perf::serve_car(given.url, given.interface, interval, print);
+        perf::serve_car(given.url, given.group, interval, print);
     } else if (given.what == "icd-pull") {
         perf::serve_replies_by_hand(given.url, print);
     } else {
@@ -56,13 +56,13 @@ int main(int argc, char** argv) {
         ->required()
         ->check(CLI::IsMember({"car", "icd-pull", "icd-update"}));
     serving->add_option("url", given.url, "Where to listen, such as tcp://10.0.0.1:0")->required();
-    serving->add_option("--multicast", given.interface, "The interface for multicast");
+    serving->add_option("--multicast", given.group, "IFACE[,GROUP[:PORT]], or off")->capture_default_str();
     auto* asking =
         program.add_subcommand("time", "The end that requests the data; prints microseconds as a JSON array");
     asking->add_option("what", given.what, "pull, update, update-multicast, icd-pull or icd-update")
         ->required()
         ->check(CLI::IsMember({"pull", "update", "update-multicast", "icd-pull", "icd-update"}));
-    asking->add_option("where", given.url, "What the other end printed; for update-multicast an interface")->required();
+    asking->add_option("where", given.url, "What the other end printed; for update-multicast its group")->required();
     asking->add_option("--count", given.count, "How many")
         ->check(CLI::Range(std::size_t{1}, std::size_t{1'000'000}))
         ->capture_default_str();

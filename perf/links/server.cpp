@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/multicast.hpp>
 #include <cles/service.hpp>
 
 #include "ends.hpp"
@@ -51,14 +52,11 @@ void send_updates(int client, std::chrono::milliseconds interval) {
 
 } // namespace
 
-void serve_car(std::string_view url, std::string_view interface, std::chrono::milliseconds interval,
+void serve_car(std::string_view url, std::string_view group, std::chrono::milliseconds interval,
                const announcement& announce) {
     asio::io_context io{1};
-    cles::service car{io,
-                      {.name = "car1",
-                       .listen = {std::string{url}},
-                       .insecure = true,
-                       .multicast = {.interface = std::string{interface}}}};
+    cles::service car{
+        io, {.name = "car1", .listen = {std::string{url}}, .insecure = true, .multicast = parse_multicast(group)}};
     register_localization(car);
     car.on_bind("localization"); // from the beginning, before anything is published
     asio::co_spawn(io, publish(car, interval), rethrow);

@@ -6,7 +6,6 @@
 #include <exception>
 #include <span>
 
-#include <fcntl.h>
 #include <poll.h>
 #include <sys/socket.h>
 
@@ -31,24 +30,14 @@ bool pass(int from, int to, std::atomic<std::uint64_t>& count, buffer& space) {
 
 byte_tap::byte_tap(const cles::url& target)
     : listener_(listen_on({.scheme = "tcp", .host = "127.0.0.1", .port = 0, .path = {}})), server_(connect_to(target)) {
-    std::array<int, 2> ends{};
-    checked(::pipe2(ends.data(), O_CLOEXEC), "pipe");
-    stop_here_ = descriptor{ends[0]};
-    stop_ = descriptor{ends[1]};
-    relay_ = std::thread{[this] { run(); }};
-}
-
-byte_tap::~byte_tap() {
-    stop_.reset();
-    relay_.join();
 }
 
 std::string byte_tap::url() const { return to_string(listener_.where); }
 
-void byte_tap::run() {
+void byte_tap::run(int stop) {
     buffer space;
     descriptor client;
-    std::array<pollfd, 3> watched{{{.fd = stop_here_.get(), .events = POLLIN, .revents = 0},
+    std::array<pollfd, 3> watched{{{.fd = stop, .events = POLLIN, .revents = 0},
                                    {.fd = listener_.socket.get(), .events = POLLIN, .revents = 0},
                                    {.fd = -1, .events = POLLIN, .revents = 0}}};
     try {

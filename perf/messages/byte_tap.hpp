@@ -4,11 +4,11 @@
 #include <cles/url.hpp>
 
 #include "perf/support/bare_socket.hpp"
+#include "relay_thread.hpp"
 
 #include <atomic>
 #include <cstdint>
 #include <string>
-#include <thread>
 
 namespace cles::perf {
 
@@ -19,9 +19,6 @@ class byte_tap {
     /// Listens for the link that it forwards to a `tcp` or `unix` URL.
     /// \throws std::system_error, std::runtime_error if the URL cannot be reached
     explicit byte_tap(const cles::url& target);
-    byte_tap(const byte_tap&) = delete;
-    byte_tap& operator=(const byte_tap&) = delete;
-    ~byte_tap();
 
     /// Where to connect instead.
     [[nodiscard]] std::string url() const;
@@ -29,15 +26,13 @@ class byte_tap {
     [[nodiscard]] std::uint64_t to_client() const noexcept { return to_client_; }
 
   private:
-    void run();
+    void run(int stop);
 
     listener listener_;
     descriptor server_;
-    descriptor stop_here_;
-    descriptor stop_;
     std::atomic<std::uint64_t> to_server_{0};
     std::atomic<std::uint64_t> to_client_{0};
-    std::thread relay_;
+    relay_thread relay_{[this](int stop) { run(stop); }}; // the last member: it uses the others
 };
 
 } // namespace cles::perf

@@ -5,7 +5,6 @@
 #include <cstddef>
 
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <netinet/in.h>
 #include <poll.h>
 #include <sys/socket.h>
@@ -26,24 +25,23 @@ sockaddr_in loopback(std::uint16_t port) {
 const sockaddr* generic(const sockaddr_in& address) { return reinterpret_cast<const sockaddr*>(&address); }
 sockaddr* generic(sockaddr_in& address) { return reinterpret_cast<sockaddr*>(&address); }
 
+descriptor bound_socket() {
+    auto socket = datagram_socket();
+    const auto here = loopback(0);
+    checked(::bind(socket.get(), generic(here), sizeof here), "bind");
+    return socket;
+}
+
+descriptor connected_socket(std::uint16_t port) {
+    auto socket = datagram_socket();
+    const auto there = loopback(port);
+    checked(::connect(socket.get(), generic(there), sizeof there), "connect");
+    return socket;
+}
+
 } // namespace
 
-datagram_tap::datagram_tap(const cles::url& target) : client_(datagram_socket()), server_(datagram_socket()) {
-    const auto here = loopback(0);
-    checked(::bind(client_.get(), generic(here), sizeof here), "bind");
-    const auto there = loopback(target.port);
-    checked(::connect(server_.get(), generic(there), sizeof there), "connect");
-    std::array<int, 2> ends{};
-    checked(::pipe2(ends.data(), O_CLOEXEC), "pipe");
-    stop_here_ = descriptor{ends[0]};
-    stop_ = descriptor{ends[1]};
-    relay_ = std::thread{[this] { run(); }};
-}
-
-datagram_tap::~datagram_tap() {
-    stop_.reset();
-    relay_.join();
-}
+datagram_tap::datagram_tap(const cles::url& target) : client_(bound_socket()), server_(connected_socket(target.port)) {}
 
 std::string datagram_tap::url() const {
     sockaddr_in address{};
@@ -53,10 +51,10 @@ std::string datagram_tap::url() const {
 }
 
 // What cannot be forwarded is lost, as datagrams may be.
-void datagram_tap::run() {
+void datagram_tap::run(int stop) {
     std::array<std::byte, 65536> space{};
     sockaddr_in client{};
-    std::array<pollfd, 3> watched{{{.fd = stop_here_.get(), .events = POLLIN, .revents = 0},
+    std::array<pollfd, 3> watched{{{.fd = stop, .events = POLLIN, .revents = 0},
                                    {.fd = client_.get(), .events = POLLIN, .revents = 0},
                                    {.fd = server_.get(), .events = POLLIN, .revents = 0}}};
     while (::poll(watched.data(), watched.size(), -1) > 0 && watched[0].revents == 0) {

@@ -4,11 +4,11 @@
 #include <cles/url.hpp>
 
 #include "perf/support/descriptor.hpp"
+#include "relay_thread.hpp"
 
 #include <atomic>
 #include <cstdint>
 #include <string>
-#include <thread>
 
 namespace cles::perf {
 
@@ -18,9 +18,6 @@ class datagram_tap {
   public:
     /// \throws std::system_error
     explicit datagram_tap(const cles::url& target);
-    datagram_tap(const datagram_tap&) = delete;
-    datagram_tap& operator=(const datagram_tap&) = delete;
-    ~datagram_tap();
 
     /// Where to send to instead.
     [[nodiscard]] std::string url() const;
@@ -28,15 +25,13 @@ class datagram_tap {
     [[nodiscard]] std::uint64_t to_client() const noexcept { return to_client_; }
 
   private:
-    void run();
+    void run(int stop);
 
     descriptor client_;
     descriptor server_;
-    descriptor stop_here_;
-    descriptor stop_;
     std::atomic<std::uint64_t> to_server_{0};
     std::atomic<std::uint64_t> to_client_{0};
-    std::thread relay_;
+    relay_thread relay_{[this](int stop) { run(stop); }}; // the last member: it uses the others
 };
 
 } // namespace cles::perf

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "broker.hpp"
 
-#include "peer.hpp"
+#include "driver/peer.hpp"
 #include "perf/support/descriptor.hpp"
 #include "perf/support/pinning.hpp"
 

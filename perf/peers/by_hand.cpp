@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // The hand-written exchange, with which all others are compared: packed structs on blocking sockets.
-#include "packets.hpp"
-#include "peer.hpp"
+#include "driver/packets.hpp"
+#include "driver/peer.hpp"
 #include "perf/baseline/binders.hpp"
 #include "perf/baseline/exchange.hpp"
 #include "perf/baseline/publisher.hpp"

@@ -4,7 +4,7 @@
 #include <cles/service.hpp>
 #include <cles/version.hpp>
 
-#include "peer.hpp"
+#include "driver/peer.hpp"
 #include "perf/fan_out/fan_out_exchange.hpp"
 #include "perf/jobs/delegate_load.hpp"
 #include "perf/pull/pull_exchange.hpp"

@@ -3,9 +3,9 @@
 // as many at once as are wanted (NSTART). The fan-out is a resource that each subscriber observes from a session of its
 // own, always notified without confirmation, which a node may do for a day.
 #include "broker.hpp"
-#include "ordered_fan_out.hpp"
-#include "packets.hpp"
-#include "peer.hpp"
+#include "driver/ordered_fan_out.hpp"
+#include "driver/packets.hpp"
+#include "driver/peer.hpp"
 
 #include <coap3/coap.h>
 

@@ -2,9 +2,9 @@
 // Cyclone DDS: listeners on both sides, which run on the thread that receives, so that nothing is handed on to another;
 // reliable, keeping as many samples as are in flight; on the loopback interface alone. A request and its reply are
 // topics with a number in both.
+#include "driver/ordered_fan_out.hpp"
+#include "driver/peer.hpp"
 #include "localization.h"
-#include "ordered_fan_out.hpp"
-#include "peer.hpp"
 
 #include <dds/dds.h>
 #include <dds/version.h>

@@ -4,8 +4,8 @@
 // API on both sides, each subscriber with a channel and a connection of its own. The transport sets TCP_NODELAY itself.
 #include "grpc.hpp"
 
-#include "ordered_fan_out.hpp"
-#include "peer.hpp"
+#include "driver/ordered_fan_out.hpp"
+#include "driver/peer.hpp"
 
 #include <unistd.h>
 

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "ordered_fan_out.hpp"
-#include "peer.hpp"
+#include "driver/ordered_fan_out.hpp"
+#include "driver/peer.hpp"
 
 #include <grpcpp/grpcpp.h>
 

@@ -2,10 +2,10 @@
 // MQTT by mosquitto's client library and broker: quality of service 0, TCP_NODELAY at the clients and the broker. A
 // request is a message to the node's topic, its answer one to the asker's; the broker is between them both times.
 #include "broker.hpp"
-#include "ordered_fan_out.hpp"
-#include "packets.hpp"
-#include "peer.hpp"
-#include "polled_subscriptions.hpp"
+#include "driver/ordered_fan_out.hpp"
+#include "driver/packets.hpp"
+#include "driver/peer.hpp"
+#include "driver/polled_subscriptions.hpp"
 
 #include <exception>
 #include <fstream>

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 // NNG: REQ asks REP by asynchronous operations, a context for each call in flight, as its manual recommends for servers
 // and clients under load; PUB and SUB for the fan-out. Its TCP transport sets TCP_NODELAY unless told otherwise.
-#include "ordered_fan_out.hpp"
-#include "packets.hpp"
-#include "peer.hpp"
+#include "driver/ordered_fan_out.hpp"
+#include "driver/packets.hpp"
+#include "driver/peer.hpp"
 
 #include <nng/nng.h>
 #include <nng/protocol/pubsub0/pub.h>

@@ -3,10 +3,10 @@
 // the store without asking the node. A task is pushed to a list, which the node waits for (BLPOP), as work queues on
 // Redis do; clients that push turn off its replies. The fan-out is PUBLISH and SUBSCRIBE.
 #include "broker.hpp"
-#include "ordered_fan_out.hpp"
-#include "packets.hpp"
-#include "peer.hpp"
-#include "polled_subscriptions.hpp"
+#include "driver/ordered_fan_out.hpp"
+#include "driver/packets.hpp"
+#include "driver/peer.hpp"
+#include "driver/polled_subscriptions.hpp"
 
 #include <hiredis/hiredis.h>
 

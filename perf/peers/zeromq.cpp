@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 // ZeroMQ: a DEALER asks a ROUTER, which needs no empty frame between address and packet; PUB and SUB for the fan-out.
 // libzmq sets TCP_NODELAY itself. One I/O thread on each side, which is the default of a context.
-#include "ordered_fan_out.hpp"
-#include "packets.hpp"
-#include "peer.hpp"
+#include "driver/ordered_fan_out.hpp"
+#include "driver/packets.hpp"
+#include "driver/peer.hpp"
 
 #include <zmq.hpp>
 

@@ -5,6 +5,7 @@
 
 #include "support/answer.hpp"
 #include "support/feed_log.hpp"
+#include "support/metric.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
@@ -29,13 +30,6 @@ using cles::errc;
 using cles::feed_event;
 
 constexpr std::array carriers{carrier::tcp4, carrier::unix_file, carrier::inproc};
-
-std::uint64_t metric(cles::service& of, const std::string& name) {
-    const auto text = of.request("PULL self:cles/metrics");
-    const auto at = text.find("\"" + name + "\":");
-    BOOST_REQUIRE(at != std::string::npos);
-    return std::stoull(text.substr(at + name.size() + 3));
-}
 
 // Publishes one after another, each when the one before has been taken.
 struct steady_publisher {

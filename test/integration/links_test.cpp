@@ -4,6 +4,7 @@
 #include <cles/service.hpp>
 
 #include "support/answer.hpp"
+#include "support/metric.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
@@ -41,14 +42,7 @@ struct node {
         car.on_bind("notice");
     }
     scripted_peer peer() { return {io, car.endpoints().front()}; }
-    std::uint64_t metric(const std::string& name) {
-        answer<> all;
-        car.async_request("PULL self:cles/metrics", all.take());
-        run_until(io, [&] { return all.done(); });
-        const auto at = all.value.text.find("\"" + name + "\":");
-        BOOST_REQUIRE(at != std::string::npos);
-        return std::stoull(all.value.text.substr(at + name.size() + 3));
-    }
+    std::uint64_t metric(const std::string& name) { return cles::test::metric(car, name); }
     /// Links that others opened, as far as this shows it: the node's own to itself is one.
     std::uint64_t open() { return metric("links_open") - own; }
 

@@ -5,6 +5,7 @@
 
 #include "support/answer.hpp"
 #include "support/feed_log.hpp"
+#include "support/metric.hpp"
 #include "support/node.hpp"
 #include "support/run_until.hpp"
 #include "support/scripted_peer.hpp"
@@ -33,15 +34,7 @@ using cles::errc;
 constexpr std::size_t mebi = 1U << 20U;
 constexpr std::size_t budget = 16 * mebi;
 
-// A member of the metrics' member "memory".
-std::uint64_t memory(cles::service& of, const std::string& name) {
-    const auto text = of.request("PULL self:cles/metrics");
-    const auto inside = text.find("\"memory\":{");
-    BOOST_REQUIRE(inside != std::string::npos);
-    const auto at = text.find("\"" + name + "\":", inside);
-    BOOST_REQUIRE(at != std::string::npos);
-    return std::stoull(text.substr(at + name.size() + 3));
-}
+std::uint64_t memory(cles::service& of, const std::string& name) { return metric(of, name, "memory"); }
 
 BOOST_DATA_TEST_CASE(many_large_results_that_nobody_reads_stay_within_it, every_socket, kind) {
     boost::asio::io_context io;

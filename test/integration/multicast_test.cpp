@@ -6,6 +6,7 @@
 
 #include "support/feed_log.hpp"
 #include "support/group_address.hpp"
+#include "support/metric.hpp"
 #include "support/run_until.hpp"
 #include "transport/group_port.hpp"
 #include "transport/ip_interface.hpp"
@@ -71,13 +72,6 @@ using cles::errc;
 using cles::feed_event;
 
 namespace {
-
-std::uint64_t metric(cles::service& of, const std::string& name) {
-    const auto all = of.request("PULL self:cles/metrics");
-    const auto at = all.find("\"" + name + "\":");
-    BOOST_REQUIRE(at != std::string::npos);
-    return std::stoull(all.substr(at + name.size() + 3));
-}
 
 /// Somebody in the group who is no node: hears all, and says what a test wants.
 struct stranger final : cles::core::group_listener {

@@ -7,6 +7,7 @@
 #include "support/feed_log.hpp"
 #include "support/impaired_path.hpp"
 #include "support/localization.hpp"
+#include "support/metric.hpp"
 #include "support/node.hpp"
 #include "support/reply_text.hpp"
 #include "support/run_until.hpp"
@@ -34,13 +35,6 @@ using cles::errc;
 using cles::feed_event;
 
 namespace {
-
-std::uint64_t metric(cles::service& of, const std::string& name) {
-    const auto all = of.request("PULL self:cles/metrics");
-    const auto at = all.find("\"" + name + "\":");
-    BOOST_REQUIRE(at != std::string::npos);
-    return std::stoull(all.substr(at + name.size() + 3));
-}
 
 /// A client with a plain socket.
 class plain_client {

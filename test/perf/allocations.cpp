@@ -55,15 +55,6 @@ namespace {
 
 // --- The service -----------------------------------------------------------------------------------------------------
 
-struct localization {
-    double utc = 1'700'000'000.5;
-    double lat = 48.137154;
-    double lon = 11.576124;
-    double velocity = 27.31;
-    double acceleration = 0.12;
-};
-BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon, velocity, acceleration))
-
 constexpr std::uint64_t warm_up = 5'000;
 constexpr std::uint64_t counted = 10'000;
 // A handler of `std::function` and the like must not be what makes the difference: the client sends some requests more.

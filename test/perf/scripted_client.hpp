@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <boost/describe/class.hpp>
+
 #include <cerrno>
 #include <cstdint>
 #include <cstdlib>
@@ -14,6 +16,16 @@
 #include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
+
+/// What the service replies.
+struct localization {
+    double utc = 1'700'000'000.5;
+    double lat = 48.137154;
+    double lon = 11.576124;
+    double velocity = 27.31;
+    double acceleration = 0.12;
+};
+BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon, velocity, acceleration))
 
 /// A client that shares no code with the service whose allocations and system calls are counted: a blocking socket
 /// with a timeout of some seconds.

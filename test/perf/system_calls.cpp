@@ -29,15 +29,6 @@ constexpr int warm_up = 200;
 constexpr int counted = 2'000;
 constexpr int allowed_per_pull = 4;
 
-struct localization {
-    double utc = 1'700'000'000.5;
-    double lat = 48.137154;
-    double lon = 11.576124;
-    double velocity = 27.31;
-    double acceleration = 0.12;
-};
-BOOST_DESCRIBE_STRUCT(localization, (), (utc, lat, lon, velocity, acceleration))
-
 [[noreturn]] void serve(int announce_to) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     try {

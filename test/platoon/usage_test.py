@@ -1,0 +1,103 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""What `cles-platoon` says if something is missing or wrong, and how it shows a drive."""
+
+import os
+import pty
+import re
+import select
+import socket
+import time
+import unittest
+
+from processes import PATIENCE, free_group, run, start, wait_until
+
+
+class Usage(unittest.TestCase):
+    def test_nobody_leads(self):
+        group = free_group()
+        code, out, err = run("vehicle", "--name", "v9", "--multicast", group)
+        self.assertEqual((code, out), (3, ""))
+        self.assertEqual(err, f"cles-platoon: there is no platoon: no vehicle was found in the group {group[3:]}\n")
+
+    def test_the_one_ahead_is_not_there(self):
+        code, out, err = run("vehicle", "--name", "v1", "--ahead", "v0", "--multicast", free_group(), "--seconds", 2)
+        self.assertEqual((code, out), (0, ""))
+        self.assertRegex(err, r"^ +1\.\d+ s  v1  fallback: v0 ahead was never heard\n$")
+
+    def test_the_port_is_taken(self):
+        with socket.socket(type=socket.SOCK_DGRAM) as other:
+            other.bind(("", 0))
+            code, out, err = run("run", "--multicast", f"lo,239.255.25.37:{other.getsockname()[1]}")
+        self.assertNotEqual(code, 0)
+        self.assertEqual(out, "")
+        self.assertRegex(err, r"^cles-platoon: .*239\.255\.25\.37.*[Aa]ddress already in use")
+
+    def test_there_is_no_multicast(self):
+        for where, said in (("nowhere0", "nowhere0"), ("off", "by multicast, which is off"), ("lo,1.2.3.4", "1.2.3.4")):
+            code, out, err = run("run", "--multicast", where)
+            self.assertNotIn(code, (0, 1), where)
+            self.assertEqual(out, "")
+            self.assertRegex(err, f"^cles-platoon: .*{re.escape(said)}")
+
+    def test_another_platoon_is_there(self):
+        group = free_group()
+        other = start("vehicle", "--name", "v0", "--lead", "--multicast", group)
+        try:
+            tries = []
+
+            def is_heard():
+                tries.append(run("run", "--multicast", group, "--vehicles", 2, "--seconds", 1))
+                return tries[-1][0] == 6
+
+            wait_until(is_heard, "it is heard")
+            self.assertEqual(tries[-1][2], "cles-platoon: another platoon uses this group (received v0): choose another port "
+                                  "with --multicast\n")
+        finally:
+            other.terminate()
+            other.communicate(timeout=PATIENCE)
+
+    def test_wrong_usage(self):
+        for arguments in ([], ["fly"], ["run", "--vanish", "x"], ["run", "--vanish", "99@1"], ["run", "--join", "0@1"],
+                          ["run", "--hz", "5"], ["run", "--loss", "101"], ["simulate", "--vehicles", "1"],
+                          ["simulate", "--vanish", "3@"], ["vehicle"],
+                          ["vehicle", "--name", "v1", "--lead", "--ahead", "v0"]):
+            code, out, err = run(*arguments)
+            self.assertEqual((code, out), (2, ""), arguments)
+            self.assertNotEqual(err, "", arguments)
+
+    def test_a_record_that_cannot_be_written(self):
+        code, _, err = run("simulate", "--vehicles", 2, "--record", "/nowhere/record.json")
+        self.assertEqual(code, 5)
+        self.assertRegex(err, "^cles-platoon: cannot write /nowhere/record.json: No such file or directory")
+
+    def test_a_drive_is_told_even_if_its_record_cannot_be_written(self):
+        where = ("run", "--multicast", free_group(), "--vehicles", 2, "--seconds", 3, "--record")
+        self.assertEqual(run(*where, "/nowhere/record.json"),  # which is known before it begins
+                         (5, "", "cles-platoon: cannot write /nowhere/record.json: No such file or directory\n"))
+        code, out, err = run(*where, "/dev/full")
+        self.assertEqual((code, err), (5, "cles-platoon: cannot write /dev/full: No space left on device\n"))
+        self.assertRegex(out, r"(?m)^gap +\d+\.\d{3} m at least\nfallback")
+        self.assertRegex(out, r"(?m)^latency   p50 \d")
+
+    def test_on_a_terminal_it_shows_a_table(self):
+        controller, terminal = pty.openpty()
+        watcher = start("run", "--multicast", free_group(), "--vehicles", 2, "--seconds", 2, stdout=terminal)
+        os.close(terminal)
+        shown = b""
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end and select.select([controller], [], [], PATIENCE)[0]:
+            try:
+                part = os.read(controller, 65536)
+            except OSError:  # its end
+                break
+            shown += part
+        os.close(controller)
+        watcher.communicate(timeout=PATIENCE)
+        self.assertEqual(watcher.returncode, 0)
+        self.assertRegex(shown.decode(), r"\x1b\[H\x1b\[J +\d+\.\d s +m/s +m/s2  distance   error\r\nv0 +2\d\.\d\d .* lead")
+        self.assertRegex(shown.decode(), r"\nv1 +2\d\.\d\d .* 1\d\.\d\d .* follow")
+
+
+if __name__ == "__main__":
+    unittest.main()
