@@ -18,6 +18,8 @@ struct identity {
     std::string name;                 ///< the node's authenticated name; empty if the transport authenticates none
     std::optional<std::uint32_t> uid; ///< of the process, if the kernel reports it (Unix sockets)
     bool local = false;               ///< whether it is on this host
+
+    bool operator==(const identity&) const = default;
 };
 
 /// A request whose access is to be checked.

@@ -13,9 +13,13 @@
 #include <chrono>
 #include <cstddef>
 #include <fstream>
+#include <functional>
+#include <map>
+#include <optional>
 #include <sstream>
 #include <string_view>
 #include <system_error>
+#include <type_traits>
 #include <vector>
 
 namespace cles::runtime {
@@ -23,30 +27,36 @@ namespace {
 
 constexpr std::size_t max_file_size = 1U << 20U;
 
-// A list of strings, each converted by `to`; a single one may be written without brackets.
+// -- values from YAML ----------------------------------------------------------------------------------------------
+
+// The following three make functions that return what they read. \param to converts text
 template <class F>
-std::vector<std::string> string_list(const yaml_value& from, F to) {
-    if (from.is_scalar()) {
-        return {from.as(to)};
-    }
-    std::vector<std::string> all;
-    from.read_list([&](const yaml_value& item) { all.push_back(item.as(to)); });
-    return all;
+auto scalar(F to) {
+    return [=](const yaml_value& from) { return from.as(to); };
 }
 
-template <class T>
-yaml_value::reader count_into(T& to, std::uint64_t min, std::uint64_t max) {
-    return [&to, min, max](const yaml_value& v) {
-        to = static_cast<T>(v.as([&](const std::string& text) { return to_count(text, min, max); }));
+// A single string may be written without brackets.
+template <class F>
+auto list(F to) {
+    return [=](const yaml_value& from) {
+        std::vector<std::string> all;
+        if (from.is_scalar()) {
+            all.push_back(from.as(to));
+        } else {
+            from.read_list([&](const yaml_value& item) { all.push_back(item.as(to)); });
+        }
+        return all;
     };
 }
 
-yaml_value::reader bool_into(bool& to) {
-    return [&to](const yaml_value& v) { to = v.as(to_bool); };
+auto count(std::uint32_t min, std::uint32_t max) {
+    return scalar([=](const std::string& text) { return static_cast<std::uint32_t>(to_count(text, min, max)); });
 }
 
-yaml_value::reader duration_into(std::chrono::microseconds& to) {
-    return [&to](const yaml_value& v) { to = v.as(to_duration); };
+// Reads a part of a value.
+template <class T, class F>
+yaml_value::reader part(T& to, F read) {
+    return [&to, read](const yaml_value& from) { to = static_cast<T>(read(from)); };
 }
 
 // One string with commas, or a list.
@@ -56,30 +66,23 @@ std::string interfaces_of(const yaml_value& from) {
     }
     std::string all;
     from.read_list([&](const yaml_value& item) { all += (all.empty() ? "" : ",") + item.as(to_interfaces); });
-    try {
-        return to_interfaces(all);
-    } catch (const invalid_value& e) {
-        from.fail(e.what());
-    }
+    return from.checked([&] { return to_interfaces(all); });
 }
 
 multicast_options multicast_of(const yaml_value& from) {
     if (from.is_scalar()) {
         return from.as(to_multicast);
     }
+    const auto to_group = [](const std::string& group) { return to_multicast("lo," + group + ":1").group; };
     multicast_options read{.interface = "lo"};
     if (from.is_list()) {
         read.interface = interfaces_of(from);
         return read;
     }
-    from.read_map({{"interface", [&](const yaml_value& v) { read.interface = interfaces_of(v); }},
-                   {"group",
-                    [&](const yaml_value& v) {
-                        read.group =
-                            v.as([](const std::string& group) { return to_multicast("lo," + group + ":1").group; });
-                    }},
-                   {"port", count_into(read.port, 1, 65535)},
-                   {"required", bool_into(read.required)}});
+    from.read_map({{"interface", part(read.interface, interfaces_of)},
+                   {"group", part(read.group, scalar(to_group))},
+                   {"port", part(read.port, count(1, 65535))},
+                   {"required", part(read.required, scalar(to_bool))}});
     return read;
 }
 
@@ -88,29 +91,38 @@ void read_log(const yaml_value& from, log_config& into) {
         into = from.as([&](const std::string& text) { return to_log_config(text, into); });
         return;
     }
-    from.read_map({{"level", [&](const yaml_value& v) { into.level = v.as(to_log_level); }},
-                   {"format", [&](const yaml_value& v) { into.format = v.as(to_log_format); }}});
+    from.read_map(
+        {{"level", part(into.level, scalar(to_log_level))}, {"format", part(into.format, scalar(to_log_format))}});
 }
 
-plugin_config plugin_of(const yaml_value& from) {
+std::map<std::string, std::string> peers_of(const yaml_value& from) {
+    std::map<std::string, std::string> peers;
+    from.read_names([&](const std::string& name, const yaml_value& url) { peers[name] = url.as(to_url); });
+    return peers;
+}
+
+std::vector<plugin_config> plugins_of(const yaml_value& from) {
     const auto to_path = [](const std::string& path) {
         if (path.empty()) {
             throw invalid_value("is empty");
         }
         return path;
     };
-    plugin_config read;
-    if (from.is_scalar()) {
-        read.path = from.as(to_path);
-        return read;
-    }
-    from.read_map({{"path", [&](const yaml_value& v) { read.path = v.as(to_path); }},
-                   {"config", [&](const yaml_value& v) { read.config = v.json(); }},
-                   {"required", bool_into(read.required)}});
-    if (read.path.empty()) {
-        from.fail("has no 'path'");
-    }
-    return read;
+    std::vector<plugin_config> plugins;
+    from.read_list([&](const yaml_value& item) {
+        auto& read = plugins.emplace_back();
+        if (item.is_scalar()) {
+            read.path = item.as(to_path);
+            return;
+        }
+        item.read_map({{"path", part(read.path, scalar(to_path))},
+                       {"config", part(read.config, [](const yaml_value& v) { return v.json(); })},
+                       {"required", part(read.required, scalar(to_bool))}});
+        if (read.path.empty()) {
+            item.fail("has no 'path'");
+        }
+    });
+    return plugins;
 }
 
 constexpr std::size_t max_links = 20'000; // each takes a file descriptor
@@ -135,55 +147,136 @@ std::chrono::milliseconds to_milliseconds(const std::string& text, const time_ra
 void read_limits(const yaml_value& from, limits& into) {
     yaml_value::readers known;
     for (const auto& range : count_ranges) {
-        known.emplace(range.name, [&into, &range](const yaml_value& v) {
-            into.*range.member = v.as([&](const std::string& text) {
-                return static_cast<std::size_t>(to_size(text, range.least, max_of(range)));
-            });
-        });
+        const auto to = [&range](const std::string& text) { return to_size(text, range.least, max_of(range)); };
+        known.emplace(range.name, part(into.*range.member, scalar(to)));
     }
     for (const auto& range : time_ranges) {
-        known.emplace(range.name, [&into, &range](const yaml_value& v) {
-            into.*range.member = v.as([&](const std::string& text) { return to_milliseconds(text, range); });
-        });
+        const auto to = [&range](const std::string& text) { return to_milliseconds(text, range); };
+        known.emplace(range.name, part(into.*range.member, scalar(to)));
     }
     from.read_map(known);
 }
 
-void read_all(const yaml_value& from, config& into) {
-    constexpr std::uint64_t max_workers = 1024;
-    constexpr std::uint64_t max_queue = 1'000'000;
-    from.read_map(
-        {{"node", [&](const yaml_value& v) { into.node = v.as(to_node_name); }},
-         {"pool", [&](const yaml_value& v) { into.pool = v.as(to_pool_name); }},
-         {"allow_clash", bool_into(into.allow_clash)},
-         {"listen", [&](const yaml_value& v) { into.listen = string_list(v, to_url); }},
-         {"insecure", bool_into(into.insecure)},
-         {"networks", [&](const yaml_value& v) { into.networks = string_list(v, to_network); }},
-         {"multicast", [&](const yaml_value& v) { into.multicast = multicast_of(v); }},
-         {"seeds", [&](const yaml_value& v) { into.seeds = string_list(v, to_url); }},
-         {"peers",
-          [&](const yaml_value& v) {
-              into.peers.clear();
-              v.read_names([&](const std::string& name, const yaml_value& url) { into.peers[name] = url.as(to_url); });
-          }},
-         {"workers", count_into(into.workers, 1, max_workers)},
-         {"queue", count_into(into.queue, 1, max_queue)},
-         {"stuck_after", duration_into(into.stuck_after)},
-         {"replacements", count_into(into.replacements, 0, max_workers)},
-         {"drain", duration_into(into.drain)},
-         {"plugins",
-          [&](const yaml_value& v) {
-              into.plugins.clear();
-              v.read_list([&](const yaml_value& item) { into.plugins.push_back(plugin_of(item)); });
-          }},
-         {"plugin_path",
-          [&](const yaml_value& v) { into.plugin_path = string_list(v, [](const std::string& s) { return s; }); }},
-         {"log", [&](const yaml_value& v) { read_log(v, into.log); }},
-         {"limits", [&](const yaml_value& v) { read_limits(v, into.limits); }},
-         {"busy_poll", duration_into(into.busy_poll)},
-         {"real_time", count_into(into.real_time, 0, 99)},
-         {"wake_within", [&](const yaml_value& v) { into.wake_within = v.as(to_wake_within); }}});
+// -- values as YAML -------------------------------------------------------------------------------------------------
+
+// Quoted, because YAML reads JSON strings.
+std::string text_of(std::string_view value) {
+    std::string out;
+    json_writer w{out};
+    w.value(value);
+    return out;
 }
+
+std::string text_of(bool value) { return value ? "true" : "false"; }
+
+std::string text_of(std::uint32_t number) { return std::to_string(number); }
+
+std::string text_of(std::chrono::microseconds span) { return to_string(span); }
+
+std::string text_of(std::optional<std::chrono::microseconds> bound) { return wake_within_text(bound); }
+
+std::string text_of(const multicast_options& where) {
+    return where.is_on() ? "{interface: " + text_of(where.interface) + ", group: " + where.group +
+                               ", port: " + std::to_string(where.port) + ", required: " + text_of(where.required) + "}"
+                         : "off";
+}
+
+std::string text_of(const std::vector<std::string>& items) {
+    std::string all;
+    for (const auto& item : items) {
+        all += (all.empty() ? "" : ", ") + text_of(item);
+    }
+    return "[" + all + "]";
+}
+
+std::string text_of(const std::map<std::string, std::string>& peers) {
+    std::string all;
+    for (const auto& [name, url] : peers) {
+        all += (all.empty() ? "" : ", ") + text_of(name) + ": " + text_of(url);
+    }
+    return "{" + all + "}";
+}
+
+std::string text_of(const log_config& log) {
+    return "{level: " + std::string{to_string(log.level)} + ", format: " + std::string{to_string(log.format)} + "}";
+}
+
+std::string text_of(const std::vector<plugin_config>& plugins) {
+    std::string all;
+    for (const auto& p : plugins) {
+        all +=
+            "\n  - path: " + text_of(p.path) + "\n    config: " + p.config + "\n    required: " + text_of(p.required);
+    }
+    return (all.empty() ? " []" : all) + "\n";
+}
+
+std::string text_of(const limits& bounds) {
+    std::string text{"\n"};
+    for (const auto& range : count_ranges) {
+        text.append("  ").append(range.name) += ": " + std::to_string(bounds.*range.member) + "\n";
+    }
+    for (const auto& range : time_ranges) {
+        text.append("  ").append(range.name) +=
+            ": " + to_string(std::chrono::microseconds{bounds.*range.member}) + "\n";
+    }
+    return text;
+}
+
+// -- the settings ---------------------------------------------------------------------------------------------------
+
+// A key of the configuration: how its value is read, and how it is written.
+struct setting {
+    std::string_view key;
+    bool is_list; // of strings
+    std::function<void(const yaml_value&, config&)> read;
+    std::function<std::string(const config&)> text; // if it ends with a line feed, it has lines of its own
+};
+
+// \param read returns the value, or changes it
+template <class T, class Read>
+setting value(std::string_view key, T config::*member, Read read) {
+    const auto assign = [=](const yaml_value& from, config& into) {
+        if constexpr (std::is_invocable_v<Read, const yaml_value&, T&>) {
+            read(from, into.*member);
+        } else {
+            into.*member = read(from);
+        }
+    };
+    return {.key = key,
+            .is_list = std::is_same_v<T, std::vector<std::string>>,
+            .read = assign,
+            .text = [=](const config& from) { return text_of(from.*member); }};
+}
+
+const std::vector<setting>& settings() {
+    constexpr std::uint32_t max_workers = 1024;
+    constexpr std::uint32_t max_queue = 1'000'000;
+    const auto unchanged = [](const std::string& text) { return text; };
+    static const std::vector<setting> all{value("node", &config::node, scalar(to_node_name)),
+                                          value("pool", &config::pool, scalar(to_pool_name)),
+                                          value("allow_clash", &config::allow_clash, scalar(to_bool)),
+                                          value("listen", &config::listen, list(to_url)),
+                                          value("insecure", &config::insecure, scalar(to_bool)),
+                                          value("networks", &config::networks, list(to_network)),
+                                          value("multicast", &config::multicast, multicast_of),
+                                          value("seeds", &config::seeds, list(to_url)),
+                                          value("peers", &config::peers, peers_of),
+                                          value("workers", &config::workers, count(1, max_workers)),
+                                          value("queue", &config::queue, count(1, max_queue)),
+                                          value("stuck_after", &config::stuck_after, scalar(to_duration)),
+                                          value("replacements", &config::replacements, count(0, max_workers)),
+                                          value("drain", &config::drain, scalar(to_duration)),
+                                          value("plugin_path", &config::plugin_path, list(unchanged)),
+                                          value("plugins", &config::plugins, plugins_of),
+                                          value("log", &config::log, read_log),
+                                          value("busy_poll", &config::busy_poll, scalar(to_duration)),
+                                          value("real_time", &config::real_time, count(0, 99)),
+                                          value("wake_within", &config::wake_within, scalar(to_wake_within)),
+                                          value("limits", &config::limits, read_limits)};
+    return all;
+}
+
+// -- the file -------------------------------------------------------------------------------------------------------
 
 // Calls `each(line, number)` for each line that is not blank or a comment.
 template <class F>
@@ -245,7 +338,12 @@ void read_config(const std::string& text, const std::string& name, config& into)
         check_empty(text, name);
         return;
     }
-    read_all({root, "", name, into.origins}, into);
+    yaml_value::readers readers;
+    for (const auto& each : settings()) {
+        readers.emplace(each.key, [&](const yaml_value& v) { each.read(v, into); });
+    }
+    const yaml_source source{.name = name, .origins = into.origins};
+    yaml_value{root, "", source}.read_map(readers);
 }
 
 void read_config_file(const std::string& path, config& into) {
@@ -264,105 +362,41 @@ void read_config_file(const std::string& path, config& into) {
     into.file = path;
 }
 
-// -- writing -------------------------------------------------------------------------------------------------------
-
-namespace {
-
-// YAML reads JSON strings.
-std::string in_quotes(std::string_view text) {
-    std::string out;
-    json_writer w{out};
-    w.value(text);
-    return out;
-}
-
-class yaml_lines {
-  public:
-    explicit yaml_lines(const config& setup) : setup_(setup) {}
-
-    void line(const std::string& key, const std::string& value) {
-        const auto origin = setup_.origins.find(key);
-        text_ += key + ": " + value + (origin == setup_.origins.end() ? "" : "  # " + origin->second) + "\n";
-    }
-    void list(const std::string& key, const std::vector<std::string>& items) {
-        std::string all;
-        for (const auto& item : items) {
-            all += (all.empty() ? "" : ", ") + in_quotes(item);
+void apply_overrides(const overrides& wanted, config& into) {
+    for (const auto& each : wanted) {
+        // The file's values of the key and its parts are replaced.
+        std::erase_if(into.origins, [&](const auto& origin) {
+            const auto& known = origin.first;
+            return known.starts_with(each.key) &&
+                   (known.size() == each.key.size() || known[each.key.size()] == '[' || known[each.key.size()] == '.');
+        });
+        const auto known = std::ranges::find(settings(), each.key, &setting::key);
+        YAML::Node value{known->is_list ? YAML::NodeType::Sequence : YAML::NodeType::Scalar};
+        for (const auto& text : each.texts) {
+            if (known->is_list) {
+                value.push_back(text);
+            } else {
+                value = text;
+            }
         }
-        line(key, "[" + all + "]");
+        const yaml_source source{.name = each.source, .origins = into.origins, .is_file = false};
+        known->read({value, each.key, source}, into);
     }
-    void raw(const std::string& lines) { text_ += lines; }
-    [[nodiscard]] std::string take() { return std::move(text_); }
-
-  private:
-    const config& setup_;
-    std::string text_;
-};
-
-std::string text_of(const multicast_options& where) {
-    return where.is_on() ? "{interface: " + in_quotes(where.interface) + ", group: " + where.group +
-                               ", port: " + std::to_string(where.port) +
-                               ", required: " + (where.required ? "true" : "false") + "}"
-                         : "off";
 }
-
-std::string text_of(const std::map<std::string, std::string>& peers) {
-    std::string all;
-    for (const auto& [name, url] : peers) {
-        all += (all.empty() ? "" : ", ") + in_quotes(name) + ": " + in_quotes(url);
-    }
-    return "{" + all + "}";
-}
-
-std::string text_of(const std::vector<plugin_config>& plugins) {
-    std::string all;
-    for (const auto& p : plugins) {
-        all += "  - path: " + in_quotes(p.path) + "\n    config: " + p.config +
-               "\n    required: " + (p.required ? "true" : "false") + "\n";
-    }
-    return all.empty() ? "plugins: []\n" : "plugins:\n" + all;
-}
-
-std::string limits_text(const limits& bounds, const std::string& indent) {
-    std::string text;
-    for (const auto& range : count_ranges) {
-        text.append(indent).append(range.name) += ": " + std::to_string(bounds.*range.member) + "\n";
-    }
-    for (const auto& range : time_ranges) {
-        text.append(indent).append(range.name) +=
-            ": " + to_string(std::chrono::microseconds{bounds.*range.member}) + "\n";
-    }
-    return text;
-}
-
-} // namespace
 
 std::string to_yaml(const config& setup) {
-    yaml_lines out{setup};
-    out.raw(setup.file.empty() ? "# no configuration file\n" : "# " + setup.file + "\n");
-    out.line("node", in_quotes(setup.node));
-    out.line("pool", in_quotes(setup.pool));
-    out.line("allow_clash", setup.allow_clash ? "true" : "false");
-    out.list("listen", setup.listen);
-    out.line("insecure", setup.insecure ? "true" : "false");
-    out.list("networks", setup.networks);
-    out.line("multicast", text_of(setup.multicast));
-    out.list("seeds", setup.seeds);
-    out.line("peers", text_of(setup.peers));
-    out.line("workers", std::to_string(setup.workers));
-    out.line("queue", std::to_string(setup.queue));
-    out.line("stuck_after", to_string(setup.stuck_after));
-    out.line("replacements", std::to_string(setup.replacements));
-    out.line("drain", to_string(setup.drain));
-    out.list("plugin_path", setup.plugin_path);
-    out.raw(text_of(setup.plugins));
-    out.line("log", "{level: " + std::string{to_string(setup.log.level)} +
-                        ", format: " + std::string{to_string(setup.log.format)} + "}");
-    out.line("busy_poll", to_string(setup.busy_poll));
-    out.line("real_time", std::to_string(setup.real_time));
-    out.line("wake_within", wake_within_text(setup.wake_within));
-    out.raw("limits:\n" + limits_text(setup.limits, "  "));
-    return out.take();
+    std::string out = setup.file.empty() ? "# no configuration file\n" : "# " + setup.file + "\n";
+    for (const auto& each : settings()) {
+        const std::string key{each.key};
+        const auto text = each.text(setup);
+        const auto origin = setup.origins.find(key);
+        if (text.ends_with('\n')) {
+            out += key + ":" + text;
+        } else {
+            out += key + ": " + text + (origin == setup.origins.end() ? "" : "  # " + origin->second) + "\n";
+        }
+    }
+    return out;
 }
 
 } // namespace cles::runtime

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "config/config.hpp"
+#include "config/config_file.hpp"
 
 #include <functional>
 #include <optional>
@@ -10,29 +11,9 @@
 
 namespace cles::runtime {
 
-/// Values from the environment or from flags, which override those of the file.
-struct overrides {
-    template <class T>
-    struct given {
-        T value{};
-        std::string source; ///< "CLES_NODE", "--node"
-    };
-
-    std::optional<given<std::string>> node;
-    std::optional<given<std::string>> pool;
-    std::optional<given<bool>> allow_clash;
-    std::optional<given<std::vector<std::string>>> listen;
-    std::optional<given<std::vector<std::string>>> seeds;
-    std::optional<given<std::string>> multicast;
-    std::optional<given<std::string>> log;
-};
-
 /// Reads CLES_NODE, CLES_POOL, CLES_LISTEN and CLES_SEEDS (lists separated by commas), CLES_MULTICAST and CLES_LOG.
 /// Empty variables are ignored. \param variable returns the value of a variable, or null
 overrides from_environment(const std::function<const char*(const char*)>& variable);
-
-/// \throws config_error naming the variable or flag
-void apply(const overrides& wanted, config& into);
 
 /// The sources of a daemon's configuration: flags override the environment, which overrides the file, which overrides
 /// the defaults. Kept in order to reload the configuration.

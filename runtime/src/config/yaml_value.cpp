@@ -10,11 +10,10 @@
 
 namespace cles::runtime {
 
-yaml_value::yaml_value(const YAML::Node& value, std::string key, const std::string& file,
-                       std::map<std::string, std::string>& origins)
-    : value_(value), key_(std::move(key)), file_(file), origins_(origins) {
+yaml_value::yaml_value(const YAML::Node& value, std::string key, const yaml_source& source)
+    : value_(value), key_(std::move(key)), source_(source) {
     if (!key_.empty()) {
-        origins_[key_] = location();
+        source_.origins[key_] = location();
     }
 }
 
@@ -44,11 +43,7 @@ void yaml_value::read_map(const readers& known) const {
 
 void yaml_value::read_names(const std::function<void(const std::string&, const yaml_value&)>& each) const {
     for_each_pair([&](const std::string& name, const yaml_value& value) {
-        try {
-            to_node_name(name);
-        } catch (const invalid_value& e) {
-            value.fail(e.what());
-        }
+        value.checked([&] { return to_node_name(name); });
         each(name, value);
     });
 }
@@ -59,25 +54,21 @@ void yaml_value::read_list(const reader& each) const {
     }
     std::size_t at = 0;
     for (const auto& item : value_) {
-        each({static_cast<const YAML::Node&>(item), key_ + "[" + std::to_string(at++) + "]", file_, origins_});
+        each({static_cast<const YAML::Node&>(item), key_ + "[" + std::to_string(at++) + "]", source_});
     }
 }
 
 std::string yaml_value::json() const {
-    try {
-        auto text = yaml_to_json(value_); // throws if it is nested endlessly
-        record_locations(value_, key_);
-        return text;
-    } catch (const invalid_value& e) {
-        fail(e.what());
-    }
+    auto text = checked([&] { return yaml_to_json(value_); }); // throws if it is nested endlessly
+    record_locations(value_, key_);
+    return text;
 }
 
 void yaml_value::record_locations(const YAML::Node& value, const std::string& key) const {
     constexpr std::size_t max_locations = 10'000; // anchors may multiply the values
     const auto keep = [&](const YAML::Node& inner, int line, const std::string& inner_key) {
-        if (origins_.size() < max_locations) {
-            origins_[inner_key] = file_ + ":" + std::to_string(line + 1);
+        if (source_.origins.size() < max_locations) {
+            source_.origins[inner_key] = source_.name + ":" + std::to_string(line + 1);
             record_locations(inner, inner_key);
         }
     };
@@ -94,7 +85,7 @@ void yaml_value::record_locations(const YAML::Node& value, const std::string& ke
 }
 
 void yaml_value::fail(const std::string& why) const {
-    throw config_error(key_.empty() ? location() : location() + ": " + key_, why);
+    throw config_error(key_.empty() || !source_.is_file ? location() : location() + ": " + key_, why);
 }
 
 void yaml_value::for_each_pair(const std::function<void(const std::string&, const yaml_value&)>& each) const {
@@ -109,9 +100,9 @@ void yaml_value::for_each_pair(const std::function<void(const std::string&, cons
         }
         const auto& name = key.Scalar();
         // A missing value has no line.
-        const yaml_value made{pair.second, key_.empty() ? name : key_ + "." + name, file_, origins_};
+        const yaml_value made{pair.second, key_.empty() ? name : key_ + "." + name, source_};
         const auto line = key.Mark().line + 1;
-        origins_[made.key_] = file_ + ":" + std::to_string(line);
+        source_.origins[made.key_] = source_.name + ":" + std::to_string(line);
         if (const auto [first, is_new] = lines.emplace(name, line); !is_new) {
             made.fail("is a duplicate of the key in line " + std::to_string(first->second));
         }
@@ -120,11 +111,11 @@ void yaml_value::for_each_pair(const std::function<void(const std::string&, cons
 }
 
 std::string yaml_value::location() const {
-    if (const auto known = origins_.find(key_); !key_.empty() && known != origins_.end()) {
+    if (const auto known = source_.origins.find(key_); !key_.empty() && known != source_.origins.end()) {
         return known->second;
     }
     const auto line = value_.Mark().line;
-    return line < 0 ? file_ : file_ + ":" + std::to_string(line + 1);
+    return line < 0 ? source_.name : source_.name + ":" + std::to_string(line + 1);
 }
 
 namespace {

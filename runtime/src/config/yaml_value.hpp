@@ -14,16 +14,22 @@
 
 namespace cles::runtime {
 
-/// A value in the configuration file, with its full key and its line, so that messages can name them. All functions may
+/// Where values come from.
+struct yaml_source {
+    std::string name;                            ///< of the file, the environment variable or the flag
+    std::map<std::string, std::string>& origins; ///< receives the locations of all values that are read
+    bool is_file = true;                         ///< messages name the key
+};
+
+/// A value of the configuration, with its full key and its line, so that messages can name them. All functions may
 /// throw config_error.
 class yaml_value {
   public:
     using reader = std::function<void(const yaml_value&)>;
     using readers = std::map<std::string_view, reader>;
 
-    /// \param file its name, for messages \param origins receives the locations of all values that are read
-    yaml_value(const YAML::Node& value, std::string key, const std::string& file,
-               std::map<std::string, std::string>& origins);
+    /// \param source has to outlive this
+    yaml_value(const YAML::Node& value, std::string key, const yaml_source& source);
 
     [[nodiscard]] bool is_scalar() const { return value_.IsScalar(); }
     [[nodiscard]] bool is_list() const { return value_.IsSequence(); }
@@ -31,8 +37,13 @@ class yaml_value {
     /// The scalar, converted by a function that may throw invalid_value.
     template <class F>
     auto as(F convert) const {
+        return checked([&] { return convert(scalar()); });
+    }
+    /// The result of a function that may throw invalid_value because of this value.
+    template <class F>
+    auto checked(F read) const {
         try {
-            return convert(scalar());
+            return read();
         } catch (const invalid_value& e) {
             fail(e.what());
         }
@@ -55,8 +66,7 @@ class yaml_value {
 
     YAML::Node value_;
     std::string key_;
-    const std::string& file_;
-    std::map<std::string, std::string>& origins_;
+    const yaml_source& source_;
 };
 
 /// The settings of a plugin as JSON: a map or a list; null becomes `{}`. Unquoted scalars that are a number, true,

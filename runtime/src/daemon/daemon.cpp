@@ -5,7 +5,7 @@
 #include "config/config_file.hpp"
 #include "config/config_values.hpp"
 #include "jobs/pooled_registrar.hpp"
-#include "plugins/plugin_search.hpp"
+#include "plugins/plugin_library.hpp"
 #include "plugins/plugin_start_guard.hpp"
 #include "plugins/plugin_trial.hpp"
 
@@ -133,16 +133,8 @@ void daemon::load_plugins() {
 void daemon::write_metrics(json_writer& w) const {
     w.key("pool");
     write_json(w, pool_.figures());
-    const auto figures = plugins_.figures();
     w.key("plugins");
-    w.begin_object();
-    w.key("loaded");
-    w.value(std::uint64_t{plugins_.plugins().size()});
-    w.key("jobs");
-    w.value(std::uint64_t{figures.jobs});
-    w.key("answered_twice");
-    w.value(figures.answered_twice);
-    w.end_object();
+    write_json(w, plugins_.figures());
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------

@@ -1,65 +1,47 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/completion_queue.hpp"
 
-#include <mutex>
 #include <thread>
 #include <utility>
 
 namespace cles::runtime {
 
 bool completion_queue::push(entry what, bool deferred) {
-    bool first = false;
-    {
-        const std::lock_guard lock{mutex_};
-        if (closed_) {
-            return false;
-        }
-        entries_.push_back(what);
-        first = !deferred && needs_wake();
+    std::unique_lock lock{mutex_};
+    if (closed_) {
+        return false;
     }
-    if (first) {
-        wake();
+    entries_.push_back(what);
+    if (!deferred) {
+        wake(lock);
     }
     return true;
 }
 
 void completion_queue::flush() {
-    bool first = false;
-    {
-        const std::lock_guard lock{mutex_};
-        first = !closed_ && !entries_.empty() && needs_wake();
-    }
-    if (first) {
-        wake();
+    std::unique_lock lock{mutex_};
+    if (!closed_ && !entries_.empty()) {
+        wake(lock);
     }
 }
 
 bool completion_queue::post(function what) {
-    bool first = false;
-    {
-        const std::lock_guard lock{mutex_};
-        if (closed_ || functions_.size() >= max_functions) {
-            return false;
-        }
-        functions_.push_back(std::move(what));
-        first = needs_wake();
-    }
-    if (first) {
-        wake();
-    }
-    return true;
-}
-
-bool completion_queue::needs_wake() noexcept {
-    if (std::exchange(woken_, true)) {
+    std::unique_lock lock{mutex_};
+    if (closed_ || functions_.size() >= max_functions) {
         return false;
     }
-    wakers_.fetch_add(1, std::memory_order_relaxed);
+    functions_.push_back(std::move(what));
+    wake(lock);
     return true;
 }
 
-// Runs without the lock, because it takes long; `close` waits until no thread is in it.
-void completion_queue::wake() {
+// Once until `take`. Unlocks, because waking takes long; `close` waits until no thread is in it.
+void completion_queue::wake(std::unique_lock<adaptive_mutex>& lock) {
+    if (std::exchange(woken_, true)) {
+        return;
+    }
+    wakers_.fetch_add(1, std::memory_order_relaxed);
+    lock.unlock();
     wake_();
     wakers_.fetch_sub(1, std::memory_order_release);
 }

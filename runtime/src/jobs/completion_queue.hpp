@@ -10,6 +10,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <mutex>
+#include <utility>
 #include <vector>
 
 namespace cles::runtime {
@@ -96,8 +98,7 @@ class completion_queue {
   private:
     static constexpr std::size_t max_functions = 4096;
 
-    [[nodiscard]] bool needs_wake() noexcept;
-    void wake();
+    void wake(std::unique_lock<adaptive_mutex>& lock);
 
     std::function<void()> wake_;
     adaptive_mutex mutex_;

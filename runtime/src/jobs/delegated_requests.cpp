@@ -8,7 +8,7 @@
 
 namespace cles::runtime {
 
-void delegated_requests::send(const job_context& job, const responder* by, const std::string& command,
+void delegated_requests::send(const job_ptr& job, const responder* by, const std::string& command,
                               const call_options& options, const answer_callback& callback) {
     const auto ticket = ++last_ticket_;
     open_.emplace(ticket, open_request{job, callback});
@@ -19,8 +19,7 @@ void delegated_requests::send(const job_context& job, const responder* by, const
     auto forwarded = options;
     if (options.on_progress_) {
         forwarded.on_progress([this, job, on_progress = options.on_progress_](double fraction, std::string_view json) {
-            workers_.schedule(*job.record_,
-                              [on_progress, fraction, json = std::string{json}] { on_progress(fraction, json); });
+            workers_.schedule(*job, [on_progress, fraction, json = std::string{json}] { on_progress(fraction, json); });
         });
     }
     // The job keeps this alive, even if the answer comes after `close`.
@@ -38,8 +37,8 @@ void delegated_requests::complete(std::uint64_t ticket, boost::system::error_cod
     }
     const auto done = std::move(found->second);
     open_.erase(found);
-    workers_.schedule(*done.job.record_, [callback = done.callback, code, json = std::string{json},
-                                          message = std::string{message}] { callback(code, json, message); });
+    workers_.schedule(*done.job, [callback = done.callback, code, json = std::string{json},
+                                  message = std::string{message}] { callback(code, json, message); });
 }
 
 void delegated_requests::close() {

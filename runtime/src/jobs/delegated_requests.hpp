@@ -4,7 +4,7 @@
 #include <cles/call_options.hpp>
 #include <cles/responder.hpp>
 
-#include "jobs/job_context.hpp"
+#include "jobs/job_record.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
 
@@ -26,14 +26,14 @@ class delegated_requests {
     ~delegated_requests() = default;
 
     /// \param by the responder of the job; null if its requester waits no more
-    void send(const job_context& job, const responder* by, const std::string& command, const call_options& options,
+    void send(const job_ptr& job, const responder* by, const std::string& command, const call_options& options,
               const answer_callback& callback);
     /// Completes all open requests with `unavailable`.
     void close();
 
   private:
     struct open_request {
-        job_context job;
+        job_ptr job;
         answer_callback callback;
     };
     void complete(std::uint64_t ticket, boost::system::error_code code, std::string_view json,

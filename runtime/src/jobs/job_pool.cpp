@@ -1,29 +1,472 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_pool.hpp"
 
-#include "jobs/job_dispatcher.hpp"
+#include <cles/limits.hpp>
 
+#include "jobs/service_time.hpp"
+
+#include <boost/asio/execution/outstanding_work.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/prefer.hpp>
+
+#include <algorithm>
+#include <mutex>
 #include <utility>
 
 namespace cles::runtime {
+
+namespace asio = boost::asio;
+using clock = time_point::clock;
+using namespace std::chrono_literals;
+
+namespace {
+
+// After so many jobs of one burst further workers are woken at once, and not when the burst has been read.
+constexpr std::size_t max_unwoken_jobs = 32;
+
+std::string seconds(std::chrono::nanoseconds span) {
+    const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(span).count() / 100;
+    return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " s";
+}
+
+// A function for the executor that does nothing once the dispatcher has been destroyed.
+template <class F>
+auto while_alive(std::weak_ptr<job_dispatcher> dispatcher, F call) {
+    return [dispatcher = std::move(dispatcher), call](auto... results) {
+        if (const auto self = dispatcher.lock()) {
+            call(*self, results...);
+        }
+    };
+}
+
+} // namespace
 
 job_pool::job_pool(service& host, pool_options options)
     : dispatcher_(std::make_shared<job_dispatcher>(host.get_executor(), std::move(options))) {
     dispatcher_->start();
 }
 
-job_pool::~job_pool() { dispatcher_->close(); }
+job_dispatcher::job_dispatcher(asio::any_io_executor executor, pool_options options)
+    : executor_(std::move(executor)), options_(std::move(options)), completions_([this] {
+          // The thread that wakes the executor holds a job, and so this object.
+          asio::post(executor_,
+                     while_alive(weak_from_this(), [](job_dispatcher& self) { self.process_completions(); }));
+      }),
+      workers_(options_, completions_),
+      pauses_(executor_, workers_, options_, [this](std::chrono::nanoseconds lasted) { report_pause(lasted); }),
+      delegated_(workers_), timer_(std::in_place, executor_), drain_limit_(std::in_place, executor_),
+      close_timeout_(options_.close_timeout) {}
 
-std::size_t job_pool::close(std::chrono::milliseconds limit) { return dispatcher_->close(limit); }
+asio::any_io_executor job_dispatcher::executor() const {
+    const std::lock_guard lock{executor_mutex_};
+    return executor_;
+}
 
-void job_pool::submit(job what) { dispatcher_->submit(std::move(what)); }
+void job_dispatcher::start() {
+    workers_.start(std::shared_ptr<worker_pool>{shared_from_this(), &workers_}, [this] {
+        // If this fails, the next timer does it.
+        static_cast<void>(completions_.post([this] { pauses_.check(); }));
+    });
+    pauses_.start(std::shared_ptr<pause_detector>{shared_from_this(), &pauses_});
+    if (options_.check_interval.count() > 0) {
+        // Once the executor runs, which may be later.
+        asio::post(executor_, while_alive(weak_from_this(), [](job_dispatcher& self) { self.arm_timer(); }));
+    }
+}
 
-node_load job_pool::load() const noexcept { return dispatcher_->load(); }
+void job_dispatcher::write_log(log_level level, const log_entry& what) const {
+    if (options_.log) {
+        options_.log(level, what);
+    }
+}
 
-pool_figures job_pool::figures() const { return dispatcher_->figures(); }
+// -- records -------------------------------------------------------------------------------------------------------
 
-void job_pool::drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done) {
-    dispatcher_->drain(limit, std::move(done));
+job_record& job_dispatcher::acquire_record() {
+    auto& r = records_.acquire(shared_from_this());
+    if (records_.size() == 1) {
+        work_guard_ = asio::prefer(executor_, asio::execution::outstanding_work.tracked);
+        arm_timer();
+    }
+    return r;
+}
+
+void job_dispatcher::recycle(job_record& r) {
+    records_.recycle(r);
+    if (records_.size() == 0) {
+        work_guard_ = {};
+    }
+}
+
+void job_dispatcher::return_record(job_record& r) noexcept {
+    if (!completions_.push({&r, completion_queue::event::released}, !draining_.load(std::memory_order_relaxed))) {
+        // The pool has been closed.
+        const std::unique_ptr<job_record> owned{&r};
+        const auto keep = std::move(r.dispatcher_);
+    }
+}
+
+// -- admission -----------------------------------------------------------------------------------------------------
+
+void job_dispatcher::submit(const request& what, responder answer, std::shared_ptr<const registration> task) {
+    if (closed_) {
+        answer.fail(errc::unavailable, "its workers have stopped");
+        return;
+    }
+    if (draining_) {
+        refuse(answer, worker_pool::admission::no_workers);
+        return;
+    }
+    pauses_.detect();
+    pauses_.count_input();
+    auto& r = acquire_record();
+    r.assign(what, records_.copy_of(what.peer()), std::move(task));
+    const auto admission = workers_.push(r);
+    if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
+        r.answered_ = true;
+        recycle(r);
+        refuse(answer, admission);
+        return;
+    }
+    ++figures_.admitted;
+    // A worker may already run it; workers do not use what is set here.
+    r.requester_.emplace(std::move(answer));
+    ++open_;
+    ++awaited_;
+    r.requester_->on_stop([this, &r] { stop(r); });
+    if (admission == worker_pool::admission::needs_wake) {
+        wake_workers();
+    }
+}
+
+// A single job starts at once. Otherwise more may come with the same read, and workers are woken for all together.
+void job_dispatcher::wake_workers() {
+    if (open_ == 1 || ++unwoken_jobs_ >= max_unwoken_jobs) {
+        unwoken_jobs_ = 0;
+        workers_.wake();
+    } else if (!std::exchange(wake_posted_, true)) {
+        asio::post(executor_, while_alive(weak_from_this(), [](job_dispatcher& self) {
+                       self.wake_posted_ = false;
+                       self.unwoken_jobs_ = 0;
+                       self.workers_.wake();
+                   }));
+    }
+}
+
+void job_dispatcher::refuse(responder& answer, worker_pool::admission why) {
+    ++figures_.refused;
+    const auto workers = workers_.read_figures();
+    const auto retry = retry_delay(workers.queued, workers.usable, workers.service_time);
+    if (draining_) {
+        answer.refuse("it is shutting down", 1s);
+    } else if (why == worker_pool::admission::no_workers) {
+        answer.refuse("all its workers are stuck", std::max<std::chrono::milliseconds>(retry, 1s));
+    } else {
+        answer.refuse("its queue is full", retry);
+    }
+}
+
+// -- results -------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::process_completions() {
+    auto entries = std::move(entries_);
+    auto functions = std::move(functions_);
+    entries.clear();
+    functions.clear();
+    completions_.take(entries, functions);
+    for (const auto& [record, what] : entries) {
+        if (what == completion_queue::event::released) {
+            recycle(*record);
+            continue;
+        }
+        record->send_progress();
+        if (what == completion_queue::event::answered && record->requester_) {
+            record->send_answer();
+            forget_requester(*record);
+            ++figures_.answered;
+        }
+        release_record(*record);
+    }
+    for (const auto& function : functions) {
+        function();
+    }
+    entries_ = std::move(entries);
+    functions_ = std::move(functions);
+    functions_.clear();
+    update_drain(false);
+}
+
+// It has its answer, or has withdrawn.
+void job_dispatcher::forget_requester(job_record& r) {
+    if (r.requester_) {
+        r.requester_.reset();
+        --open_;
+        awaited_ -= r.stopped() ? 0 : 1;
+    }
+}
+
+void job_dispatcher::release_record(job_record& r) {
+    // The caller has dealt with its answer.
+    if (r.references_.fetch_sub(1, std::memory_order_acq_rel) == 1) {
+        r.answered_.load() ? recycle(r) : (r.add_reference(), r.release());
+    }
+}
+
+// -- stopping ------------------------------------------------------------------------------------------------------
+
+// Returns whether the job had not started.
+bool job_dispatcher::stop(job_record& r) {
+    pauses_.count_input();
+    awaited_ -= r.requester_ && !r.stopped() ? 1 : 0;
+    auto callback = r.stop();
+    if (workers_.withdraw(r)) {
+        ++figures_.withdrawn;
+        r.answered_ = true;
+        forget_requester(r);
+        release_record(r);
+        return true;
+    }
+    workers_.job_stopped(r, clock::now());
+    if (callback) {
+        stop_notifier_.notify(
+            {.callback = std::move(callback), .log = [job = job_ptr{&r}](log_level level, const std::string& text) {
+                 const auto& what = job->request();
+                 job->log(level, std::string{to_string(what.verb())} + " '" + std::string{what.task()} + "': " + text);
+             }});
+    }
+    return false;
+}
+
+// -- requests to other nodes ---------------------------------------------------------------------------------------
+
+void job_dispatcher::delegate(job_ptr job, std::string command, call_options options, answer_callback answered) {
+    const auto callback = std::make_shared<answer_callback>(std::move(answered));
+    const auto put = completions_.post([this, job, command = std::move(command), options, callback] {
+        const auto& by = job->requester_;
+        delegated_.send(job, by ? &*by : nullptr, command, options, *callback);
+    });
+    if (put) {
+        return;
+    }
+    // Like any other answer: later, as a continuation of the job.
+    const auto refuse = [callback, ending = draining_.load()] {
+        ending ? (*callback)(errc::unavailable, "{}", "the node is stopping")
+               : (*callback)(errc::busy, "{}", "too many requests at once");
+    };
+    if (!workers_.schedule(*job, refuse)) {
+        refuse(); // no worker is left
+    }
+}
+
+// -- figures -------------------------------------------------------------------------------------------------------
+
+node_load job_dispatcher::load() const noexcept {
+    constexpr std::chrono::microseconds max_service_time = 1'000s;
+    const auto workers = workers_.read_figures();
+    const auto open = static_cast<std::uint32_t>(open_);
+    const auto started = open - std::min(workers.queued, open);
+    // While no worker becomes free, the next job waits at least as long as this has lasted. Rounded up, because zero
+    // means that nothing is known.
+    const auto service_time =
+        std::chrono::ceil<std::chrono::microseconds>(std::max(workers.service_time, workers.saturated_for));
+    return {.queued = workers.queued,
+            .running = std::max(started, workers.running),
+            .workers = workers.usable,
+            .service_us = static_cast<std::uint32_t>(std::min(service_time, max_service_time).count())};
+}
+
+pool_figures job_dispatcher::figures() const {
+    const auto now = load();
+    const auto workers = workers_.read_figures();
+    auto all = figures_;
+    all.threw = counts_.threw.load(std::memory_order_relaxed);
+    all.answerless = counts_.answerless.load(std::memory_order_relaxed);
+    all.answered_twice = counts_.answered_twice.load(std::memory_order_relaxed);
+    all.logs_dropped = counts_.logs_dropped.load(std::memory_order_relaxed);
+    all.stuck = workers.stuck;
+    all.replaced = workers.replaced;
+    all.revived = workers.revived;
+    all.queued = now.queued;
+    all.running = workers.running;
+    all.waiting = now.running - std::min(now.running, all.running);
+    all.workers = now.workers;
+    all.stuck_now = workers.stuck_now;
+    all.service_time_us =
+        static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(workers.service_time).count());
+    return all;
+}
+
+// -- log -----------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::log(job_ptr job, log_level level, std::string text) {
+    const auto put = completions_.post([this, job = std::move(job), level, text = std::move(text)] {
+        const auto& r = *job;
+        if (r.requester_) {
+            r.requester_->log(level, text); // adds the request's id
+        } else {
+            write_log(level, {text, r.request().peer().address});
+        }
+    });
+    if (!put) {
+        counts_.logs_dropped.fetch_add(1, std::memory_order_relaxed);
+    }
+}
+
+void job_dispatcher::record_inline_call(std::string_view task, std::chrono::nanoseconds took) {
+    ++figures_.inline_calls;
+    const auto us = static_cast<std::uint64_t>(std::chrono::duration_cast<std::chrono::microseconds>(took).count());
+    figures_.inline_worst_us = std::max(figures_.inline_worst_us, us);
+    if (took > options_.slow_inline) {
+        ++figures_.inline_slow;
+        write_log(log_level::warning, "the task '" + std::string{task} + "' blocked the node for " +
+                                          std::to_string(us / 1000) + " ms: it should not be marked inline_ok");
+    }
+}
+
+// -- timer ---------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::arm_timer() {
+    const bool has_jobs = records_.size() != 0;
+    if (closed_ || (timer_armed_ && !(timer_idle_ && has_jobs))) {
+        return;
+    }
+    timer_armed_ = true;
+    timer_idle_ = !has_jobs;
+    const auto interval =
+        has_jobs ? std::clamp<std::chrono::milliseconds>(options_.grace / 4, 5ms, 50ms) : options_.check_interval;
+    pauses_.expect_timer(interval);
+    timer_->expires_after(interval);
+    timer_->async_wait(while_alive(weak_from_this(), [](job_dispatcher& self, boost::system::error_code code) {
+        if (!code) {
+            self.on_timer();
+        }
+    }));
+}
+
+void job_dispatcher::on_timer() {
+    timer_armed_ = false;
+    if (closed_) {
+        return;
+    }
+    pauses_.check();
+    report_stuck();
+    process_completions(); // deferred ones
+    if (records_.size() != 0 || options_.check_interval.count() > 0) {
+        arm_timer();
+    }
+}
+
+// -- pauses and stuck workers --------------------------------------------------------------------------------------
+
+void job_dispatcher::report_pause(std::chrono::nanoseconds lasted) {
+    write_log(log_level::warning, "this node was suspended or blocked for more than " + seconds(lasted) +
+                                      ": no job starts until the input that arrived since has been read");
+}
+
+void job_dispatcher::report_stuck() {
+    for (const auto& [worker, job] : workers_.check_stuck(clock::now())) {
+        const auto& what = job->request();
+        write_log(log_level::error,
+                  {"worker " + std::to_string(worker.slot + 1) + " is stuck in " + std::string{to_string(what.verb())} +
+                       " '" + std::string{what.task()} + "' for " + seconds(worker.busy_for) +
+                       (worker.replaced ? ": replaced by another" : ": no replacement is left"),
+                   what.peer().address});
+    }
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void job_dispatcher::drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done) {
+    draining_ = true;
+    on_drained_ = std::move(done);
+    drain_limit_->expires_after(limit);
+    drain_limit_->async_wait(while_alive(weak_from_this(), [](job_dispatcher& self, boost::system::error_code code) {
+        if (!code) {
+            self.update_drain(true);
+        }
+    }));
+    asio::post(executor_, while_alive(weak_from_this(), [](job_dispatcher& self) { self.update_drain(false); }));
+}
+
+// Ends the drain at its limit, or with the last job.
+void job_dispatcher::update_drain(bool at_limit) {
+    if (!on_drained_ || !(at_limit || (awaited_ == 0 && workers_.read_figures().running == 0))) {
+        return;
+    }
+    drain_report report;
+    if (at_limit) {
+        fail_open_jobs(report);
+        close_timeout_ = 0ms;
+    }
+    report.stuck = workers_.read_figures().running;
+    drain_limit_->cancel();
+    std::exchange(on_drained_, nullptr)(report);
+}
+
+// Answers all open jobs, and tells them to stop.
+void job_dispatcher::fail_open_jobs(drain_report& report) {
+    for (std::size_t i = 0; i < records_.size();) {
+        auto& r = records_[i];
+        if (!r.requester_) {
+            ++i;
+            continue; // a withdrawn record leaves the list, and another takes its index
+        }
+        auto requester = *r.requester_;
+        if (stop(r)) {
+            ++report.refused;
+            requester.refuse("it is shutting down", 1s);
+        } else {
+            ++report.abandoned;
+            requester.fail(errc::unavailable, "it shut down before the job had ended");
+            forget_requester(r);
+        }
+    }
+}
+
+std::size_t job_dispatcher::close(std::chrono::milliseconds limit) {
+    if (closed_) {
+        return 0;
+    }
+    const auto end = clock::now() + limit;
+    draining_ = true;
+    drain_report unreported;
+    fail_open_jobs(unreported);
+    closed_ = true;
+    pauses_.close();
+    on_drained_ = nullptr;
+    drain_limit_.reset();
+    timer_.reset();
+    workers_.close();
+    std::vector<completion_queue::entry> entries;
+    std::vector<completion_queue::function> functions;
+    completions_.close(entries, functions);
+    for (const auto& function : functions) { // their requests have to be answered
+        function();
+    }
+    delegated_.close();
+    records_.close();
+    work_guard_ = {};
+    for (const auto& [record, what] : entries) {
+        what == completion_queue::event::released ? return_record(*record) : record->release();
+    }
+    functions.clear();
+    {
+        const std::lock_guard lock{executor_mutex_};
+        executor_ = {};
+    }
+    const auto time_left = [end] {
+        return std::max(std::chrono::ceil<std::chrono::milliseconds>(end - clock::now()), 0ms);
+    };
+    const auto workers = workers_.join(time_left());
+    if (workers != 0) {
+        write_log(log_level::error, "workers abandoned in jobs that do not end: " + std::to_string(workers));
+    }
+    const auto callbacks = stop_notifier_.close(time_left());
+    if (callbacks != 0) {
+        write_log(log_level::error,
+                  "threads abandoned in on_stop callbacks that do not return: " + std::to_string(callbacks));
+    }
+    return workers + callbacks;
 }
 
 } // namespace cles::runtime

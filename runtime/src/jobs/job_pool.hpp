@@ -3,19 +3,34 @@
 
 #include <cles/log.hpp>
 #include <cles/peer.hpp>
+#include <cles/registrar.hpp>
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
 #include <cles/service.hpp>
 
-#include "jobs/job_context.hpp"
+#include "jobs/adaptive_mutex.hpp"
+#include "jobs/completion_queue.hpp"
+#include "jobs/delegated_requests.hpp"
+#include "jobs/job_record.hpp"
+#include "jobs/pause_detector.hpp"
+#include "jobs/stop_notifier.hpp"
+#include "jobs/worker_pool.hpp"
 
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/steady_timer.hpp>
 #include <boost/describe/class.hpp>
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 namespace cles::runtime {
 
@@ -68,20 +83,102 @@ BOOST_DESCRIBE_STRUCT(pool_figures, (),
                        replaced, revived, inline_calls, inline_slow, inline_worst_us, queued, running, waiting, workers,
                        stuck_now, service_time_us))
 
-/// A request to be served by a worker.
-struct job {
-    const cles::request& what;            ///< copied by `job_pool::submit`
-    responder answer;                     ///< used on the service's executor only
-    std::shared_ptr<const job_work> work; ///< shared by all jobs of the task
-};
-
-class job_dispatcher;
-
 /// How a drain ended.
 struct drain_report {
     std::size_t refused = 0;   ///< jobs that had not started and were answered `busy`
     std::size_t abandoned = 0; ///< jobs that had started and were answered `unavailable`
     std::size_t stuck = 0;     ///< of these, those that still hold a worker
+};
+
+/// Takes the jobs of a pool, on the service's executor, from admission to reply: it is the sequence of these steps, and
+/// its parts keep their state. It lives as long as any job is held.
+class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher> {
+  public:
+    job_dispatcher(boost::asio::any_io_executor executor, pool_options options);
+    job_dispatcher(const job_dispatcher&) = delete;
+    job_dispatcher& operator=(const job_dispatcher&) = delete;
+    ~job_dispatcher() = default;
+
+    // -- on the service's executor ---------------------------------------------------------------------------------
+    /// To be called first, once a shared_ptr owns this.
+    void start();
+    /// Queues a job, or refuses it. \param what is copied \param task its handler
+    void submit(const request& what, responder answer, std::shared_ptr<const registration> task);
+    [[nodiscard]] node_load load() const noexcept;
+    [[nodiscard]] pool_figures figures() const;
+    void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
+    /// Returns how many threads are abandoned.
+    std::size_t close(std::chrono::milliseconds limit);
+    std::size_t close() { return close(close_timeout_); }
+    /// A handler has run on this executor.
+    void record_inline_call(std::string_view task, std::chrono::nanoseconds took);
+
+    // -- from any thread -------------------------------------------------------------------------------------------
+    struct shared_counts {
+        std::atomic<std::uint64_t> threw{0};
+        std::atomic<std::uint64_t> answerless{0};
+        std::atomic<std::uint64_t> answered_twice{0};
+        std::atomic<std::uint64_t> logs_dropped{0};
+    };
+    [[nodiscard]] shared_counts& counts() noexcept { return counts_; }
+    [[nodiscard]] completion_queue& completions() noexcept { return completions_; }
+    /// The service's; empty after `close`.
+    [[nodiscard]] boost::asio::any_io_executor executor() const;
+    /// The last reference to the record has been released.
+    void return_record(job_record& r) noexcept;
+    void delegate(job_ptr job, std::string command, call_options options, answer_callback answered);
+    void log(job_ptr job, log_level level, std::string text);
+
+  private:
+    job_record& acquire_record();
+    void recycle(job_record& r);
+    void wake_workers();
+    void refuse(responder& answer, worker_pool::admission why);
+
+    void process_completions();
+    void forget_requester(job_record& r);
+    void release_record(job_record& r);
+    bool stop(job_record& r);
+
+    void on_timer();
+    void arm_timer();
+    void report_pause(std::chrono::nanoseconds lasted);
+    void report_stuck();
+    void fail_open_jobs(drain_report& report);
+    void update_drain(bool at_limit);
+    void write_log(log_level level, const log_entry& what) const;
+
+    mutable adaptive_mutex executor_mutex_;
+    boost::asio::any_io_executor executor_;
+    pool_options options_;
+    shared_counts counts_;
+    completion_queue completions_;
+    worker_pool workers_;
+    pause_detector pauses_;
+    delegated_requests delegated_;
+    stop_notifier stop_notifier_;
+
+    job_record_pool records_;
+    std::size_t open_ = 0;    // jobs whose requester has no answer yet
+    std::size_t awaited_ = 0; // of these, those that have not been told to stop
+    bool wake_posted_ = false;
+    std::size_t unwoken_jobs_ = 0;
+    std::vector<completion_queue::entry> entries_;
+    std::vector<completion_queue::function> functions_;
+
+    // These hold nothing of the executor after `close`, because its context may be destroyed then.
+    boost::asio::any_io_executor work_guard_; // keeps it running while there are jobs
+    std::optional<boost::asio::steady_timer> timer_;
+    std::optional<boost::asio::steady_timer> drain_limit_;
+    std::function<void(const drain_report&)> on_drained_; // null: it is not being drained
+    bool timer_armed_ = false;
+    bool timer_idle_ = false; // armed while there was no job
+
+    std::atomic<bool> draining_{false};
+    bool closed_ = false;
+    std::chrono::milliseconds close_timeout_;
+
+    pool_figures figures_; // those that are counted here
 };
 
 /// Runs the jobs of a service on workers.
@@ -100,23 +197,23 @@ class job_pool {
     job_pool(service& host, pool_options options);
     job_pool(const job_pool&) = delete;
     job_pool& operator=(const job_pool&) = delete;
-    ~job_pool();
-
-    void submit(job what);
+    ~job_pool() { dispatcher_->close(); }
 
     /// For announcements and `any:`; cheap.
-    [[nodiscard]] node_load load() const noexcept;
-    [[nodiscard]] pool_figures figures() const;
+    [[nodiscard]] node_load load() const noexcept { return dispatcher_->load(); }
+    [[nodiscard]] pool_figures figures() const { return dispatcher_->figures(); }
 
     /// Admits no more jobs, and calls back when all have ended. At the limit it answers those that are left, tells
     /// those that run to stop, and calls back; after that the destructor waits for no job, and `close` only as long as
     /// its argument says. To be called once.
-    void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
+    void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done) {
+        dispatcher_->drain(limit, std::move(done));
+    }
 
     /// Does what the destructor does, with another limit than `pool_options::close_timeout`: answers what is left, and
     /// waits that long in total for workers and `on_stop` callbacks, and up to a second for those about to end. Returns
     /// how many threads are abandoned; 0 if the pool has been closed before.
-    std::size_t close(std::chrono::milliseconds limit);
+    std::size_t close(std::chrono::milliseconds limit) { return dispatcher_->close(limit); }
 
     /// For `pooled_registrar`, whose handlers may be called after the pool has been destroyed.
     [[nodiscard]] const std::shared_ptr<job_dispatcher>& dispatcher() const noexcept { return dispatcher_; }

@@ -1,48 +1,47 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <boost/intrusive/list.hpp>
 #include <boost/unordered/unordered_flat_map.hpp>
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <vector>
+#include <list>
 
 namespace cles::runtime {
-
-struct requester_queue;
 
 /// The jobs that wait for a worker, served round-robin: requesters take turns, and the jobs of one requester keep their
 /// order. So a requester with a thousand jobs makes another wait for one of them, not for all.
 ///
 /// Items are linked in place: in steady state nothing is allocated.
 class job_queue {
+    // It borrows the items, and does not look at those that are left at its end.
+    using link = boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::normal_link>>;
+
   public:
     /// Something that can be queued. The queue borrows it until it is popped or removed.
-    class item {
+    class item : public link {
       public:
         item() = default;
         item(const item&) = delete;
         item& operator=(const item&) = delete;
 
-        /// Any number that identifies the requester.
+        /// Any number that identifies the requester. Not changed while this is queued.
         std::uint64_t requester = 0;
-        [[nodiscard]] bool queued() const noexcept { return queue_ != nullptr; }
+        [[nodiscard]] bool queued() const noexcept { return queued_; }
 
       protected:
         ~item() = default;
 
       private:
         friend job_queue;
-        requester_queue* queue_ = nullptr;
-        item* previous_ = nullptr;
-        item* next_in_queue_ = nullptr;
+        bool queued_ = false;
     };
 
-    explicit job_queue(std::size_t capacity);
+    explicit job_queue(std::size_t capacity) : capacity_(capacity) {}
     job_queue(const job_queue&) = delete;
     job_queue& operator=(const job_queue&) = delete;
-    ~job_queue();
+    ~job_queue() = default;
 
     /// Queues a new job. False if the queue is full.
     [[nodiscard]] bool push(item& job);
@@ -58,16 +57,22 @@ class job_queue {
     [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
 
   private:
-    requester_queue* queue_of(std::uint64_t requester);
-    void unlink(item& job) noexcept;
-    void forget_idle();
+    /// The waiting jobs of one requester.
+    struct requester_queue {
+        std::uint64_t requester = 0;
+        boost::intrusive::list<item, boost::intrusive::constant_time_size<false>> jobs{};
+    };
+    using requesters = std::list<requester_queue>;
+
+    requester_queue& queue_for(item& job);
+    void unlink(requesters::iterator from, item& job) noexcept;
 
     std::size_t capacity_;
     std::size_t size_ = 0;
-    boost::unordered_flat_map<std::uint64_t, std::unique_ptr<requester_queue>> requesters_;
-    std::vector<std::unique_ptr<requester_queue>> spare_;
-    requester_queue* next_ = nullptr; // in the ring of requesters with jobs
-    std::size_t idle_ = 0;            // requesters without jobs
+    boost::unordered_flat_map<std::uint64_t, requesters::iterator> known_; // those in the next two
+    requesters with_jobs_;                                                 // the first is served next
+    requesters idle_;                                                      // without jobs
+    requesters spare_;                                                     // their memory is reused
 };
 
 } // namespace cles::runtime

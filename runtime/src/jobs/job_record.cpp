@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/job_record.hpp"
 
-#include "jobs/job_dispatcher.hpp"
+#include "jobs/job_pool.hpp"
 
 #include <cmath>
+#include <exception>
 #include <mutex>
 #include <utility>
 
@@ -31,9 +32,16 @@ void job_record::open(std::shared_ptr<job_dispatcher> dispatcher) {
     result_written_ = started = awaited_ = false;
 }
 
+void job_record::assign(const cles::request& what, std::shared_ptr<const identity> peer,
+                        std::shared_ptr<const registration> task) {
+    requester = reinterpret_cast<std::uintptr_t>(&what.peer());
+    owned_.assign(what, std::move(peer));
+    task_ = std::move(task);
+}
+
 void job_record::clear() {
     dispatcher_.reset();
-    work_.reset();
+    task_.reset();
     reports_.clear();
     on_stop_ = nullptr;
     failure_.reset();
@@ -43,6 +51,45 @@ void job_record::clear() {
         result_ = {};
     }
     owned_.clear();
+}
+
+job_record& job_record_pool::acquire(std::shared_ptr<job_dispatcher> dispatcher) {
+    if (spare_.empty()) {
+        spare_.push_back(std::make_unique<job_record>());
+    }
+    auto& r = *spare_.back().release();
+    spare_.pop_back();
+    r.open(std::move(dispatcher));
+    r.index = in_use_.size();
+    in_use_.push_back(&r);
+    return r;
+}
+
+void job_record_pool::recycle(job_record& r) {
+    std::unique_ptr<job_record> owned{&r};
+    in_use_.back()->index = r.index;
+    in_use_[r.index] = in_use_.back();
+    in_use_.pop_back();
+    r.clear(); // the dispatcher, which runs, outlives this
+    if (spare_.size() < max_spare) {
+        spare_.push_back(std::move(owned));
+    }
+}
+
+void job_record_pool::close() noexcept {
+    in_use_.clear();
+    spare_.clear();
+}
+
+std::shared_ptr<const identity> job_record_pool::copy_of(const identity& peer) {
+    if (copies_.size() > max_copies) {
+        copies_.clear();
+    }
+    auto& copy = copies_[&peer];
+    if (!copy || *copy != peer) { // another link may be at the address of an earlier one
+        copy = std::make_shared<identity>(peer);
+    }
+    return copy;
 }
 
 // -- references ----------------------------------------------------------------------------------------------------
@@ -85,21 +132,24 @@ bool job_record::claim_answer() noexcept {
         dispatcher_->counts().answered_twice.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
+    // A job that has answered is not told to stop any more. Its callback is destroyed here, on the job's thread, and
+    // not on the executor.
     if (has_on_stop_.load(std::memory_order_acquire)) {
-        drop_on_stop();
+        std::function<void()> dropped;
+        const std::lock_guard lock{mutex_};
+        dropped.swap(on_stop_);
     }
     return true;
 }
 
-// A job that has answered is not told to stop any more. Its callback is destroyed here, on the job's thread, and not on
-// the executor.
-void job_record::drop_on_stop() noexcept {
-    std::function<void()> dropped;
-    const std::lock_guard lock{mutex_};
-    dropped.swap(on_stop_);
-}
-
-void job_record::post_answer() noexcept {
+void job_record::answer(std::string_view text, std::optional<errc> failure,
+                        std::optional<std::chrono::milliseconds> retry) {
+    if (!claim_answer()) {
+        return;
+    }
+    result_ = text;
+    failure_ = failure;
+    retry_ = retry;
     const bool defer = current != nullptr && current->job == this && current->may_defer;
     if (defer) {
         current->deferred = true;
@@ -110,45 +160,22 @@ void job_record::post_answer() noexcept {
     }
 }
 
-void job_record::done(std::string_view json) {
-    if (!claim_answer()) {
-        return;
+void job_record::send_answer() const {
+    if (retry_) {
+        requester_->refuse(result_, *retry_);
+    } else if (failure_) {
+        requester_->fail(*failure_, result_);
+    } else if (result_.empty()) {
+        requester_->done();
+    } else {
+        requester_->done(compact_json{result_});
     }
-    result_ = json;
-    post_answer();
 }
 
-void job_record::fail(errc code, std::string_view message) {
-    if (!claim_answer()) {
-        return;
-    }
-    result_ = message;
-    failure_ = code;
-    post_answer();
-}
-
-void job_record::refuse(std::string_view message, std::chrono::milliseconds retry) {
-    if (!claim_answer()) {
-        return;
-    }
-    result_ = message;
-    failure_ = errc::busy;
-    retry_ = retry;
-    post_answer();
-}
-
-void job_record::fail(const std::exception_ptr& thrown) {
-    add_reference();
-    job_context{*this}.fail(thrown);
-}
-
-bool job_record::wants_progress() const noexcept {
-    return !stopped() && !answered_.load(std::memory_order_relaxed) &&
-           !progress_unwanted_.load(std::memory_order_relaxed);
-}
+// -- progress ------------------------------------------------------------------------------------------------------
 
 bool job_record::progress(double fraction, std::string_view json) {
-    if (!wants_progress()) {
+    if (stopped() || answered_.load(std::memory_order_relaxed) || progress_unwanted_.load(std::memory_order_relaxed)) {
         return false;
     }
     std::string details{json};
@@ -174,7 +201,21 @@ bool job_record::progress(double fraction, std::string_view json) {
     return true;
 }
 
-// -- the rest of the context ---------------------------------------------------------------------------------------
+void job_record::send_progress() {
+    {
+        const std::lock_guard lock{mutex_};
+        sent_reports_.swap(reports_);
+    }
+    for (const auto& each : sent_reports_) {
+        if (!requester_ || !requester_->progress(each.fraction, compact_json{each.json})) {
+            progress_unwanted_.store(true, std::memory_order_relaxed);
+            break;
+        }
+    }
+    sent_reports_.clear();
+}
+
+// -- stop ----------------------------------------------------------------------------------------------------------
 
 void job_record::on_stop(std::function<void()> callback) {
     {
@@ -190,55 +231,62 @@ void job_record::on_stop(std::function<void()> callback) {
     }
 }
 
+// Returns the callback, to be called on a thread where it may take long.
+std::function<void()> job_record::stop() {
+    const std::lock_guard lock{mutex_};
+    stopped_.store(true, std::memory_order_release);
+    return std::exchange(on_stop_, nullptr);
+}
+
+// -- the rest of a responder's functions ---------------------------------------------------------------------------
+
 void job_record::delegate(std::string_view command, const call_options& options, answer_callback answered) {
-    add_reference();
-    dispatcher_->delegate(job_context{*this}, std::string{command}, options, std::move(answered));
+    dispatcher_->delegate(job_ptr{this}, std::string{command}, options, std::move(answered));
 }
 
 void job_record::log(log_level level, std::string_view text) {
-    add_reference();
-    dispatcher_->log(job_context{*this}, level, std::string{text.substr(0, max_log_length)});
+    dispatcher_->log(job_ptr{this}, level, std::string{text.substr(0, max_log_length)});
 }
 
 boost::asio::any_io_executor job_record::executor() const { return dispatcher_->executor(); }
 
 // -- work ----------------------------------------------------------------------------------------------------------
 
-bool job_record::start(time_point executor_due) noexcept {
+// An exception becomes text on this thread, because it belongs to the code that threw it.
+template <class F>
+void job_record::run_guarded(F&& work) noexcept {
     try {
-        const auto now = time_point::clock::now();
-        if (stopped()) { // while a worker took it from the queue
-            fail(errc::cancelled, "the requester does not wait for it any more");
-            return true;
-        }
-        if (const auto due = request().deadline(); due != time_point{} && due <= now) {
-            fail(errc::deadline, "its deadline had passed before it began");
-            return true;
-        }
-        if (now > executor_due) {
-            return false;
-        }
-        // The context borrows the worker's reference.
-        struct borrowed {
-            job_context context;
-            ~borrowed() { context.record_ = nullptr; }
-        };
-        const borrowed job{job_context{*this}};
-        (*work_)(job.context);
+        work();
     } catch (...) {
         dispatcher_->counts().threw.fetch_add(1, std::memory_order_relaxed);
-        fail(std::current_exception());
+        detail::fail_with(*this, std::current_exception());
     }
+}
+
+bool job_record::start(time_point executor_due) noexcept {
+    const auto now = time_point::clock::now();
+    const bool over = request_.deadline() != time_point{} && request_.deadline() <= now;
+    if (!stopped() && !over && now > executor_due) {
+        return false;
+    }
+    run_guarded([&] {
+        if (stopped()) { // while a worker took it from the queue
+            fail(errc::cancelled, "the requester does not wait for it any more");
+        } else if (over) {
+            fail(errc::deadline, "its deadline had passed before it began");
+        } else if (task_->plain) {
+            json_writer writer{result_};
+            task_->plain(request_, writer);
+            result_written_ = true;
+        } else {
+            add_reference();
+            task_->async(request_,
+                         responder{std::shared_ptr<detail::call_control>{this, [](job_record* r) { r->release(); }}});
+        }
+    });
     return true;
 }
 
-void job_record::run(const std::function<void()>& continuation) noexcept {
-    try {
-        continuation();
-    } catch (...) {
-        dispatcher_->counts().threw.fetch_add(1, std::memory_order_relaxed);
-        fail(std::current_exception());
-    }
-}
+void job_record::run(const std::function<void()>& continuation) noexcept { run_guarded(continuation); }
 
 } // namespace cles::runtime

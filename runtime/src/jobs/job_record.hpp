@@ -1,20 +1,27 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/call_options.hpp>
 #include <cles/error.hpp>
+#include <cles/identity.hpp>
+#include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
+#include <cles/log.hpp>
+#include <cles/registrar.hpp>
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
 
 #include "jobs/adaptive_mutex.hpp"
-#include "jobs/job_context.hpp"
 #include "jobs/job_queue.hpp"
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/smart_ptr/intrusive_ptr.hpp>
+#include <boost/unordered/unordered_flat_map.hpp>
 
 #include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <exception>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -24,44 +31,52 @@
 
 namespace cles::runtime {
 
-class pending_replies;
 class job_dispatcher;
 
-/// One job, from its admission until its last holder releases it; then the memory is reused for another job.
+/// One job, from its admission until its last holder releases it; then the memory is reused for another job. It is what
+/// the responder of its handler holds: a job answers once, on its worker or later, from any thread, even after the pool
+/// has ended. A second answer is counted and ignored; one that comes after the requester withdrew is ignored.
 ///
 /// Members are grouped by who may use them: any thread, the worker pool (under its mutex), the owner of the records, or
 /// the service's executor (of which the owner of the records is a part).
-class job_record final : public job_queue::item {
+class job_record final : public job_queue::item, public detail::call_control {
   public:
-    job_record() = default;
-    ~job_record() = default;
-
     // -- any thread ------------------------------------------------------------------------------------------------
     void add_reference() noexcept { references_.fetch_add(1, std::memory_order_relaxed); }
     /// The last release answers the job if it has not been answered, and returns the record.
     void release() noexcept;
+    friend void intrusive_ptr_add_ref(job_record* r) noexcept { r->add_reference(); }
+    friend void intrusive_ptr_release(job_record* r) noexcept { r->release(); }
 
-    /// \param json compact, or empty; not checked again
-    void done(std::string_view json);
-    void fail(errc code, std::string_view message);
-    void refuse(std::string_view message, std::chrono::milliseconds retry);
-    /// \param json compact; not checked again
-    bool progress(double fraction, std::string_view json);
-    [[nodiscard]] bool wants_progress() const noexcept;
-    void on_stop(std::function<void()> callback);
-    void delegate(std::string_view command, const call_options& options, answer_callback answered);
-    void log(log_level level, std::string_view text);
-    [[nodiscard]] bool stopped() const noexcept { return stopped_.load(std::memory_order_acquire); }
+    // The functions of a responder, which has checked and compacted the JSON.
+    void done(std::string_view json) override { answer(json, std::nullopt, std::nullopt); }
+    void fail(errc code, std::string_view message) override { answer(message, code, std::nullopt); }
+    void refuse(std::string_view message, std::chrono::milliseconds retry) override {
+        answer(message, errc::busy, retry);
+    }
+    bool progress(double fraction, std::string_view json) override;
+    /// Calls back on a thread that only makes these calls; or at once, in this thread, if the job has been stopped. A
+    /// later callback replaces an earlier one.
+    void on_stop(std::function<void()> callback) override;
+    /// The job has been withdrawn, its link is lost, its time is over, or the pool ends.
+    [[nodiscard]] bool stopped() const noexcept override { return stopped_.load(std::memory_order_acquire); }
+    /// No worker is held while the request waits: the callback runs on a worker as a continuation of this job. The
+    /// start and the continuations of one job never run at the same time. If the pool ends first, the callback gets
+    /// `unavailable`; it is dropped without a call only if no worker becomes free for it in time, because all that are
+    /// left are in jobs that do not end. (If too many requests are made at once, it is called with `busy` before this
+    /// function returns.)
+    void delegate(std::string_view command, const call_options& options, answer_callback answered) override;
+    /// Entries that come too fast are dropped and counted.
+    void log(log_level level, std::string_view text) override;
+    [[nodiscard]] boost::asio::any_io_executor executor() const override;
+    [[nodiscard]] bool is_thread_safe() const noexcept override { return true; }
+
     [[nodiscard]] const cles::request& request() const noexcept { return request_; }
-    [[nodiscard]] boost::asio::any_io_executor executor() const;
+    /// The JSON or the message with which the job is answered, as far as it is known.
+    [[nodiscard]] const std::string& result() const noexcept { return result_; }
 
-    /// Where a worker that is the only holder of the job writes its result.
-    std::string& result_buffer() noexcept { return result_; }
-    /// The result has been written; `finish_run` sends it.
-    void set_result_written() noexcept { result_written_ = true; }
-
-    /// Runs the job's work on a worker, unless its requester has withdrawn or its time is over. False if the executor,
-    /// which would know of a withdrawal, is late (`executor_due` has passed): then nothing has been done.
+    /// Runs the task's handler on a worker, unless the requester has withdrawn or the job's time is over. False if the
+    /// executor, which would know of a withdrawal, is late (`executor_due` has passed): then nothing has been done.
     [[nodiscard]] bool start(time_point executor_due) noexcept;
     /// Runs a continuation of the job on a worker.
     void run(const std::function<void()>& continuation) noexcept;
@@ -69,7 +84,7 @@ class job_record final : public job_queue::item {
     /// was a result. \param may_defer sends it without waking the executor
     bool finish_run(bool may_defer) noexcept;
     /// Identifies the job's task.
-    [[nodiscard]] const void* task() const noexcept { return work_.get(); }
+    [[nodiscard]] const void* task() const noexcept { return task_.get(); }
 
     /// The job that this thread runs: whether its result may be deferred, and whether it has been.
     struct current_run {
@@ -89,12 +104,14 @@ class job_record final : public job_queue::item {
     // -- the owner of the records ----------------------------------------------------------------------------------
     /// Prepares the record for a new job, with one reference.
     void open(std::shared_ptr<job_dispatcher> dispatcher);
+    /// What the job is about. \param peer a copy of the requester's identity \param task its handler
+    void assign(const cles::request& what, std::shared_ptr<const identity> peer,
+                std::shared_ptr<const registration> task);
     /// Releases what belonged to the job, except for some memory.
     void clear();
     std::size_t index = 0; ///< among the records in use
 
   private:
-    friend pending_replies;
     friend job_dispatcher;
 
     struct progress_report {
@@ -102,10 +119,13 @@ class job_record final : public job_queue::item {
         std::string json;
     };
 
-    void fail(const std::exception_ptr& thrown);
+    template <class F>
+    void run_guarded(F&& work) noexcept;
     [[nodiscard]] bool claim_answer() noexcept;
-    void drop_on_stop() noexcept;
-    void post_answer() noexcept;
+    void answer(std::string_view text, std::optional<errc> failure, std::optional<std::chrono::milliseconds> retry);
+    std::function<void()> stop();
+    void send_progress();
+    void send_answer() const;
 
     // -- any thread ------------------------------------------------------------------------------------------------
     std::atomic<int> references_{0};
@@ -123,11 +143,52 @@ class job_record final : public job_queue::item {
     detail::owned_request owned_;
     cles::request request_{owned_.data()};
     std::shared_ptr<job_dispatcher> dispatcher_;
-    std::shared_ptr<const job_work> work_;
+    std::shared_ptr<const registration> task_;
 
     // -- the executor ----------------------------------------------------------------------------------------------
     std::optional<responder> requester_;
     bool awaited_ = false; // neither answered nor stopped
+    std::vector<progress_report> sent_reports_;
+};
+
+/// A holder of a job, which keeps it open: when the last one and the job's worker release it without an answer, it is
+/// answered `failed`.
+using job_ptr = boost::intrusive_ptr<job_record>;
+
+/// The records of a pool's jobs: those in use, and some spare ones. Used on the service's executor.
+class job_record_pool {
+  public:
+    /// A record for a new job, with one reference.
+    job_record& acquire(std::shared_ptr<job_dispatcher> dispatcher);
+    /// Takes back a record without references.
+    void recycle(job_record& r);
+    /// From now on the records in use destroy themselves.
+    void close() noexcept;
+
+    /// The records in use, in no particular order: recycling one moves another.
+    [[nodiscard]] std::size_t size() const noexcept { return in_use_.size(); }
+    [[nodiscard]] job_record& operator[](std::size_t index) const noexcept { return *in_use_[index]; }
+
+    /// A copy of a requester's identity. All jobs of one requester share it, and it may outlive the link.
+    [[nodiscard]] std::shared_ptr<const identity> copy_of(const identity& peer);
+
+  private:
+    static constexpr std::size_t max_spare = 1024;
+    static constexpr std::size_t max_copies = 1024;
+
+    std::vector<std::unique_ptr<job_record>> spare_;
+    std::vector<job_record*> in_use_; // owned; each knows its index
+    boost::unordered_flat_map<const identity*, std::shared_ptr<const identity>> copies_;
+};
+
+/// JSON text that is known to be valid and free of white space, as a result: it is written unchanged.
+struct compact_json {
+    std::string_view text;
 };
 
 } // namespace cles::runtime
+
+template <>
+struct cles::converter<cles::runtime::compact_json> {
+    static void write(json_writer& w, const runtime::compact_json& value) { w.raw(value.text); }
+};

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "jobs/pooled_registrar.hpp"
 
-#include "jobs/job_dispatcher.hpp"
-
 #include <chrono>
+#include <memory>
+#include <string_view>
 #include <utility>
 
 namespace cles::runtime {
@@ -27,16 +27,18 @@ class inline_timer {
 
 void pooled_registrar::add(registration task) {
     if (task.info.inline_ok || task.coroutine) {
-        add_inline(std::move(task));
+        time_inline(task);
     } else if (task.plain || task.async) {
-        auto work = take_work(task);
-        add_work(task.verb, std::move(task.task), std::move(task.info), std::move(work));
-    } else {
-        host_.add(std::move(task));
+        auto work = std::make_shared<const registration>(
+            registration{.plain = std::exchange(task.plain, nullptr), .async = std::exchange(task.async, nullptr)});
+        task.async = [dispatcher = dispatcher_, work = std::move(work)](const request& r, responder answer) {
+            dispatcher->submit(r, std::move(answer), work);
+        };
     }
+    host_.add(std::move(task));
 }
 
-void pooled_registrar::add_inline(registration task) {
+void pooled_registrar::time_inline(registration& task) {
     if (task.plain) {
         task.plain = [handler = std::move(task.plain), dispatcher = dispatcher_](const request& r, json_writer& w) {
             const inline_timer timed{*dispatcher, r.task()};
@@ -49,16 +51,6 @@ void pooled_registrar::add_inline(registration task) {
             handler(r, std::move(answer));
         };
     }
-    host_.add(std::move(task));
-}
-
-void pooled_registrar::add_work(cles::verb verb, std::string task, task_info info, job_work work) {
-    registration entry{.verb = verb, .task = std::move(task), .info = std::move(info)};
-    entry.async = [dispatcher = dispatcher_,
-                   work = std::make_shared<const job_work>(std::move(work))](const request& r, responder answer) {
-        dispatcher->submit({.what = r, .answer = std::move(answer), .work = work});
-    };
-    host_.add(std::move(entry));
 }
 
 publisher pooled_registrar::make_publisher() { return host_.make_publisher(); }

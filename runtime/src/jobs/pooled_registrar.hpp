@@ -2,12 +2,10 @@
 #pragma once
 
 #include <cles/registrar.hpp>
-#include <cles/task_info.hpp>
-#include <cles/verb.hpp>
 
 #include "jobs/job_pool.hpp"
 
-#include <string>
+#include <memory>
 
 namespace cles::runtime {
 
@@ -26,12 +24,9 @@ class pooled_registrar final : public registrar {
     /// \throws cles::error: `invalid_name`, `already_registered`
     void add(registration task) override;
     [[nodiscard]] publisher make_publisher() override;
-    /// Adds a task whose work takes the job's context.
-    /// \throws cles::error: `invalid_name`, `already_registered`
-    void add_work(cles::verb verb, std::string task, task_info info, job_work work);
 
   private:
-    void add_inline(registration task);
+    void time_inline(registration& task);
 
     service& host_;
     std::shared_ptr<job_dispatcher> dispatcher_;

@@ -2,7 +2,6 @@
 #include "jobs/worker_pool.hpp"
 
 #include "jobs/job_pool.hpp"
-#include "jobs/job_record.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -19,7 +18,6 @@ namespace {
 using clock = time_point::clock;
 
 constexpr std::size_t max_workers = 1024;
-constexpr std::int64_t max_reported_us = 1'000'000'000;
 constexpr std::size_t max_replacements = 1024;
 // How long free workers have at the end for continuations, whatever the others do.
 constexpr std::chrono::milliseconds final_grace{500};
@@ -33,9 +31,7 @@ std::size_t worker_count(const pool_options& options) {
 
 worker_pool::worker_pool(const pool_options& options, completion_queue& completions)
     : completions_(completions), threads_(worker_count(options)), queue_(std::max<std::size_t>(options.queue, 1)),
-      watchdog_(worker_count(options), std::min<std::size_t>(options.replacements, max_replacements), options.grace) {
-    publish_figures();
-}
+      watchdog_(worker_count(options), std::min<std::size_t>(options.replacements, max_replacements), options.grace) {}
 
 // -- the queue -----------------------------------------------------------------------------------------------------
 
@@ -44,26 +40,13 @@ bool worker_pool::needs_worker() const noexcept {
     return !ended_ && !paused_ && awake_ < watchdog_.allowed() && queue_.size() > awake_ - busy_;
 }
 
-void worker_pool::publish_figures() noexcept {
-    queued_.store(static_cast<std::uint32_t>(queue_.size()), std::memory_order_relaxed);
-    running_.store(busy_, std::memory_order_relaxed);
-    usable_.store(static_cast<std::uint32_t>(watchdog_.usable()), std::memory_order_relaxed);
-    // Rounded up, because zero means that nothing is known.
-    service_us_.store(static_cast<std::uint32_t>(
-                          std::min<std::int64_t>((service_time_.value().count() + 999) / 1000, max_reported_us)),
-                      std::memory_order_relaxed);
-}
+// With the lock.
+job_record* worker_pool::pop() noexcept { return static_cast<job_record*>(queue_.pop()); }
 
-// To be called when a worker starts or ends a job.
-void worker_pool::update_saturation(time_point now) noexcept {
-    const bool all = busy_ >= watchdog_.allowed();
-    saturated_since_.store(all ? now.time_since_epoch().count() : 0, std::memory_order_relaxed);
-}
-
-std::chrono::nanoseconds worker_pool::saturated_for(time_point now) const noexcept {
-    const auto since = saturated_since_.load(std::memory_order_relaxed);
-    return since == 0 ? std::chrono::nanoseconds{0}
-                      : std::max<std::chrono::nanoseconds>(now - time_point{time_point::duration{since}}, {});
+// With the lock. The job is the first of its requester.
+void worker_pool::resume(job_record& job) {
+    job.state = job_record::run_state::queued;
+    queue_.push_resumed(job);
 }
 
 worker_pool::admission worker_pool::push(job_record& job) {
@@ -76,7 +59,6 @@ worker_pool::admission worker_pool::push(job_record& job) {
     }
     job.state = job_record::run_state::queued;
     job.started = false;
-    publish_figures();
     return needs_worker() ? admission::needs_wake : admission::queued;
 }
 
@@ -92,9 +74,7 @@ bool worker_pool::schedule(job_record& job, std::function<void()> continuation) 
             return true; // its turn comes
         }
         job.add_reference();
-        job.state = job_record::run_state::queued;
-        queue_.push_resumed(job);
-        publish_figures();
+        resume(job);
         wanted = needs_worker();
         awake_ += wanted ? 1 : 0;
     }
@@ -111,7 +91,6 @@ bool worker_pool::withdraw(job_record& job) {
     }
     queue_.remove(job);
     job.state = job_record::run_state::idle;
-    publish_figures();
     return true;
 }
 
@@ -135,7 +114,7 @@ void worker_pool::job_stopped(const job_record& job, time_point now) {
     }
 }
 
-void worker_pool::close(const std::function<void(job_record&)>& dropped) {
+void worker_pool::close() {
     std::vector<job_record*> left;
     {
         const std::lock_guard lock{mutex_};
@@ -143,22 +122,16 @@ void worker_pool::close(const std::function<void(job_record&)>& dropped) {
         paused_ = false;
         executor_due_.store(time_point::max(), std::memory_order_relaxed); // no input is read any more
         std::vector<job_record*> started;
-        while (auto* next = queue_.pop()) {
-            auto& job = static_cast<job_record&>(*next);
-            if (job.started) {
-                started.push_back(&job);
-            } else {
-                job.state = job_record::run_state::idle;
-                left.push_back(&job);
-            }
+        while (auto* job = pop()) {
+            job->state = job_record::run_state::idle;
+            (job->started ? started : left).push_back(job);
         }
         for (auto* job : started) {
-            queue_.push_resumed(*job);
+            resume(*job);
         }
-        publish_figures();
     }
     for (auto* job : left) {
-        dropped(*job);
+        job->release();
     }
 }
 
@@ -172,7 +145,7 @@ std::size_t worker_pool::join(std::chrono::milliseconds limit) {
         ended_ = true;
     }
     const auto time_left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
-    const auto left = threads_.stop(std::max(time_left, {}), running());
+    const auto left = threads_.stop(std::max(time_left, {}), read_figures().running);
     if (left == 0) {
         drop_continuations();
     }
@@ -185,14 +158,12 @@ void worker_pool::drop_continuations() {
     std::vector<job_record*> left;
     {
         const std::lock_guard lock{mutex_};
-        while (auto* next = queue_.pop()) {
-            auto& job = static_cast<job_record&>(*next);
-            job.state = job_record::run_state::idle;
-            std::move(job.continuations.begin(), job.continuations.end(), std::back_inserter(dropped));
-            job.continuations.clear();
-            left.push_back(&job);
+        while (auto* job = pop()) {
+            job->state = job_record::run_state::idle;
+            std::move(job->continuations.begin(), job->continuations.end(), std::back_inserter(dropped));
+            job->continuations.clear();
+            left.push_back(job);
         }
-        publish_figures();
     }
     dropped.clear();
     for (auto* job : left) {
@@ -235,13 +206,6 @@ void worker_pool::finish_job(job_record* job, bool may_defer, completion_batcher
     }
 }
 
-// With the lock. Puts back a job that must not start now.
-void worker_pool::requeue(job_record& job) {
-    job.started = false;
-    job.state = job_record::run_state::queued;
-    queue_.push_resumed(job); // first of its requester, as before
-}
-
 void worker_pool::work() {
     std::vector<std::function<void()>> dropped;
     job_record* done = nullptr;
@@ -253,18 +217,17 @@ void worker_pool::work() {
     auto now = clock::now();
     bool executor_late = false;
     while (awake_ <= watchdog_.allowed() && !paused_) {
-        auto* next = queue_.pop();
+        auto* next = pop();
         if (next == nullptr) {
             break;
         }
-        auto& job = static_cast<job_record&>(*next);
+        auto& job = *next;
         const bool starts = !std::exchange(job.started, true);
         job.state = job_record::run_state::running;
         job.worker_slot = slot;
         watchdog_.begin(slot, &job, now, job.request().deadline());
         ++busy_;
-        update_saturation(now);
-        publish_figures();
+        last_begin_ = now;
         std::vector<std::function<void()>> continuations;
         continuations.swap(job.continuations);
         const bool may_defer_last = batcher.may_defer_before(job.task());
@@ -289,13 +252,12 @@ void worker_pool::work() {
         }
         lock.lock();
         --busy_;
-        update_saturation(now);
-        figures_.revived += watchdog_.end(slot) ? 1 : 0;
+        counts_.revived += watchdog_.end(slot) ? 1 : 0;
         executor_late = executor_late && !closed_; // at the end it is dropped
         if (executor_late) {
             done = nullptr;
-            requeue(job);
-            publish_figures();
+            job.started = false;
+            resume(job); // as before
             break;
         }
         service_time_.add(ended - now);
@@ -303,11 +265,9 @@ void worker_pool::work() {
         done = &job;
         job.state = job_record::run_state::idle;
         if (!job.continuations.empty()) {
-            job.state = job_record::run_state::queued;
-            queue_.push_resumed(job); // with the worker's reference
+            resume(job); // with the worker's reference
             done = nullptr;
         }
-        publish_figures();
         if (closed_) {
             idle_.notify_all();
         }
@@ -322,30 +282,20 @@ void worker_pool::work() {
     }
 }
 
-void worker_pool::check_stuck(
-    time_point now, const std::function<void(const worker_watchdog::stuck_worker&, const job_record&)>& found) {
-    struct stuck_job {
-        worker_watchdog::stuck_worker what;
-        job_record* job;
-    };
+std::vector<worker_pool::stuck_job> worker_pool::check_stuck(time_point now) {
     std::vector<stuck_job> all;
     std::size_t threads = 0;
     {
         const std::lock_guard lock{mutex_};
         watchdog_.check(now, [&](const worker_watchdog::stuck_worker& what) {
             auto* job = const_cast<job_record*>(static_cast<const job_record*>(what.job)); // NOLINT
-            job->add_reference();
-            all.push_back({what, job});
-            ++figures_.stuck;
-            figures_.replaced += what.replaced ? 1 : 0;
+            all.push_back({what, job_ptr{job}});
+            ++counts_.stuck;
+            counts_.replaced += what.replaced ? 1 : 0;
         });
         threads = watchdog_.allowed();
-        if (busy_ < threads) { // a replacement is free
-            saturated_since_.store(0, std::memory_order_relaxed);
-        }
-        publish_figures();
     }
-    for (const auto& each : all) {
+    if (!all.empty()) {
         try {
             while (threads_.count() < threads) {
                 threads_.add();
@@ -353,19 +303,23 @@ void worker_pool::check_stuck(
         } catch (const std::system_error&) {
             // There is one worker less; jobs in the queue end at their deadlines.
         }
-        found(each.what, *each.job);
-        each.job->release();
-    }
-    if (!all.empty()) {
         wake();
     }
+    return all;
 }
 
-worker_pool::figures worker_pool::read_figures() const {
+worker_pool::figures worker_pool::read_figures() const noexcept {
+    const auto now = clock::now();
     const std::lock_guard lock{mutex_};
-    auto result = figures_;
+    auto result = counts_;
     result.stuck_now = static_cast<std::uint32_t>(watchdog_.stuck());
+    result.queued = static_cast<std::uint32_t>(queue_.size());
+    result.running = busy_;
+    result.usable = static_cast<std::uint32_t>(watchdog_.usable());
     result.service_time = service_time_.value();
+    if (busy_ >= watchdog_.allowed()) {
+        result.saturated_for = std::max<std::chrono::nanoseconds>(now - last_begin_, {});
+    }
     return result;
 }
 

@@ -6,6 +6,7 @@
 #include "jobs/adaptive_mutex.hpp"
 #include "jobs/completion_queue.hpp"
 #include "jobs/job_queue.hpp"
+#include "jobs/job_record.hpp"
 #include "jobs/service_time.hpp"
 #include "jobs/worker_threads.hpp"
 #include "jobs/worker_watchdog.hpp"
@@ -21,7 +22,6 @@
 
 namespace cles::runtime {
 
-class job_record;
 struct pool_options;
 
 /// The workers, and the jobs that wait for them.
@@ -67,11 +67,14 @@ class worker_pool {
     void unpause();
     /// The job has been told to stop: its grace period begins.
     void job_stopped(const job_record& job, time_point now);
-    /// Calls `found` for each worker that has become stuck, after adding replacements.
-    void check_stuck(time_point now,
-                     const std::function<void(const worker_watchdog::stuck_worker&, const job_record&)>& found);
-    /// No job starts any more. Jobs that have not started are passed to `dropped`.
-    void close(const std::function<void(job_record&)>& dropped);
+    struct stuck_job {
+        worker_watchdog::stuck_worker worker;
+        job_ptr job;
+    };
+    /// The workers that have become stuck. Adds replacements.
+    [[nodiscard]] std::vector<stuck_job> check_stuck(time_point now);
+    /// No job starts any more. Jobs that have not started are released.
+    void close();
     /// After `close`: waits up to the limit for the workers, which still run the continuations of started jobs; free
     /// workers get a moment for that in any case. Returns how many workers are abandoned in a job; one whose job ends
     /// after all still runs its continuations.
@@ -81,32 +84,28 @@ class worker_pool {
     /// Queues a continuation of a job that has started. False after `join`: it is dropped.
     bool schedule(job_record& job, std::function<void()> continuation);
 
-    [[nodiscard]] std::uint32_t queued() const noexcept { return queued_.load(std::memory_order_relaxed); }
-    [[nodiscard]] std::uint32_t running() const noexcept { return running_.load(std::memory_order_relaxed); }
-    [[nodiscard]] std::uint32_t usable() const noexcept { return usable_.load(std::memory_order_relaxed); }
-    /// How long a job holds a worker, on average, in microseconds; zero before the first job.
-    [[nodiscard]] std::uint32_t service_us() const noexcept { return service_us_.load(std::memory_order_relaxed); }
-    /// For how long all workers have been busy; zero if one is free.
-    [[nodiscard]] std::chrono::nanoseconds saturated_for(time_point now) const noexcept;
     struct figures {
         std::uint64_t stuck = 0;
         std::uint64_t replaced = 0;
         std::uint64_t revived = 0;
         std::uint32_t stuck_now = 0;
-        std::chrono::nanoseconds service_time{0};
+        std::uint32_t queued = 0;
+        std::uint32_t running = 0;
+        std::uint32_t usable = 0;                  ///< workers that are not stuck
+        std::chrono::nanoseconds service_time{0};  ///< how long a job holds a worker; zero before the first job
+        std::chrono::nanoseconds saturated_for{0}; ///< for how long all workers have been busy; zero if one is free
     };
-    [[nodiscard]] figures read_figures() const;
+    [[nodiscard]] figures read_figures() const noexcept;
 
   private:
     void work();
     void finish_job(job_record* job, bool may_defer, completion_batcher& batcher, time_point now,
                     std::vector<std::function<void()>>& dropped);
     void schedule_worker();
-    void requeue(job_record& job);
+    job_record* pop() noexcept;
+    void resume(job_record& job);
     void drop_continuations();
     [[nodiscard]] bool needs_worker() const noexcept;
-    void publish_figures() noexcept;
-    void update_saturation(time_point now) noexcept;
 
     completion_queue& completions_;
     worker_threads threads_;
@@ -118,18 +117,13 @@ class worker_pool {
     worker_watchdog watchdog_;
     std::size_t awake_ = 0; // workers that look for jobs, or are about to
     std::uint32_t busy_ = 0;
+    time_point last_begin_; // of a job
     service_time service_time_;
-    figures figures_;
+    figures counts_;      // its first three
     bool paused_ = false; // no job or continuation starts
     bool closed_ = false; // no job starts
     bool ended_ = false;  // no continuation starts
     std::condition_variable_any idle_;
-    // Copies for readers without the lock.
-    std::atomic<std::uint32_t> queued_{0};
-    std::atomic<std::uint32_t> running_{0};
-    std::atomic<std::uint32_t> usable_{0};
-    std::atomic<std::uint32_t> service_us_{0};
-    std::atomic<time_point::rep> saturated_since_{0}; // 0: a worker is free
 };
 
 } // namespace cles::runtime

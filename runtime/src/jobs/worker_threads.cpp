@@ -15,15 +15,10 @@ constexpr std::chrono::seconds idle_stop_limit{1};
 } // namespace
 
 struct worker_threads::state {
-    struct worker {
-        std::thread thread;
-        bool ended = false;
-    };
-
     boost::asio::thread_pool pool{0};
     std::mutex mutex;
     std::condition_variable one_ended;
-    std::vector<std::unique_ptr<worker>> workers;
+    std::vector<std::thread> threads;
     std::size_t running = 0;
 };
 
@@ -42,21 +37,18 @@ worker_threads::~worker_threads() { stop(std::chrono::milliseconds{0}, count());
 
 void worker_threads::add() {
     const std::lock_guard lock{state_->mutex};
-    auto made = std::make_unique<state::worker>();
-    made->thread = std::thread{[self = state_, mine = made.get()] {
+    state_->threads.emplace_back([self = state_] {
         self->pool.attach();
         const std::lock_guard ending{self->mutex};
-        mine->ended = true;
         --self->running;
         self->one_ended.notify_all();
-    }};
-    state_->workers.push_back(std::move(made));
+    });
     ++state_->running;
 }
 
 std::size_t worker_threads::count() const noexcept {
     const std::lock_guard lock{state_->mutex};
-    return state_->workers.size();
+    return state_->threads.size();
 }
 
 boost::asio::thread_pool::executor_type worker_threads::get_executor() const noexcept {
@@ -66,6 +58,10 @@ boost::asio::thread_pool::executor_type worker_threads::get_executor() const noe
 std::size_t worker_threads::stop(std::chrono::milliseconds limit, std::size_t busy) {
     state_->pool.stop();
     std::unique_lock lock{state_->mutex};
+    auto threads = std::exchange(state_->threads, {});
+    if (threads.empty()) {
+        return 0;
+    }
     const auto all_ended = [this] { return state_->running == 0; };
     if (limit == std::chrono::milliseconds::max()) {
         state_->one_ended.wait(lock, all_ended);
@@ -74,23 +70,10 @@ std::size_t worker_threads::stop(std::chrono::milliseconds limit, std::size_t bu
         // Idle threads take a moment too.
         state_->one_ended.wait_for(lock, idle_stop_limit, [&] { return state_->running <= busy; });
     }
-    // An abandoned thread can still set its `ended`: it shares the state.
-    std::vector<std::thread> ended;
-    std::size_t left = 0;
-    for (const auto& w : state_->workers) {
-        if (!w->thread.joinable()) {
-            continue;
-        }
-        if (w->ended) {
-            ended.push_back(std::move(w->thread));
-        } else {
-            w->thread.detach();
-            ++left;
-        }
-    }
+    const auto left = state_->running;
     lock.unlock();
-    for (auto& t : ended) {
-        t.join();
+    for (auto& thread : threads) {
+        left == 0 ? thread.join() : thread.detach(); // an abandoned thread shares the state
     }
     return left;
 }

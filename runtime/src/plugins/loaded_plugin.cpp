@@ -3,7 +3,7 @@
 
 #include <cles/plugin_text.hpp>
 
-#include "jobs/job_context.hpp"
+#include "jobs/job_record.hpp"
 #include "plugins/plugin_jobs.hpp"
 
 #include <algorithm>
@@ -60,17 +60,10 @@ struct loaded_plugin::host_api {
         }
     }
     static void refuse(const cles_host* host, cles_text why) noexcept {
-        auto& plugin = self(host);
-        if (plugin.may_refuse_ && plugin.refusal_.empty()) {
-            plugin.refusal_ = view_of(why);
-        }
+        self(host).note_refusal({.why = std::string{view_of(why)}, .setting = std::nullopt});
     }
     static void refuse_setting(const cles_host* host, cles_text key, cles_text why) noexcept {
-        auto& plugin = self(host);
-        if (plugin.may_refuse_ && plugin.refusal_.empty()) {
-            plugin.refusal_ = view_of(why);
-            plugin.refused_setting_ = view_of(key);
-        }
+        self(host).note_refusal({.why = std::string{view_of(why)}, .setting = std::string{view_of(key)}});
     }
     static void publish(const cles_host* host, cles_text noun, cles_text json) noexcept {
         auto& plugin = self(host);
@@ -90,26 +83,18 @@ struct loaded_plugin::host_api {
         auto& plugin = self(host);
         if (const auto here = plugin.jobs_.take_if_direct(job)) {
             send_answer(*here, view_of(json));
-        } else if (!plugin.jobs_.finish(
-                       job, [text = std::string{view_of(json)}](const responder& to) { send_answer(to, text); })) {
-            plugin.report_unknown_job();
+        } else {
+            plugin.finish(job, [text = std::string{view_of(json)}](const responder& to) { send_answer(to, text); });
         }
     }
     static void fail(const cles_host* host, cles_job job, cles_text code, cles_text message) noexcept {
-        auto& plugin = self(host);
-        const auto why = errc_from_wire(view_of(code));
-        if (!plugin.jobs_.finish(
-                job, [why, words = std::string{view_of(message)}](const responder& to) { to.fail(why, words); })) {
-            plugin.report_unknown_job();
-        }
+        self(host).finish(job, [why = errc_from_wire(view_of(code)),
+                                words = std::string{view_of(message)}](const responder& to) { to.fail(why, words); });
     }
     static void busy(const cles_host* host, cles_job job, cles_text message, std::uint32_t retry_ms) noexcept {
-        auto& plugin = self(host);
-        if (!plugin.jobs_.finish(job, [words = std::string{view_of(message)}, retry_ms](const responder& to) {
-                to.refuse(words, std::chrono::milliseconds{retry_ms});
-            })) {
-            plugin.report_unknown_job();
-        }
+        self(host).finish(job, [words = std::string{view_of(message)}, retry_ms](const responder& to) {
+            to.refuse(words, std::chrono::milliseconds{retry_ms});
+        });
     }
     static std::int32_t progress(const cles_host* host, cles_job job, double fraction, cles_text json) noexcept {
         const auto report = [fraction, text = std::string{view_of(json)}](const responder& to) {
@@ -174,8 +159,8 @@ void loaded_plugin::disable_log() noexcept {
     log_ = nullptr;
 }
 
-void loaded_plugin::report_unknown_job() {
-    if (!closed_ && !unknown_job_reported_.exchange(true)) {
+void loaded_plugin::finish(plugin_jobs::id job, std::function<void(const responder&)> answer) {
+    if (!jobs_.finish(job, std::move(answer)) && !closed_ && !unknown_job_reported_.exchange(true)) {
         log(log_level::warning, "answered a job that does not exist or has been answered (logged once)");
     }
 }
@@ -202,8 +187,18 @@ std::optional<loaded_plugin::refusal> loaded_plugin::run_guarded(const char* wha
     if (!thrown.empty()) {
         return refusal{.why = std::move(thrown), .setting = std::nullopt};
     }
-    return refusal{.why = refusal_.empty() ? "it refuses to start without giving a reason" : refusal_,
-                   .setting = refused_setting_};
+    auto refused = refusal_;
+    if (refused.why.empty()) {
+        refused.why = "it refuses to start without giving a reason";
+    }
+    return refused;
+}
+
+// The first one counts.
+void loaded_plugin::note_refusal(refusal what) {
+    if (may_refuse_ && refusal_.why.empty()) {
+        refusal_ = std::move(what);
+    }
 }
 
 std::optional<loaded_plugin::refusal> loaded_plugin::check(const std::string& config) {
@@ -224,8 +219,8 @@ std::optional<loaded_plugin::refusal> loaded_plugin::start(const std::string& co
         return refused;
     }
     stopped_ = false;
-    if (!refusal_.empty()) {
-        log(log_level::warning, "continues without a task: " + refusal_);
+    if (!refusal_.why.empty()) {
+        log(log_level::warning, "continues without a task: " + refusal_.why);
     }
     return std::nullopt;
 }
@@ -235,9 +230,7 @@ std::int32_t loaded_plugin::add_task(const cles_task& added) {
         return CLES_TOO_LATE;
     }
     const auto refuse = [&](std::int32_t code, std::string why) {
-        if (refusal_.empty()) {
-            refusal_ = std::move(why);
-        }
+        note_refusal({.why = std::move(why), .setting = std::nullopt});
         return code;
     };
     const std::string name{view_of(added.name)};
@@ -246,40 +239,31 @@ std::int32_t loaded_plugin::add_task(const cles_task& added) {
     }
     const auto verb = static_cast<cles::verb>(added.verb);
     const auto what = std::string{to_string(verb)} + " '" + name + "'";
-    const bool inline_ok = (added.flags & CLES_TASK_INLINE_OK) != 0;
     if (verb != verb::bind && added.start == nullptr) {
         return refuse(CLES_BAD_TASK, what + " has no handler");
     }
-    const auto same = [&](const auto& t) { return t->what.verb == verb && t->what.task == name; };
+    const auto same = [&](const auto& t) { return t.verb == verb && t.task == name; };
     if (std::any_of(tasks_.begin(), tasks_.end(), same)) {
         return refuse(CLES_TASK_EXISTS, what + " is added twice");
     }
     if (const auto owner = (*owner_of_)(verb, name)) {
         return refuse(CLES_TASK_EXISTS, what + " is already provided by " + *owner);
     }
-    task_info info{.description = std::string{view_of(added.description)},
-                   .idempotent = (added.flags & CLES_TASK_IDEMPOTENT) != 0,
-                   .inline_ok = inline_ok};
+    registration task{.verb = verb,
+                      .task = name,
+                      .info = {.description = std::string{view_of(added.description)},
+                               .idempotent = (added.flags & CLES_TASK_IDEMPOTENT) != 0,
+                               .inline_ok = (added.flags & CLES_TASK_INLINE_OK) != 0}};
     for (std::size_t i = 0; i < added.parameter_count; ++i) {
-        info.parameters.emplace_back(view_of(added.parameters[i]));
+        task.info.parameters.emplace_back(view_of(added.parameters[i]));
     }
-    tasks_.push_back(std::make_unique<task>(
-        task{this, {.verb = verb, .task = name, .info = std::move(info)}, added.start, added.user}));
+    if (added.start != nullptr) { // without a handler it can only be bound
+        task.async = [this, handler = added.start, user = added.user](const request& r, const responder& answer) {
+            run(handler, user, r, answer);
+        };
+    }
+    tasks_.push_back(std::move(task));
     return CLES_ADDED;
-}
-
-std::vector<registration> loaded_plugin::tasks() const {
-    std::vector<registration> out;
-    for (const auto& t : tasks_) {
-        auto entry = t->what;
-        if (t->start != nullptr) { // without a handler it can only be bound
-            entry.async = [t = t.get()](const request& what, const responder& answer) {
-                t->plugin->run(*t, what, answer);
-            };
-        }
-        out.push_back(std::move(entry));
-    }
-    return out;
 }
 
 void loaded_plugin::stop() noexcept {
@@ -305,7 +289,7 @@ void loaded_plugin::throw_refusal() const {
     throw error(errc::busy, "too many jobs of plugins are running");
 }
 
-void loaded_plugin::run(const task& t, const request& what, const responder& answer) {
+void loaded_plugin::run(task_handler handler, void* user, const request& what, const responder& answer) {
     if (closed_) {
         throw_refusal();
     }
@@ -320,11 +304,11 @@ void loaded_plugin::run(const task& t, const request& what, const responder& ans
             }
         });
     }
-    call_start(t, what, job);
+    call_handler(handler, user, what, job);
     jobs_.started(job);
 }
 
-void loaded_plugin::call_start(const task& t, const request& what, plugin_jobs::id job) const {
+void loaded_plugin::call_handler(task_handler handler, void* user, const request& what, plugin_jobs::id job) const {
     std::array<cles_text, max_parameters> parameters{};
     const auto given = what.parameters();
     const auto count = std::min(given.size(), parameters.size());
@@ -351,7 +335,7 @@ void loaded_plugin::call_start(const task& t, const request& what, plugin_jobs::
         jobs_.finish(job, [](const responder& to) { to.fail(errc::failed, "the handler failed"); });
     };
     try {
-        t.start(t.user, job, &asked);
+        handler(user, job, &asked);
     } catch (const std::exception& e) {
         report_exception(std::string{"'"} + e.what() + "'");
     } catch (...) {

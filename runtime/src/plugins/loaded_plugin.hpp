@@ -12,11 +12,11 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::runtime {
@@ -51,7 +51,7 @@ class loaded_plugin {
     /// Starts the plugin, which adds its tasks. Returns why it cannot be used, if so.
     std::optional<refusal> start(const std::string& config, publisher updates, const owner_lookup& owner_of);
     /// The tasks that it added, to be registered. Their requests are refused after `close`.
-    [[nodiscard]] std::vector<registration> tasks() const;
+    [[nodiscard]] std::vector<registration> take_tasks() noexcept { return std::move(tasks_); }
     /// Starts no further jobs.
     void close() noexcept { closed_ = true; }
     /// Stops the plugin. May take long, or never return.
@@ -62,12 +62,7 @@ class loaded_plugin {
     [[nodiscard]] bool has_stopped() const noexcept { return stopped_; }
 
   private:
-    struct task {
-        loaded_plugin* plugin;
-        registration what; // without handlers
-        void (*start)(void*, cles_job, const cles_request*);
-        void* user;
-    };
+    using task_handler = decltype(cles_task::start);
 
     // `functions` is passed to the plugin. It is the first member, so that a function of the host finds the other.
     struct host_functions {
@@ -79,13 +74,14 @@ class loaded_plugin {
     std::int32_t add_task(const cles_task& added);
     template <class F>
     std::optional<refusal> run_guarded(const char* what, F&& call);
+    void note_refusal(refusal what);
     [[noreturn]] void throw_refusal() const;
-    void run(const task& t, const request& what, const responder& answer);
-    void call_start(const task& t, const request& what, plugin_jobs::id job) const;
+    void run(task_handler handler, void* user, const request& what, const responder& answer);
+    void call_handler(task_handler handler, void* user, const request& what, plugin_jobs::id job) const;
+    void finish(plugin_jobs::id job, std::function<void(const responder&)> answer);
     void delegate(plugin_jobs::id job, std::string_view command, const cles_ask& ask);
     void call_on_other_thread(std::function<void()> callback);
     void log(log_level level, std::string_view text) const;
-    void report_unknown_job();
 
     const cles_plugin description_;
     const std::string name_;
@@ -97,11 +93,10 @@ class loaded_plugin {
     plugin_log log_;
     host_functions host_;
     std::optional<publisher> updates_;
-    std::vector<std::unique_ptr<task>> tasks_;
+    std::vector<registration> tasks_;
     const owner_lookup* owner_of_ = nullptr; ///< while it starts
     bool may_refuse_ = false;                ///< while it starts or checks its settings
-    std::string refusal_;                    ///< why a task was refused, or the plugin's own message
-    std::optional<std::string> refused_setting_;
+    refusal refusal_{};                      ///< why a task was refused, or the plugin's own message
     std::atomic<bool> closed_{false};
     std::atomic<bool> stopped_{true};
     std::atomic<bool> unknown_job_reported_{false};

@@ -6,7 +6,6 @@
 #include <cles/plugin_text.hpp>
 
 #include "plugins/plugin_library.hpp"
-#include "plugins/plugin_search.hpp"
 #include "plugins/plugin_trial.hpp"
 
 #include <algorithm>
@@ -34,7 +33,7 @@ struct plugin_host::state {
     plugin_jobs jobs;
     stop_notifier notifier; ///< for inline jobs; a pool has its own
     std::vector<std::unique_ptr<loaded_plugin>> plugins;
-    std::vector<boost::dll::shared_library> libraries;
+    std::vector<std::shared_ptr<const boost::dll::shared_library>> libraries;
     std::vector<const cles_plugin*> descriptions; ///< of the loaded ones, to detect duplicates
 
     // Used by the thread that stops them.
@@ -57,7 +56,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
         try_plugin(path, file, options_.node, config, options_.trial);
     }
     auto library = open_library(path, file);
-    const auto& described = describe_plugin(path, library);
+    const auto& described = describe_plugin(path, *library);
     if (std::find(state_->descriptions.begin(), state_->descriptions.end(), &described) != state_->descriptions.end()) {
         throw plugin_error(path, "it is already loaded");
     }
@@ -82,7 +81,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
     }
     plugin_info info{.path = path, .name = plugin.name(), .version = plugin.version()};
     try {
-        for (auto& task : plugin.tasks()) {
+        for (auto& task : plugin.take_tasks()) {
             info.tasks.push_back(std::string{to_string(task.verb)} + " " + task.task);
             into.add(std::move(task));
         }
@@ -96,7 +95,7 @@ void plugin_host::load(const std::string& path, const std::string& config, regis
 }
 
 plugin_figures plugin_host::figures() const {
-    return {.jobs = state_->jobs.size(), .answered_twice = state_->jobs.unknown_answers()};
+    return {.loaded = plugins_.size(), .jobs = state_->jobs.size(), .answered_twice = state_->jobs.unknown_answers()};
 }
 
 plugin_stop_report plugin_host::stop(std::chrono::milliseconds limit) {

@@ -5,7 +5,9 @@
 
 #include "jobs/stop_notifier.hpp"
 #include "plugins/loaded_plugin.hpp"
-#include "plugins/plugin_search.hpp"
+#include "plugins/plugin_library.hpp"
+
+#include <boost/describe/class.hpp>
 
 #include <chrono>
 #include <cstddef>
@@ -41,9 +43,11 @@ struct plugin_stop_report {
 };
 
 struct plugin_figures {
-    std::size_t jobs = 0;             ///< without an answer
+    std::uint64_t loaded = 0;
+    std::uint64_t jobs = 0;           ///< without an answer
     std::uint64_t answered_twice = 0; ///< answers to jobs that did not exist (any more)
 };
+BOOST_DESCRIBE_STRUCT(plugin_figures, (), (loaded, jobs, answered_twice))
 
 /// Loads plugins (docs/plugins.md) and registers their tasks.
 ///

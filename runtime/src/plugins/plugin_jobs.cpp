@@ -11,18 +11,22 @@
 namespace cles::runtime {
 namespace {
 
+using detail::abi_text;
+
 // Posts the use of a responder, which is released there, too.
 void post_to(responder to, std::function<void(const responder&)> use) {
     const auto executor = to.get_executor();
     boost::asio::post(executor, [to = std::move(to), use = std::move(use)] { use(to); });
 }
 
-// \param name of the error, as static text
-void deliver(decltype(cles_ask::answered) call, void* user, std::string_view name, std::string_view json,
-             std::string_view message) noexcept {
-    try {
-        call(user, detail::abi_text(name), detail::abi_text(json), detail::abi_text(message));
-    } catch (...) { // ignore errors of the plugin
+// Errors of the plugin are ignored.
+template <class... Parameters, class... Arguments>
+void call_plugin(void (*function)(Parameters...), Arguments... arguments) noexcept {
+    if (function != nullptr) {
+        try {
+            function(arguments...);
+        } catch (...) { // ignored
+        }
     }
 }
 
@@ -30,21 +34,11 @@ void deliver(decltype(cles_ask::answered) call, void* user, std::string_view nam
 
 // -- callbacks -----------------------------------------------------------------------------------------------------
 
-plugin_callback::~plugin_callback() {
-    if (drop_ != nullptr) {
-        try {
-            drop_(user_);
-        } catch (...) { // ignore errors of the plugin
-        }
-    }
-}
+plugin_callback::state::~state() { call_plugin(drop, user); }
 
-void plugin_callback::operator()() {
-    if (const auto call = std::exchange(call_, nullptr); call != nullptr) {
-        try {
-            call(user_);
-        } catch (...) { // ignore errors of the plugin
-        }
+void plugin_callback::operator()() const {
+    if (state_) {
+        call_plugin(state_->call.exchange(nullptr), state_->user);
     }
 }
 
@@ -52,15 +46,11 @@ void plugin_callback::operator()() {
 
 // A handle consists of a slot's number and generation, so that an old handle is invalid for the slot's next job.
 plugin_jobs::slot* plugin_jobs::find(id job) noexcept {
-    return const_cast<slot*>(std::as_const(*this).find(job)); // NOLINT(cppcoreguidelines-pro-type-const-cast)
-}
-
-const plugin_jobs::slot* plugin_jobs::find(id job) const noexcept {
     const auto index = static_cast<std::size_t>(job & 0xFFFFFFFFU);
     if (index >= slots_.size()) {
         return nullptr;
     }
-    const auto& s = slots_[index];
+    auto& s = slots_[index];
     return s.answer && s.generation == job >> 32U ? &s : nullptr;
 }
 
@@ -152,15 +142,14 @@ bool plugin_jobs::use(id job, std::function<void(const responder&)> use) {
     return true;
 }
 
-bool plugin_jobs::stopped(id job) const {
+bool plugin_jobs::stopped(id job) {
     const std::scoped_lock lock{mutex_};
     const auto* s = find(job);
     return s == nullptr || s->stopped || (s->thread_safe && s->answer->stopped());
 }
 
 void plugin_jobs::on_stop(id job, plugin_callback callback) {
-    shared_callback wanted{std::move(callback)};
-    shared_callback replaced; // destroyed without the lock
+    plugin_callback replaced; // destroyed without the lock
     std::optional<responder> by;
     {
         const std::scoped_lock lock{mutex_};
@@ -172,20 +161,20 @@ void plugin_jobs::on_stop(id job, plugin_callback callback) {
             if (s->thread_safe) {
                 by = s->answer;
             }
-            replaced = std::exchange(s->on_stop, wanted);
+            replaced = std::exchange(s->on_stop, callback);
             if (!by) {
-                wanted = {}; // `stop` returns it
+                callback = {}; // `stop` returns it
             }
         }
     }
     if (by) {
-        by->on_stop([wanted] { wanted(); });
+        by->on_stop([callback] { callback(); });
     } else {
-        wanted();
+        callback();
     }
 }
 
-shared_callback plugin_jobs::stop(id job) {
+plugin_callback plugin_jobs::stop(id job) {
     const std::scoped_lock lock{mutex_};
     auto* s = find(job);
     if (s == nullptr) {
@@ -197,7 +186,7 @@ shared_callback plugin_jobs::stop(id job) {
 
 // -- close ---------------------------------------------------------------------------------------------------------
 
-std::vector<shared_callback> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
+std::vector<plugin_callback> plugin_jobs::close(const std::function<void(const responder&)>& answer) {
     std::vector<slot> gone;
     {
         const std::scoped_lock lock{mutex_};
@@ -208,7 +197,7 @@ std::vector<shared_callback> plugin_jobs::close(const std::function<void(const r
             }
         }
     }
-    std::vector<shared_callback> callbacks;
+    std::vector<plugin_callback> callbacks;
     for (auto& s : gone) {
         answer(*s.answer);
         callbacks.push_back(std::move(s.on_stop));
@@ -245,21 +234,20 @@ void plugin_request::complete(boost::system::error_code code, std::string_view j
     const auto result = code ? std::string_view{"{}"} : json;
     try {
         if (sending_thread_.load() == std::this_thread::get_id()) {
-            call_later_([call = answered_, user = user_, name, result = std::string{result},
-                         text = std::string{message}] { deliver(call, user, name, result, text); });
+            call_later_(
+                [call = answered_, user = user_, name, result = std::string{result}, text = std::string{message}] {
+                    call_plugin(call, user, abi_text(name), abi_text(result), abi_text(text));
+                });
             return;
         }
     } catch (...) { // no memory or no thread: better now than never
     }
-    deliver(answered_, user_, name, result, message);
+    call_plugin(answered_, user_, abi_text(name), abi_text(result), abi_text(message));
 }
 
 void plugin_request::report_progress(double fraction, std::string_view json) noexcept {
-    if (progress_ != nullptr && !completed_) {
-        try {
-            progress_(user_, fraction, detail::abi_text(json));
-        } catch (...) { // ignore errors of the plugin
-        }
+    if (!completed_) {
+        call_plugin(progress_, user_, fraction, abi_text(json));
     }
 }
 

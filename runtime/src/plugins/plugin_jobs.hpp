@@ -20,51 +20,29 @@
 
 namespace cles::runtime {
 
-/// A callback of a plugin: called at most once, then dropped.
+/// A callback of a plugin: called by one of its holders at most, and dropped by the last.
 class plugin_callback {
   public:
     using function = void (*)(void*);
 
     plugin_callback() = default;
-    plugin_callback(function call, function drop, void* user) noexcept : call_(call), drop_(drop), user_(user) {}
-    plugin_callback(plugin_callback&& other) noexcept
-        : call_(std::exchange(other.call_, nullptr)), drop_(std::exchange(other.drop_, nullptr)), user_(other.user_) {}
-    plugin_callback& operator=(plugin_callback other) noexcept {
-        std::swap(call_, other.call_);
-        std::swap(drop_, other.drop_);
-        std::swap(user_, other.user_);
-        return *this;
-    }
-    ~plugin_callback();
+    plugin_callback(function call, function drop, void* user) : state_(std::make_shared<state>(call, drop, user)) {}
 
-    void operator()();
+    void operator()() const;
+    [[nodiscard]] explicit operator bool() const noexcept { return state_ != nullptr; }
 
   private:
-    function call_ = nullptr;
-    function drop_ = nullptr;
-    void* user_ = nullptr;
-};
+    struct state {
+        state(function c, function d, void* u) noexcept : call(c), drop(d), user(u) {}
+        state(const state&) = delete;
+        state& operator=(const state&) = delete;
+        ~state();
 
-/// A callback with several holders, of whom only the first call counts.
-class shared_callback {
-  public:
-    shared_callback() = default;
-    explicit shared_callback(plugin_callback what) : shared_(std::make_shared<shared_state>(std::move(what))) {}
-
-    void operator()() const {
-        if (shared_ && !shared_->called.exchange(true)) {
-            shared_->what();
-        }
-    }
-    [[nodiscard]] explicit operator bool() const noexcept { return shared_ != nullptr; }
-
-  private:
-    struct shared_state {
-        explicit shared_state(plugin_callback w) : what(std::move(w)) {}
-        plugin_callback what;
-        std::atomic<bool> called{false};
+        std::atomic<function> call; ///< null once it has been called
+        function drop;
+        void* user;
     };
-    std::shared_ptr<shared_state> shared_;
+    std::shared_ptr<state> state_;
 };
 
 /// The open jobs of plugins, by their handles.
@@ -96,15 +74,15 @@ class plugin_jobs {
     /// Calls `use` with the responder of a job, now or soon. False if there is no such job.
     bool use(id job, std::function<void(const responder&)> use);
     /// Whether its requester does not wait for it any more.
-    [[nodiscard]] bool stopped(id job) const;
+    [[nodiscard]] bool stopped(id job);
     /// Calls back when the job is stopped; at once if it has been.
     void on_stop(id job, plugin_callback callback);
     /// An inline job is stopped. Returns its `on_stop` callback, to be called on a thread where it may take long.
-    [[nodiscard]] shared_callback stop(id job);
+    [[nodiscard]] plugin_callback stop(id job);
 
     /// Ends all jobs with `answer`, and accepts no more. Returns their `on_stop` callbacks, to be called on a thread
     /// where they may take long. Nothing is posted after it returns.
-    std::vector<shared_callback> close(const std::function<void(const responder&)>& answer);
+    std::vector<plugin_callback> close(const std::function<void(const responder&)>& answer);
 
     [[nodiscard]] std::size_t size() const;
     /// How many answers were for jobs that do not exist (any more).
@@ -117,10 +95,9 @@ class plugin_jobs {
         bool thread_safe = false; ///< any thread may use the responder
         std::thread::id starting_thread{};
         std::optional<responder> answer{};
-        shared_callback on_stop{};
+        plugin_callback on_stop{};
     };
     [[nodiscard]] slot* find(id job) noexcept;
-    [[nodiscard]] const slot* find(id job) const noexcept;
     [[nodiscard]] static bool is_direct(const slot& s) noexcept {
         return s.thread_safe || s.starting_thread == std::this_thread::get_id();
     }

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "plugins/plugin_library.hpp"
 
-#include "plugins/plugin_search.hpp"
+// With the standard library's file system no further library of Boost is linked.
+#ifndef BOOST_DLL_USE_STD_FS
+#define BOOST_DLL_USE_STD_FS
+#endif
+#include <boost/dll/shared_library.hpp>
 
 #include <cstddef>
 #include <exception>
@@ -10,6 +14,74 @@
 #include <dlfcn.h>
 
 namespace cles::runtime {
+
+// -- search --------------------------------------------------------------------------------------------------------
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// A relative path begins at the folder of the configuration file.
+fs::path from_config(const config& setup, const fs::path& path) {
+    return path.is_absolute() || setup.file.empty() ? path
+                                                    : (fs::path{setup.file}.parent_path() / path).lexically_normal();
+}
+
+} // namespace
+
+const char* const installed_plugins = CLES_INSTALLED_PLUGINS;
+
+fs::path find_plugin(const std::string& path, const std::vector<fs::path>& folders) {
+    std::error_code ignored;
+    if (path.empty()) {
+        throw plugin_error("''", "the path is empty");
+    }
+    if (fs::path{path}.has_parent_path()) {
+        if (!fs::exists(path, ignored)) {
+            throw plugin_error(path, "there is no such file");
+        }
+        return path;
+    }
+    std::string searched;
+    for (const auto& folder : folders) {
+        if (fs::exists(folder / path, ignored)) {
+            return folder / path;
+        }
+        searched += (searched.empty() ? "" : ", ") + folder.string();
+    }
+    throw plugin_error(path, searched.empty() ? "there are no folders to search for plugins"
+                                              : "there is no such file in " + searched);
+}
+
+std::vector<fs::path> default_plugin_folders(const fs::path& program, const fs::path& installed) {
+    const auto folder = program.parent_path();
+    return {(folder / installed).lexically_normal(), (folder / ".." / "plugins").lexically_normal()};
+}
+
+std::string resolve_plugin_path(const config& setup, const plugin_config& wanted) {
+    const fs::path path{wanted.path};
+    if (!path.has_parent_path()) {
+        return wanted.path;
+    }
+    const auto file = from_config(setup, path);
+    return file.has_parent_path() ? file.string() : "./" + file.string();
+}
+
+std::vector<fs::path> plugin_search_path(const config& setup) {
+    std::vector<fs::path> folders;
+    for (const auto& folder : setup.plugin_path) {
+        folders.push_back(from_config(setup, folder));
+    }
+    std::error_code unknown;
+    if (const auto program = fs::read_symlink("/proc/self/exe", unknown); !unknown) {
+        const auto own = default_plugin_folders(program);
+        folders.insert(folders.end(), own.begin(), own.end());
+    }
+    return folders;
+}
+
+// -- load ----------------------------------------------------------------------------------------------------------
+
 namespace {
 
 using entry_function = const cles_plugin*();
@@ -61,10 +133,10 @@ void check_version(const std::string& path, const cles_plugin& described) {
 
 } // namespace
 
-boost::dll::shared_library open_library(const std::string& path, const std::filesystem::path& file) {
-    boost::dll::shared_library library;
+std::shared_ptr<const boost::dll::shared_library> open_library(const std::string& path, const fs::path& file) {
+    auto library = std::make_shared<boost::dll::shared_library>();
     std::error_code failed;
-    library.load(file, failed, boost::dll::load_mode::rtld_now);
+    library->load(file, failed, boost::dll::load_mode::rtld_now);
     if (failed) {
         const char* why = ::dlerror();
         throw plugin_error(path, std::string{"it cannot be loaded: "} + (why == nullptr ? "" : why));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <csignal>
 #include <cstdlib>
 #include <string_view>
@@ -13,8 +14,7 @@
 namespace cles::runtime {
 namespace {
 
-constexpr std::array crashes{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGSYS};
-constexpr std::array requests{SIGTERM, SIGINT};
+constexpr std::array signals{SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGABRT, SIGSYS, SIGALRM, SIGTERM, SIGINT};
 constexpr std::size_t alternate_stack = 65536;
 
 // Read by signal handlers; not changed while signals may arrive.
@@ -23,9 +23,7 @@ struct {
     std::size_t size;
     int code;
     volatile sig_atomic_t active;
-    std::array<struct sigaction, crashes.size()> crash_before;
-    std::array<struct sigaction, requests.size()> request_before;
-    struct sigaction alarm_before;
+    std::array<struct sigaction, signals.size()> before;
     stack_t stack_before;
     std::array<char, alternate_stack> stack; // for stack overflows
 } guard_state;
@@ -44,12 +42,9 @@ void write_out(std::string_view text) {
 
 void on_crash(int number) {
     std::array<char, 32> text{"ends the process by signal "};
-    auto at = std::find(text.begin(), text.end(), '\0');
-    if (number >= 10) {
-        *at++ = static_cast<char>('0' + number / 10);
-    }
-    *at++ = static_cast<char>('0' + number % 10);
-    exit_with({text.data(), static_cast<std::size_t>(at - text.begin())});
+    const auto digits = std::find(text.begin(), text.end(), '\0');
+    const auto [end, code] = std::to_chars(digits, text.end(), number);
+    exit_with({text.data(), static_cast<std::size_t>(end - text.data())});
 }
 
 void on_timeout(int) { exit_with("does not end"); }
@@ -57,6 +52,15 @@ void on_timeout(int) { exit_with("does not end"); }
 void on_exit() {
     if (guard_state.active != 0) {
         exit_with("ends the process");
+    }
+}
+
+auto handler_of(int number) -> void (*)(int) {
+    switch (number) {
+    case SIGALRM: return on_timeout;
+    case SIGTERM:
+    case SIGINT: return SIG_DFL;
+    default: return on_crash;
     }
 }
 
@@ -77,15 +81,9 @@ plugin_start_guard::plugin_start_guard(const std::string& who, int exit_code, st
     ::sigaltstack(&stack, &guard_state.stack_before);
     struct sigaction action {};
     action.sa_flags = SA_ONSTACK;
-    action.sa_handler = on_crash;
-    for (std::size_t i = 0; i < crashes.size(); ++i) {
-        ::sigaction(crashes[i], &action, &guard_state.crash_before[i]);
-    }
-    action.sa_handler = on_timeout;
-    ::sigaction(SIGALRM, &action, &guard_state.alarm_before);
-    action.sa_handler = SIG_DFL;
-    for (std::size_t i = 0; i < requests.size(); ++i) {
-        ::sigaction(requests[i], &action, &guard_state.request_before[i]);
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+        action.sa_handler = handler_of(signals[i]);
+        ::sigaction(signals[i], &action, &guard_state.before[i]);
     }
     set_time_limit(limit);
 }
@@ -93,13 +91,9 @@ plugin_start_guard::plugin_start_guard(const std::string& who, int exit_code, st
 plugin_start_guard::~plugin_start_guard() {
     set_time_limit(std::chrono::seconds{0});
     guard_state.active = 0;
-    for (std::size_t i = 0; i < crashes.size(); ++i) {
-        ::sigaction(crashes[i], &guard_state.crash_before[i], nullptr);
+    for (std::size_t i = 0; i < signals.size(); ++i) {
+        ::sigaction(signals[i], &guard_state.before[i], nullptr);
     }
-    for (std::size_t i = 0; i < requests.size(); ++i) {
-        ::sigaction(requests[i], &guard_state.request_before[i], nullptr);
-    }
-    ::sigaction(SIGALRM, &guard_state.alarm_before, nullptr);
     ::sigaltstack(&guard_state.stack_before, nullptr);
 }
 

@@ -6,7 +6,6 @@
 #include "config/config.hpp"
 #include "plugins/loaded_plugin.hpp"
 #include "plugins/plugin_library.hpp"
-#include "plugins/plugin_search.hpp"
 
 #include <algorithm>
 #include <array>
@@ -14,6 +13,7 @@
 #include <chrono>
 #include <csignal>
 #include <exception>
+#include <optional>
 #include <string_view>
 #include <system_error>
 #include <utility>
@@ -32,28 +32,18 @@ namespace {
 // The child's exit codes. Unusual numbers, because a library that ends the process may use any, including 0.
 constexpr int usable = 123;
 constexpr int refused = 124;
+constexpr int refused_setting = 125;
 constexpr std::chrono::seconds trial_limit{10}; // for loading a plugin and its settings check
 constexpr std::size_t max_output = 2000;        // its last bytes, which say why it ended
 constexpr std::size_t max_read = 256 * 1024;
 // Small enough for the pipe to take a report at once, before it is read.
 constexpr std::size_t max_report = 2000;
 
-// The report of the child: a character at the beginning of each step; then, if the plugin is refused, a line with the
-// key of the invalid setting, and a line with the reason.
-constexpr char loading = 'l';
-constexpr char describing = 'd';
-constexpr char checking = 'c';
-constexpr char blames_setting = 's';
-constexpr char blames_plugin = 'p';
-constexpr std::string_view verdict_marks{"sp"};
-
-std::string_view step_name(char step) {
-    switch (step) {
-    case describing: return "its entry point";
-    case checking: return "its settings check";
-    default: return "its initialization";
-    }
-}
+// The report of the child: a line for each step that has begun; then, if the plugin is refused, a null character and
+// the reason. The reason follows a line with the key of the invalid setting, if the exit code says so.
+constexpr auto loading = "its initialization";
+constexpr auto describing = "its entry point";
+constexpr auto checking = "its settings check";
 
 class descriptor {
   public:
@@ -77,8 +67,11 @@ void write_all(int to, std::string_view text) {
 }
 
 // As in a new process: without the parent's signal handling, and without a core dump if it crashes.
-void reset_process_state(int output) {
+void reset_process_state(pid_t parent, int output) {
     ::prctl(PR_SET_PDEATHSIG, SIGKILL); // it may hang, and the parent may be killed before it kills the child
+    if (::getppid() != parent) {
+        ::_exit(refused); // it has been killed already
+    }
     for (const int number : {SIGABRT, SIGSEGV, SIGBUS, SIGILL, SIGFPE, SIGTERM, SIGINT, SIGHUP, SIGPIPE, SIGCHLD}) {
         ::signal(number, SIG_DFL);
     }
@@ -92,18 +85,18 @@ void reset_process_state(int output) {
 }
 
 // In the child. Ends it without exit handlers, which belong to the parent.
-[[noreturn]] void run_child(const std::filesystem::path& file, const std::string& node, const std::string& config,
-                            int output, int report) {
-    reset_process_state(output);
-    char step = loading;
-    const auto begin_step = [&](char next) {
+[[noreturn]] void run_child(pid_t parent, const std::filesystem::path& file, const std::string& node,
+                            const std::string& config, int output, int report) {
+    reset_process_state(parent, output);
+    std::string step;
+    const auto begin_step = [&](const char* next) {
         step = next;
-        write_all(report, {&step, 1});
+        write_all(report, "\n" + step);
     };
     try {
         begin_step(loading);
         // Never unloaded, as in the daemon.
-        const auto* library = new boost::dll::shared_library{open_library("", file)};
+        const auto& library = *new auto{open_library("", file)};
         begin_step(describing);
         const auto& described = describe_plugin("", *library);
         begin_step(checking);
@@ -116,10 +109,10 @@ void reset_process_state(int output) {
         ::_exit(usable);
     } catch (const plugin_error& e) {
         const std::string why{std::string_view{e.what()}.substr(2)}; // without the path, which the parent adds
-        write_all(report, (e.setting() ? blames_setting + *e.setting() : std::string{blames_plugin}) + "\n" + why);
+        write_all(report, '\0' + (e.setting() ? *e.setting() + "\n" : "") + why);
+        ::_exit(e.setting() ? refused_setting : refused);
     } catch (const std::exception& failed) {
-        const std::string what{step_name(step)};
-        write_all(report, blames_plugin + ("\n" + what) + " threw: " + failed.what());
+        write_all(report, '\0' + step + " threw: " + failed.what());
     }
     ::_exit(refused);
 }
@@ -196,10 +189,6 @@ std::string single_line(std::string text) {
     return text;
 }
 
-std::string with_output(std::string text, const std::string& output) {
-    return output.empty() ? text : text + ": " + output;
-}
-
 // Waits for the child. When the time is up, kills it and returns false.
 bool wait_for_end(pid_t child, int from, std::string& output, std::chrono::steady_clock::time_point end, int& status) {
     bool ended = false;
@@ -229,26 +218,31 @@ std::string read_report(int from) {
     return {all.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0))};
 }
 
-[[noreturn]] void refuse(const std::string& path, std::string_view report) {
-    const auto begin = report.find_first_of(verdict_marks);
-    const auto end = report.find('\n');
-    if (begin == std::string_view::npos || end == std::string_view::npos || end < begin) {
+[[noreturn]] void refuse(const std::string& path, std::string_view why, bool blames_setting) {
+    if (why.empty()) {
         throw plugin_error(path, "its trial failed without a message");
     }
-    const auto why = single_line(std::string{report.substr(end + 1)});
-    if (report[begin] == blames_setting) {
-        throw plugin_error(path, why, single_line(std::string{report.substr(begin + 1, end - begin - 1)}));
+    std::optional<std::string> setting;
+    if (blames_setting) {
+        const auto end = std::min(why.find('\n'), why.size());
+        setting = single_line(std::string{why.substr(0, end)});
+        why.remove_prefix(std::min(end + 1, why.size()));
     }
-    throw plugin_error(path, why);
+    throw plugin_error(path, single_line(std::string{why}), setting);
 }
 
-std::array<int, 2> make_pipe() {
+struct pipe_ends {
+    descriptor from;
+    descriptor into;
+};
+
+pipe_ends make_pipe() {
     std::array<int, 2> ends{};
     // Only the reader's end is non-blocking, so that no output of the child is lost.
     if (::pipe2(ends.data(), O_CLOEXEC) != 0 || ::fcntl(ends[0], F_SETFL, O_NONBLOCK) != 0) {
         throw std::system_error(errno, std::generic_category(), "cannot create a pipe");
     }
-    return ends;
+    return {descriptor{ends[0]}, descriptor{ends[1]}};
 }
 
 } // namespace
@@ -256,40 +250,41 @@ std::array<int, 2> make_pipe() {
 void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
                 const std::string& config, std::chrono::milliseconds limit) {
     const auto end = std::chrono::steady_clock::now() + limit;
-    const auto output_ends = make_pipe();
-    descriptor from{output_ends[0]};
-    descriptor into{output_ends[1]};
-    const auto report_ends = make_pipe();
-    const descriptor report_from{report_ends[0]};
-    descriptor report_into{report_ends[1]};
+    auto output_pipe = make_pipe();
+    auto report_pipe = make_pipe();
+    const auto parent = ::getpid();
     const auto child = ::fork();
     if (child < 0) {
         throw std::system_error(errno, std::generic_category(), "cannot start a process");
     }
     if (child == 0) {
-        run_child(file, node, config, into.get(), report_into.get());
+        run_child(parent, file, node, config, output_pipe.into.get(), report_pipe.into.get());
     }
-    into.close();
-    report_into.close();
+    output_pipe.into.close();
+    report_pipe.into.close();
     std::string output;
     int status = 0;
-    const bool ended = wait_for_end(child, from.get(), output, end, status);
+    const bool ended = wait_for_end(child, output_pipe.from.get(), output, end, status);
     output = single_line(std::move(output));
-    const auto report = read_report(report_from.get());
-    const auto steps = report.substr(0, report.find_first_of(verdict_marks));
-    const std::string what{step_name(steps.empty() ? loading : steps.back())};
+    const auto report = read_report(report_pipe.from.get());
+    const auto steps = report.substr(0, report.find('\0'));
+    const auto step = steps.empty() ? loading : steps.substr(steps.rfind('\n') + 1);
+    const auto fail = [&](const std::string& how) {
+        throw plugin_error(path, step + how + (output.empty() ? "" : ": " + output));
+    };
     if (!ended) {
-        throw plugin_error(path, with_output(what + " does not end", output));
+        fail(" does not end");
     }
     if (WIFSIGNALED(status)) {
-        throw plugin_error(
-            path, with_output(what + " ends the process by signal " + std::to_string(WTERMSIG(status)), output));
+        fail(" ends the process by signal " + std::to_string(WTERMSIG(status)));
     }
-    if (WEXITSTATUS(status) == refused) {
-        refuse(path, report);
+    const auto code = WEXITSTATUS(status);
+    if (code == refused || code == refused_setting) {
+        refuse(path, std::string_view{report}.substr(std::min(steps.size() + 1, report.size())),
+               code == refused_setting);
     }
-    if (WEXITSTATUS(status) != usable) {
-        throw plugin_error(path, with_output(what + " ends the process", output));
+    if (code != usable) {
+        fail(" ends the process");
     }
 }
 

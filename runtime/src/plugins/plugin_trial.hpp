@@ -2,7 +2,7 @@
 #pragma once
 
 #include "config/config.hpp"
-#include "plugins/plugin_search.hpp"
+#include "plugins/plugin_library.hpp"
 
 #include <chrono>
 #include <cstddef>

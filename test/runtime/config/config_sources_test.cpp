@@ -54,7 +54,7 @@ BOOST_AUTO_TEST_CASE(flags_override_the_environment_the_file_and_the_defaults) {
     BOOST_TEST(load(sources).node == "from_file");
     variables["CLES_NODE"] = "from_environment";
     BOOST_TEST(load(sources).node == "from_environment");
-    sources.flags.node = {"from_flag", "--node"};
+    sources.flags.push_back({"node", {"from_flag"}, "--node"});
     const auto all = load(sources);
     BOOST_TEST(all.node == "from_flag");
     BOOST_TEST(all.queue == 7U);

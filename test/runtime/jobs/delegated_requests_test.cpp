@@ -17,7 +17,6 @@ BOOST_AUTO_TEST_SUITE(delegated_requests)
 using namespace cles::test;
 using namespace std::chrono_literals;
 using cles::errc;
-using cles::runtime::job_context;
 
 // Two nodes that know each other, with one worker each.
 struct fixture {
@@ -74,7 +73,7 @@ BOOST_FIXTURE_TEST_CASE(a_callback_runs_on_a_worker_and_not_beside_its_job, fixt
     notes order;
     std::atomic<bool> on_io{false};
     const auto io_thread = std::this_thread::get_id();
-    left.tasks->add_work(cles::verb::delegate, "asking", {}, [&](const job_context& job) {
+    left.add("asking", [&](const cles::responder& job) {
         const auto inside = std::make_shared<std::atomic<int>>(1);
         const auto left_to_come = std::make_shared<std::atomic<int>>(3);
         for (int i = 0; i < 3; ++i) {
@@ -97,7 +96,7 @@ BOOST_FIXTURE_TEST_CASE(a_callback_runs_on_a_worker_and_not_beside_its_job, fixt
 }
 
 BOOST_FIXTURE_TEST_CASE(an_exception_from_a_callback_is_the_answer, fixture) {
-    left.tasks->add_work(cles::verb::delegate, "asking", {}, [](const job_context& job) {
+    left.add("asking", [](const cles::responder& job) {
         job.delegate("PULL right:nothing", {}, [job](boost::system::error_code code, auto, auto why) {
             throw cles::error(code, std::string{why});
         });
@@ -107,9 +106,8 @@ BOOST_FIXTURE_TEST_CASE(an_exception_from_a_callback_is_the_answer, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_whose_callback_does_not_answer_fails, fixture) {
-    left.tasks->add_work(cles::verb::delegate, "asking", {}, [](const job_context& job) {
-        job.delegate("PULL right:nothing", {}, [](auto, auto, auto) {});
-    });
+    left.add("asking",
+             [](const cles::responder& job) { job.delegate("PULL right:nothing", {}, [](auto, auto, auto) {}); });
     BOOST_TEST(left.peer().ask("DELEGATE self:asking") ==
                R"({"error":"failed","message":"car1: the job ended without an answer"})");
 }
@@ -118,7 +116,7 @@ BOOST_FIXTURE_TEST_CASE(requests_of_a_withdrawn_job_are_withdrawn, fixture) {
     std::vector<cles::responder> kept;
     right.on_delegate("never", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
     notes answers;
-    left.tasks->add_work(cles::verb::delegate, "asking", {}, [&](const job_context& job) {
+    left.add("asking", [&](const cles::responder& job) {
         job.delegate("DELEGATE right:never", {}, [&answers, job](boost::system::error_code code, auto, auto) {
             answers.add(code == errc::cancelled ? "cancelled" : code.message());
         });
@@ -135,7 +133,7 @@ BOOST_FIXTURE_TEST_CASE(requests_of_a_withdrawn_job_are_withdrawn, fixture) {
 
 BOOST_FIXTURE_TEST_CASE(requests_of_a_stopped_job_are_cancelled, fixture) {
     notes answers;
-    left.tasks->add_work(cles::verb::delegate, "late", {}, [&](const job_context& job) {
+    left.add("late", [&](const cles::responder& job) {
         while (!job.stopped()) {
             std::this_thread::sleep_for(1ms);
         }
@@ -150,12 +148,12 @@ BOOST_FIXTURE_TEST_CASE(requests_of_a_stopped_job_are_cancelled, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(progress_of_a_request_reaches_the_job, fixture) {
-    right_tasks->add_work(cles::verb::delegate, "slow", {}, [](const job_context& job) {
+    right_tasks->on_delegate("slow", [](const cles::request&, const cles::responder& job) {
         job.progress(0.5);
         job.done();
     });
     notes answers;
-    left.tasks->add_work(cles::verb::delegate, "asking", {}, [&](const job_context& job) {
+    left.add("asking", [&](const cles::responder& job) {
         const auto options = cles::call_options{}.on_progress(
             [&answers](double at, std::string_view) { answers.add(at == 0.5 ? "half" : "else"); });
         job.delegate("DELEGATE right:slow", options, [&answers, job](auto, auto, auto) {
@@ -171,7 +169,7 @@ BOOST_FIXTURE_TEST_CASE(progress_of_a_request_reaches_the_job, fixture) {
 struct ending : fixture {
     ending() {
         right.on_delegate("never", [this](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
-        left.tasks->add_work(cles::verb::delegate, "asking", {}, [this](const job_context& job) {
+        left.add("asking", [this](const cles::responder& job) {
             job.delegate("DELEGATE right:never", {}, [this, job](boost::system::error_code code, auto, auto) {
                 answers.add(std::string{cles::wire_name(static_cast<errc>(code.value()))} +
                             (std::this_thread::get_id() == io_thread ? " in line" : ""));
@@ -230,7 +228,7 @@ BOOST_FIXTURE_TEST_CASE(at_the_limit_of_a_drain_free_workers_run_callbacks, endi
 BOOST_FIXTURE_TEST_CASE(a_callback_runs_when_its_job_returns_after_the_end, ending) {
     const auto hold = left.held_;
     const auto late = std::make_shared<notes>();
-    left.tasks->add_work(cles::verb::delegate, "holding", {}, [hold, late](const job_context& job) {
+    left.add("holding", [hold, late](const cles::responder& job) {
         job.delegate("DELEGATE right:never", {}, [late](boost::system::error_code code, auto, auto) {
             late->add(std::string{cles::wire_name(static_cast<errc>(code.value()))});
         });

@@ -12,7 +12,6 @@ BOOST_AUTO_TEST_SUITE(job_admission)
 
 using namespace cles::test;
 using namespace std::chrono_literals;
-using cles::runtime::job_context;
 using cles::runtime::pool_options;
 
 // One worker, which is held at a gate, and room for four jobs.
@@ -109,14 +108,14 @@ BOOST_FIXTURE_TEST_CASE(a_job_past_its_deadline_leaves_the_queue, fixture) {
 // A job that runs until it is stopped, and records what it is notified of.
 struct stoppable : fixture {
     stoppable() : fixture({.workers = 2}) {
-        tasks->add_work(cles::verb::delegate, "watchful", {}, [this](const job_context& job) {
+        add("watchful", [this](const cles::responder& job) {
             job.on_stop([this] { ran.add("notified"); });
             ran.add("begun");
             while (!job.stopped()) {
                 std::this_thread::sleep_for(1ms);
             }
             ran.add("stopped");
-            job.done("1"); // ignored
+            job.done(cles::json_text{"1"}); // ignored
         });
     }
     void begin(scripted_peer& by, const std::string& adverbs) {
@@ -150,7 +149,7 @@ BOOST_FIXTURE_TEST_CASE(a_running_job_is_notified_of_its_deadline, stoppable) {
 }
 
 BOOST_FIXTURE_TEST_CASE(on_stop_of_a_stopped_job_calls_at_once, fixture) {
-    tasks->add_work(cles::verb::delegate, "late", {}, [this](const job_context& job) {
+    add("late", [this](const cles::responder& job) {
         while (!job.stopped()) {
             std::this_thread::sleep_for(1ms);
         }

@@ -23,13 +23,11 @@ BOOST_AUTO_TEST_SUITE(job_pool)
 using namespace cles::test;
 using namespace std::chrono_literals;
 using cles::errc;
-using cles::runtime::job_context;
+using cles::json_text;
+using cles::responder;
 
 struct fixture : pooled_node {
     fixture() : client(peer()) {}
-    void add(std::string task, cles::runtime::job_work work) {
-        tasks->add_work(cles::verb::delegate, std::move(task), {}, std::move(work));
-    }
     std::string ask(const std::string& line) { return client.ask(line); }
 
     scripted_peer client;
@@ -38,13 +36,12 @@ struct fixture : pooled_node {
 BOOST_FIXTURE_TEST_CASE(a_job_runs_on_a_worker_with_its_request, fixture) {
     notes seen;
     std::atomic<std::thread::id> where{};
-    add("route", [&](const job_context& job) {
+    tasks->on_delegate("route", [&](const cles::request& r, const responder& job) {
         where = std::this_thread::get_id();
-        const auto& r = job.request();
         seen.add(std::string{r.node()} + " " + std::string{r.task()} + " " + std::string{r.parameter(0)} + " " +
                  std::string{r.body()} + " " + r.peer().transport);
-        seen.add(job.deadline() > cles::time_point::clock::now() ? "in time" : "late");
-        job.done(R"({"km":3})");
+        seen.add(r.deadline() > cles::time_point::clock::now() ? "in time" : "late");
+        job.done(json_text{R"({"km":3})"});
     });
     BOOST_TEST(ask(R"(DELEGATE self:route/fast {"to":"x"})") == R"({"km":3})");
     BOOST_TEST(seen.joined() == R"(car1 route fast {"to":"x"} tcp in time)");
@@ -54,12 +51,12 @@ BOOST_FIXTURE_TEST_CASE(a_job_runs_on_a_worker_with_its_request, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(results_are_the_same_as_inline, fixture) {
-    add("nothing", [](const job_context& job) { job.done(); });
-    add("scalar", [](const job_context& job) { job.done("42"); });
-    add("spaced", [](const job_context& job) { job.done("{ \"a\" : [ 1,\n2 ] }"); });
-    add("broken", [](const job_context& job) { job.done("{\"a\":"); });
-    add("error", [](const job_context& job) { job.done(R"({"error":"mine"})"); });
-    add("refusing", [](const job_context& job) { job.fail(errc::denied, "not you"); });
+    add("nothing", [](const responder& job) { job.done(); });
+    add("scalar", [](const responder& job) { job.done(json_text{"42"}); });
+    add("spaced", [](const responder& job) { job.done(json_text{"{ \"a\" : [ 1,\n2 ] }"}); });
+    add("broken", [](const responder& job) { job.done(json_text{"{\"a\":"}); });
+    add("error", [](const responder& job) { job.done(json_text{R"({"error":"mine"})"}); });
+    add("refusing", [](const responder& job) { job.fail(errc::denied, "not you"); });
     BOOST_TEST(ask("DELEGATE self:nothing") == "{}");
     BOOST_TEST(ask("DELEGATE self:scalar") == R"({"value":42})");
     BOOST_TEST(ask("DELEGATE self:spaced") == R"({"a":[1,2]})");
@@ -69,23 +66,23 @@ BOOST_FIXTURE_TEST_CASE(results_are_the_same_as_inline, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_with_a_retry_delay, fixture) {
-    add("full", [](const job_context& job) { job.refuse("no room in the dock", 250ms); });
+    add("full", [](const responder& job) { job.refuse("no room in the dock", 250ms); });
     tasks->on_delegate("full_too", [](const cles::request&, const cles::responder& answer) {
         answer.refuse("no room here either", 7s);
     });
     BOOST_TEST(ask("DELEGATE self:full") == R"({"error":"busy","message":"car1: no room in the dock","retry_ms":250})");
     BOOST_TEST(ask("DELEGATE self:full_too") ==
                R"({"error":"busy","message":"car1: no room here either","retry_ms":7000})");
-    add("good", [](const job_context& job) { job.fail(errc::busy, "in its own words"); });
+    add("good", [](const responder& job) { job.fail(errc::busy, "in its own words"); });
     BOOST_TEST(ask("DELEGATE self:good").find("retry_ms\":7000") ==
                std::string::npos); // nothing is left of the earlier one
 }
 
 BOOST_FIXTURE_TEST_CASE(an_exception_from_a_job_becomes_the_answer, fixture) {
-    add("own", [](const job_context&) { throw cles::error(errc::bad_request, "no such place"); });
-    add("standard", [](const job_context&) { throw std::runtime_error("cannot open /etc/secret/key.pem"); });
-    add("number", [](const job_context&) { throw 7; });
-    add("good", [](const job_context& job) { job.done("1"); });
+    add("own", [](const responder&) { throw cles::error(errc::bad_request, "no such place"); });
+    add("standard", [](const responder&) { throw std::runtime_error("cannot open /etc/secret/key.pem"); });
+    add("number", [](const responder&) { throw 7; });
+    add("good", [](const responder& job) { job.done(json_text{"1"}); });
     BOOST_TEST(ask("DELEGATE self:own") == R"({"error":"bad_request","message":"car1: no such place"})");
     const auto standard = ask("DELEGATE self:standard");
     BOOST_TEST(standard.starts_with(R"({"error":"failed")"), standard);
@@ -96,9 +93,9 @@ BOOST_FIXTURE_TEST_CASE(an_exception_from_a_job_becomes_the_answer, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(the_first_answer_is_sent_and_others_are_counted, fixture) {
-    add("twice", [](const job_context& job) {
-        job.done("1");
-        job.done("2");
+    add("twice", [](const responder& job) {
+        job.done(json_text{"1"});
+        job.done(json_text{"2"});
         job.fail(errc::failed, "three");
         throw std::runtime_error("four");
     });
@@ -107,10 +104,10 @@ BOOST_FIXTURE_TEST_CASE(the_first_answer_is_sent_and_others_are_counted, fixture
 }
 
 BOOST_FIXTURE_TEST_CASE(concurrent_answers_send_one, fixture) {
-    add("race", [](const job_context& job) {
+    add("race", [](const responder& job) {
         std::vector<std::thread> racers;
         for (int i = 0; i < 4; ++i) {
-            racers.emplace_back([job, i] { job.done(std::to_string(i)); });
+            racers.emplace_back([job, i] { job.done(json_text{std::to_string(i)}); });
         }
         for (auto& each : racers) {
             each.join();
@@ -123,7 +120,7 @@ BOOST_FIXTURE_TEST_CASE(concurrent_answers_send_one, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(a_released_job_without_an_answer_fails, fixture) {
-    add("forgotten", [](const job_context&) {});
+    add("forgotten", [](const responder&) {});
     BOOST_TEST(ask("DELEGATE self:forgotten") ==
                R"({"error":"failed","message":"car1: the job ended without an answer"})");
     BOOST_TEST(pool->figures().answerless == 1U);
@@ -132,9 +129,9 @@ BOOST_FIXTURE_TEST_CASE(a_released_job_without_an_answer_fails, fixture) {
 BOOST_FIXTURE_TEST_CASE(a_job_may_be_answered_later_by_a_thread_of_its_own, fixture) {
     std::vector<std::thread> own;
     std::mutex guard;
-    add("later", [&](const job_context& job) {
+    add("later", [&](const responder& job) {
         const std::lock_guard lock{guard};
-        own.emplace_back([job] { job.done("[5]"); });
+        own.emplace_back([job] { job.done(json_text{"[5]"}); });
     });
     BOOST_TEST(ask("DELEGATE self:later") == "[5]");
     wait_for([&] { return pool->load().running == 0; }); // its worker has released it
@@ -145,12 +142,12 @@ BOOST_FIXTURE_TEST_CASE(a_job_may_be_answered_later_by_a_thread_of_its_own, fixt
 BOOST_FIXTURE_TEST_CASE(a_job_that_waits_holds_no_worker, fixture) {
     notes order;
     std::mutex guard;
-    std::vector<job_context> kept;
-    add("waiting", [&](const job_context& job) {
+    std::vector<responder> kept;
+    add("waiting", [&](const responder& job) {
         const std::lock_guard lock{guard};
         kept.push_back(job);
     });
-    add("quick", [](const job_context& job) { job.done(); });
+    add("quick", [](const responder& job) { job.done(); });
     client.send("DELEGATE self:waiting id=1\nDELEGATE self:waiting id=2\nDELEGATE self:waiting id=3\n");
     BOOST_TEST(ask("DELEGATE self:quick id=9") == "id=9 {}");
     wait_for([&] { return pool->figures().waiting == 3; });
@@ -167,10 +164,12 @@ BOOST_FIXTURE_TEST_CASE(a_job_that_waits_holds_no_worker, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_may_answer_after_the_pool_is_destroyed, fixture) {
-    std::optional<job_context> kept;
+    std::optional<responder> kept;
+    std::optional<cles::request> kept_request;
     std::promise<void> handed_over;
-    add("later", [&](const job_context& job) {
+    tasks->on_delegate("later", [&](const cles::request& r, const responder& job) {
         kept = job;
+        kept_request = r;
         handed_over.set_value();
     });
     client.send("DELEGATE self:later\n");
@@ -181,35 +180,35 @@ BOOST_FIXTURE_TEST_CASE(a_job_may_answer_after_the_pool_is_destroyed, fixture) {
     BOOST_TEST(ask("DELEGATE self:later").starts_with(R"({"error":"unavailable")"));
     BOOST_TEST(kept->stopped());
     notes events;
-    std::thread{[&events, job = *std::exchange(kept, std::nullopt)] {
+    std::thread{[&events, &kept_request, job = *std::exchange(kept, std::nullopt)] {
         events.add(job.progress(0.5) ? "wanted" : "unwanted");
         job.log(cles::log_level::info, "still here");
-        job.done("1");
-        job.done("2");
-        events.add(std::string{job.request().task()});
+        job.done(json_text{"1"});
+        job.done(json_text{"2"});
+        events.add(std::string{kept_request->task()});
     }}.join();
     BOOST_TEST(events.joined() == "unwanted later");
     run_ready(io);
 }
 
 BOOST_AUTO_TEST_CASE(a_job_may_answer_after_the_service_is_destroyed) {
-    std::optional<job_context> kept;
+    std::optional<responder> kept;
     {
         fixture node;
-        node.add("later", [&](const job_context& job) { kept = job; });
+        node.add("later", [&](const responder& job) { kept = job; });
         node.client.send("DELEGATE self:later\n");
         node.wait_for([&] { return node.pool->figures().waiting == 1; });
     }
     BOOST_TEST_REQUIRE(kept.has_value());
-    std::thread{[job = *std::exchange(kept, std::nullopt)] { job.done("1"); }}.join();
+    std::thread{[job = *std::exchange(kept, std::nullopt)] { job.done(json_text{"1"}); }}.join();
 }
 
 BOOST_FIXTURE_TEST_CASE(progress_comes_in_order_before_the_result, fixture) {
-    add("slow", [](const job_context& job) {
-        job.progress(0.25, R"({"at":1})");
+    add("slow", [](const responder& job) {
+        job.progress(0.25, json_text{R"({"at":1})"});
         job.progress(0.5);
         job.progress(0.1); // progress does not decrease
-        job.done("[]");
+        job.done(json_text{"[]"});
     });
     client.send("DELEGATE self:slow id=7 progress=yes\n");
     BOOST_TEST(client.line() == R"(id=7 progress=0.25 {"at":1})");
@@ -219,7 +218,7 @@ BOOST_FIXTURE_TEST_CASE(progress_comes_in_order_before_the_result, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(progress_reports_whether_it_is_wanted, fixture) {
-    add("slow", [](const job_context& job) {
+    add("slow", [](const responder& job) {
         while (job.progress(0.5)) {
             std::this_thread::yield();
         }
@@ -229,7 +228,7 @@ BOOST_FIXTURE_TEST_CASE(progress_reports_whether_it_is_wanted, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(memory_of_progress_reports_is_bounded, fixture) {
-    add("talkative", [](const job_context& job) {
+    add("talkative", [](const responder& job) {
         for (int i = 0; i < 10'000; ++i) {
             job.progress(i / 10'000.0);
         }
@@ -247,7 +246,7 @@ BOOST_FIXTURE_TEST_CASE(memory_of_progress_reports_is_bounded, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_writes_to_the_log, fixture) {
-    add("chatty", [](const job_context& job) {
+    add("chatty", [](const responder& job) {
         job.log(cles::log_level::info, "on my way");
         job.done();
     });
@@ -273,9 +272,9 @@ BOOST_FIXTURE_TEST_CASE(a_hung_pull_delays_no_other, fixture) {
 
 BOOST_FIXTURE_TEST_CASE(many_jobs_of_many_links_are_all_answered, fixture) {
     std::atomic<int> ran{0};
-    add("echo", [&](const job_context& job) {
+    tasks->on_delegate("echo", [&](const cles::request& r, const responder& job) {
         ++ran;
-        job.done(job.request().body());
+        job.done(json_text{std::string{r.body()}});
     });
     tasks->on_delegate("plain", [&](const cles::request& r) {
         ++ran;
@@ -311,9 +310,9 @@ BOOST_FIXTURE_TEST_CASE(many_jobs_of_many_links_are_all_answered, fixture) {
 }
 
 BOOST_FIXTURE_TEST_CASE(load_contains_the_service_time, fixture) {
-    add("slow", [](const job_context& job) {
+    add("slow", [](const responder& job) {
         std::this_thread::sleep_for(5ms);
-        job.done("1");
+        job.done(json_text{"1"});
     });
     BOOST_TEST(pool->load().service_us == 0U); // not known yet
     BOOST_TEST(ask("DELEGATE self:slow") == R"({"value":1})");
@@ -323,10 +322,10 @@ BOOST_FIXTURE_TEST_CASE(load_contains_the_service_time, fixture) {
 
 BOOST_FIXTURE_TEST_CASE(load_grows_while_no_worker_is_free, fixture) {
     cles::test::gate open;
-    add("quick", [](const job_context& job) { job.done("1"); });
-    add("waits", [&open](const job_context& job) {
+    add("quick", [](const responder& job) { job.done(json_text{"1"}); });
+    add("waits", [&open](const responder& job) {
         open.pass();
-        job.done("1");
+        job.done(json_text{"1"});
     });
     ask("DELEGATE self:quick");
     auto one = peer();

@@ -1,14 +1,21 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "jobs/job_record_pool.hpp"
+#include "jobs/job_record.hpp"
 
 #include <boost/test/unit_test.hpp>
 
+#include <list>
+#include <memory>
 #include <set>
+#include <string>
 #include <vector>
 
 BOOST_AUTO_TEST_SUITE(job_record_pool)
 
+using cles::identity;
 using cles::runtime::job_record;
+
+const identity somebody{
+    .transport = "tcp", .address = "tcp://127.0.0.1:1", .name = "", .uid = std::nullopt, .local = true};
 
 std::set<const job_record*> all_of(const cles::runtime::job_record_pool& records) {
     std::set<const job_record*> all;
@@ -36,15 +43,52 @@ BOOST_AUTO_TEST_CASE(records_in_use_are_found_after_others_are_recycled) {
 BOOST_AUTO_TEST_CASE(a_recycled_record_is_cleared) {
     cles::runtime::job_record_pool records;
     auto& first = records.acquire({});
-    first.result_buffer() = "left over";
+    cles::detail::request_data data;
+    data.peer = &somebody;
+    cles::registration task;
+    task.plain = [](const cles::request&, cles::json_writer& w) { w.raw("7"); };
+    first.assign(cles::request{data}, records.copy_of(somebody), std::make_shared<const cles::registration>(task));
+    BOOST_TEST(first.start(cles::time_point::max()));
+    BOOST_TEST(first.result() == "7");
     first.started = true;
     records.recycle(first);
     auto& second = records.acquire({});
     BOOST_TEST(&second == &first);
-    BOOST_TEST(second.result_buffer().empty());
+    BOOST_TEST(second.result().empty());
+    BOOST_TEST(second.task() == nullptr);
     BOOST_TEST(!second.started);
     BOOST_TEST(!second.stopped());
     records.recycle(second);
+}
+
+BOOST_AUTO_TEST_CASE(all_jobs_of_a_link_share_one_copy_of_its_identity) {
+    cles::runtime::job_record_pool peers;
+    const auto first = peers.copy_of(somebody);
+    BOOST_TEST(first.get() != &somebody);
+    BOOST_TEST(first->address == somebody.address);
+    BOOST_TEST(peers.copy_of(somebody) == first);
+}
+
+BOOST_AUTO_TEST_CASE(another_link_at_the_same_address_has_its_own_identity) {
+    cles::runtime::job_record_pool peers;
+    auto place = somebody;
+    const auto first = peers.copy_of(place);
+    place.address = "tcp://127.0.0.1:2";
+    const auto second = peers.copy_of(place);
+    BOOST_TEST(first->address == "tcp://127.0.0.1:1"); // its jobs may still run
+    BOOST_TEST(second->address == "tcp://127.0.0.1:2");
+    place.uid = 7;
+    BOOST_TEST(peers.copy_of(place) != second);
+}
+
+BOOST_AUTO_TEST_CASE(memory_of_identities_is_bounded_with_many_links) {
+    cles::runtime::job_record_pool peers;
+    const std::weak_ptr<const identity> first = peers.copy_of(somebody);
+    std::list<identity> others(2000, somebody);
+    for (const auto& each : others) {
+        BOOST_TEST_REQUIRE(peers.copy_of(each)->address == somebody.address);
+    }
+    BOOST_TEST(first.expired());
 }
 
 BOOST_AUTO_TEST_SUITE_END()

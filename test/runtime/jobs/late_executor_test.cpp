@@ -2,6 +2,7 @@
 // Workers that find the executor late start no job until it has caught up.
 
 #include "jobs/completion_queue.hpp"
+#include "jobs/job_pool.hpp"
 #include "jobs/job_record.hpp"
 #include "jobs/worker_pool.hpp"
 #include "pooled_node.hpp"
@@ -45,12 +46,12 @@ BOOST_AUTO_TEST_CASE(a_worker_that_requeues_its_job_continues_when_woken) {
     for (int i = 1; i <= 3; ++i) {
         workers->wake();
         BOOST_REQUIRE(happens(missed, i));
-        while (workers->queued() == 0) {
+        while (workers->read_figures().queued == 0) {
             std::this_thread::yield();
         }
     }
     BOOST_TEST(workers->withdraw(job));
-    workers->close([](cles::runtime::job_record&) {});
+    workers->close();
     BOOST_TEST(workers->join(patience) == 0U);
     records.recycle(job);
 }

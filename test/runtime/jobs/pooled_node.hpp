@@ -13,10 +13,12 @@
 #include <boost/asio/io_context.hpp>
 
 #include <algorithm>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::test {
@@ -66,6 +68,10 @@ struct pooled_node {
     template <class Condition>
     void wait_for(Condition&& holds, const std::source_location& where = std::source_location::current()) {
         run_until(io, holds, patience, where);
+    }
+    /// Adds a task whose jobs answer through a responder.
+    void add(std::string_view task, std::function<void(const responder&)> work) {
+        tasks->on_delegate(task, [work = std::move(work)](const request&, const responder& job) { work(job); });
     }
     /// Adds a task that waits at the gate.
     void add_held(std::string_view task = "held") {

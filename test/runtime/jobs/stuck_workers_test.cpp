@@ -17,7 +17,6 @@ BOOST_AUTO_TEST_SUITE(stuck_workers)
 using namespace cles::test;
 using namespace std::chrono_literals;
 using cles::runtime::drain_report;
-using cles::runtime::job_context;
 using cles::runtime::pool_options;
 
 struct fixture : pooled_node {
@@ -129,11 +128,51 @@ BOOST_AUTO_TEST_CASE(at_the_limit_of_a_drain_open_jobs_are_answered) {
     BOOST_TEST((first + second).find(R"(id=2 {"error":"busy")") != std::string::npos);
 }
 
+// The run ends although the pool exists, because the timer has been cancelled.
+BOOST_AUTO_TEST_CASE(a_drain_that_ends_cancels_its_timer) {
+    pooled_node node{{.workers = 1}};
+    int ends = 0;
+    node.pool->drain(1h, [&](const drain_report&) {
+        ++ends;
+        node.car.stop();
+    });
+    node.io.run();
+    BOOST_TEST(ends == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_drain_ends_once_if_its_limit_has_passed_already) {
+    fixture node{{.workers = 1, .close_timeout = 20ms}};
+    node.client.send("DELEGATE self:held id=1\n");
+    node.wait_for([&] { return node.hold.arrived() == 1; });
+    int ends = 0;
+    std::size_t stuck = 0;
+    node.pool->drain(0ms, [&](const drain_report& result) {
+        ++ends;
+        stuck = result.stuck;
+    });
+    node.wait_for([&] { return ends == 1; });
+    BOOST_TEST(stuck == 1U);
+    node.hold.open();
+    node.wait_for([&] { return node.pool->figures().running == 0; });
+    BOOST_TEST(ends == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_drain_of_a_closed_pool_calls_nothing) {
+    pooled_node node{{.workers = 1}};
+    int ends = 0;
+    node.pool->drain(1h, [&](const drain_report&) { ++ends; });
+    node.tasks.reset();
+    node.pool.reset();
+    node.car.stop();
+    node.io.run();
+    BOOST_TEST(ends == 0);
+}
+
 BOOST_AUTO_TEST_CASE(a_job_that_stops_when_told_ends_with_the_pool) {
     notes events;
     {
         fixture node{{.workers = 1, .close_timeout = patience}};
-        node.tasks->add_work(cles::verb::delegate, "polite", {}, [&](const job_context& job) {
+        node.add("polite", [&](const cles::responder& job) {
             events.add("begun");
             while (!job.stopped()) {
                 std::this_thread::sleep_for(1ms);

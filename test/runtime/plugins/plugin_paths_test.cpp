@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "plugins/plugin_search.hpp"
+#include "plugins/plugin_library.hpp"
 
 #include <boost/test/unit_test.hpp>
 
