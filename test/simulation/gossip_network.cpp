@@ -2,10 +2,16 @@
 #include "simulation/gossip_network.hpp"
 
 #include "node/base/deadline_schedule.hpp"
+#include "node/base/deadlines.hpp"
+#include "node/base/metrics.hpp"
+#include "node/membership/announcer.hpp"
+#include "node/membership/gossip.hpp"
+#include "node/membership/membership.hpp"
 #include "node/membership/peer_table.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
+#include "simulation/network/place.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -39,12 +45,13 @@ struct gossip_network::message {
 };
 
 /// One node, from its start to its end.
-class gossip_network::member final : public core::announcer::sender,
+class gossip_network::member final : public place,
+                                     public core::announcer::sender,
                                      public core::gossip::client,
                                      public core::membership::watcher {
   public:
     member(gossip_network& owner, std::size_t number, std::string name, std::uint32_t epoch)
-        : net(owner), place(number), run_number(epoch),
+        : place(owner.time_, static_cast<unsigned>(number), name), net(owner), run_number(epoch),
           url("tcp://10." + std::to_string(number / 62500) + "." + std::to_string(number / 250 % 250) + "." +
               std::to_string(number % 250 + 1) + ":25370"),
           said{.node = std::move(name), .endpoints = {"tcp://0.0.0.0:25370"}, .tasks = "85944171f73967e8"},
@@ -56,19 +63,17 @@ class gossip_network::member final : public core::announcer::sender,
         others_known.watch(this);
     }
 
-    [[nodiscard]] time_point local() const noexcept { return net.now_ + ahead; }
-
     void begin() {
-        mouth.start(local());
-        deadlines.expire(local()); // it speaks before it asks
-        gossip.set_seeds(net.seeds_, local());
-        gossip.start(local());
+        mouth.start(now());
+        deadlines.expire(now()); // it speaks before it asks
+        gossip.set_seeds(net.seeds_, now());
+        gossip.start(now());
     }
 
     void announce(milliseconds interval) override {
         said.interval = interval;
         said.load.running = static_cast<std::uint32_t>(net.dice_.below(4));
-        others_known.announce_self(said, ++seq, local());
+        others_known.announce_self(said, ++seq, now());
     }
     [[nodiscard]] std::size_t others() const override { return others_known.size(); }
 
@@ -78,9 +83,8 @@ class gossip_network::member final : public core::announcer::sender,
                   .text = std::string{since},
                   .describe = std::string{describe}});
         // Where no answer comes, the link's own machine tells so when the time is up.
-        net.schedule(
-            net.now_ + core::gossip::limit, place,
-            std::make_shared<message>(message{.what = message::kind::failure, .to_run = run_number, .ticket = ticket}));
+        net.deliver(net.time_.now() + core::gossip::limit, host(),
+                    {.what = message::kind::failure, .to_run = run_number, .ticket = ticket});
     }
     void ask_description(std::uint64_t, std::string_view) override {} // all here know `since`
     void push(std::string_view at, std::string_view table) override {
@@ -92,10 +96,10 @@ class gossip_network::member final : public core::announcer::sender,
         const auto about = net.by_url_.find(where);
         const bool lives = about != net.by_url_.end() && net.members_[about->second]->alive;
         if (what == core::membership::change::gone) {
-            gossip.on_gone(node, where, local());
+            gossip.on_gone(node, where, now());
             net.false_deaths_ += lives ? 1 : 0;
         } else if (what == core::membership::change::silent) {
-            net.false_suspicions_ += lives && net.members_[about->second]->stopped_until <= net.now_ ? 1 : 0;
+            net.false_suspicions_ += lives && net.members_[about->second]->stopped_until <= net.time_.now() ? 1 : 0;
         } else if (what == core::membership::change::clash) {
             ++net.clashes_;
         }
@@ -105,20 +109,20 @@ class gossip_network::member final : public core::announcer::sender,
         const auto to = net.by_url_.find(at);
         m.from_run = run_number;
         if (to != net.by_url_.end()) {
-            net.send(place, to->second, std::move(m));
+            net.send(host(), to->second, std::move(m));
         }
     }
 
+    void after_jump() override { net.run(*this); }
+
     gossip_network& net;
-    std::size_t place;
     std::uint32_t run_number;
     std::string url;
     core::announcement said;
     std::uint64_t seq = 0;
     bool alive = true;
     time_point stopped_until = time_point::min();
-    std::chrono::nanoseconds ahead{0}; // of its clock
-    std::deque<std::shared_ptr<message>> unread;
+    std::size_t unread = 0;
     time_point woken_at = time_point::max();
     std::size_t bytes = 0;
     core::suspend_detector away;
@@ -138,33 +142,29 @@ std::size_t gossip_network::start(std::size_t count, milliseconds within, std::s
     std::vector<time_point> when;
     for (std::size_t i = 0; i < count; ++i) {
         const auto number = first + i;
-        auto m = std::make_unique<member>(*this, number, "vehicle-" + std::to_string(1000 + number),
-                                          scattered(next_epoch_++));
+        const auto m = std::make_shared<member>(*this, number, "vehicle-" + std::to_string(1000 + number),
+                                                scattered(next_epoch_++));
         by_url_.emplace(m->url, number);
         if (seeds_.size() < seeds) {
             seeds_.push_back(m->url);
         }
         m->alive = false;
-        members_.push_back(std::move(m));
-        when.push_back(now_ + dice_.within(within));
+        members_.push_back(m);
+        when.push_back(time_.now() + dice_.within(within));
     }
     std::sort(when.begin(), when.end());
     for (std::size_t i = 0; i < count; ++i) {
-        pass(std::chrono::duration_cast<milliseconds>(when[i] - now_));
+        pass(std::chrono::duration_cast<milliseconds>(when[i] - time_.now()));
         auto& m = *members_[first + i];
         m.alive = true;
         m.begin();
         wake(m);
-        plan_pause(m.place);
+        plan_pause(first + i, time_.now());
     }
     return first;
 }
 
 // -- time ----------------------------------------------------------------------------------------------------------
-
-void gossip_network::schedule(time_point when, std::size_t node, std::shared_ptr<message> what) {
-    events_.push({when, order_++, node, std::move(what)});
-}
 
 // Has its timers run when the next one is due.
 void gossip_network::wake(member& m) {
@@ -172,47 +172,27 @@ void gossip_network::wake(member& m) {
     if (!m.alive || !next) {
         return;
     }
-    m.away.expect(*next, m.local());
-    const auto due = std::max(*next - m.ahead, now_);
+    m.away.expect(*next, m.now());
+    const auto due = time_.now() + std::max(*next - m.now(), time_point::duration::zero());
     if (due < m.woken_at) {
         m.woken_at = due;
-        schedule(due, m.place, nullptr);
-    }
-}
-
-void gossip_network::pass(milliseconds span) {
-    const auto end = now_ + std::max(span, milliseconds{0});
-    while (!events_.empty() && events_.top().when <= end) {
-        begin_pauses(events_.top().when);
-        const auto next = events_.top();
-        events_.pop();
-        now_ = next.when;
-        auto& m = *members_[next.node];
-        if (!m.alive) {
-            continue;
-        }
-        if (next.what) {
-            m.unread.push_back(next.what);
-            deepest_queue_ = std::max(deepest_queue_, m.unread.size());
-        } else if (m.woken_at <= now_) {
-            m.woken_at = time_point::max();
-        }
-        if (m.stopped_until <= now_) {
+        m.at_true(due, [this, &m] {
+            m.woken_at = m.woken_at <= time_.now() ? time_point::max() : m.woken_at;
             run(m);
-        }
+        });
     }
-    now_ = end;
 }
 
-void gossip_network::run(member& m) {
-    const auto now = m.local();
+void gossip_network::run(member& m, message* what) {
+    if (!m.alive) {
+        return;
+    }
+    const auto now = m.now();
     if (m.away.ended(now) && fault_ != planted::excuse_forgotten) {
         m.others_known.note_suspension(now);
     }
     m.deadlines.expire(now);
-    while (!m.unread.empty()) {
-        const auto what = std::move(m.unread.front());
-        m.unread.pop_front();
+    if (what != nullptr) {
         handle(m, *what);
     }
     wake(m);
@@ -234,7 +214,6 @@ gossip_network::milliseconds gossip_network::pass_until(const std::function<bool
 // -- messages ------------------------------------------------------------------------------------------------------
 
 void gossip_network::send(std::size_t from, std::size_t to, message what) {
-    ++messages_;
     what.from = from;
     if (passes_ && !passes_(from, to)) {
         return;
@@ -243,14 +222,26 @@ void gossip_network::send(std::size_t from, std::size_t to, message what) {
                      delay_by_loss(1 + what.text.size() / segment);
     if (!members_[to]->alive) { // there is nobody: the system there says so
         if (what.what == message::kind::ask && (!passes_ || passes_(to, from))) {
-            schedule(now_ + way * 2, from,
-                     std::make_shared<message>(
-                         message{.what = message::kind::failure, .to_run = what.from_run, .ticket = what.ticket}));
+            deliver(time_.now() + way * 2, from,
+                    {.what = message::kind::failure, .to_run = what.from_run, .ticket = what.ticket});
         }
         return;
     }
-    const auto arrival = now_ + way;
-    schedule(arrival, to, std::make_shared<message>(std::move(what)));
+    deliver(time_.now() + way, to, std::move(what));
+}
+
+void gossip_network::deliver(time_point when, std::size_t to, message what) {
+    time_.at(when, [this, to, what = std::move(what)]() mutable {
+        auto& m = *members_[to];
+        if (!m.alive) {
+            return;
+        }
+        deepest_queue_ = std::max(deepest_queue_, ++m.unread);
+        m.run([this, &m, what = std::move(what)]() mutable {
+            --m.unread;
+            run(m, &what);
+        });
+    });
 }
 
 // Streams and requests by datagram alike send again what is lost, first after 200 ms, then at doubling pauses.
@@ -268,7 +259,7 @@ std::chrono::microseconds gossip_network::delay_by_loss(std::size_t packets) {
 }
 
 void gossip_network::handle(member& m, message& what) {
-    const auto now = m.local();
+    const auto now = m.now();
     if (what.to_run != 0 && what.to_run != m.run_number) {
         return;
     }
@@ -279,7 +270,7 @@ void gossip_network::handle(member& m, message& what) {
             .what = message::kind::table, .to_run = what.from_run, .from_run = m.run_number, .ticket = what.ticket};
         json_writer w{answer.text};
         m.gossip.write_delta(w, {what.text, what.describe}, 1U << 20U, now);
-        send(m.place, what.from, std::move(answer));
+        send(m.host(), what.from, std::move(answer));
         break;
     }
     case message::kind::table:
@@ -296,61 +287,49 @@ void gossip_network::handle(member& m, message& what) {
 
 // -- what happens to nodes -----------------------------------------------------------------------------------------
 
-void gossip_network::kill(std::size_t node) {
-    members_[node]->alive = false;
-    members_[node]->unread.clear();
-}
+void gossip_network::kill(std::size_t node) { members_[node]->alive = false; }
 
 void gossip_network::leave(std::size_t node) {
-    members_[node]->gossip.stop(members_[node]->local());
+    members_[node]->gossip.stop(members_[node]->now());
     kill(node);
 }
 
 void gossip_network::restart(std::size_t node) {
-    kill(node);
-    auto& before = members_[node];
-    auto next = std::make_unique<member>(*this, node, before->said.node, scattered(next_epoch_++));
-    next->bytes = before->bytes;
-    buried_.push_back(std::exchange(before, std::move(next)));
-    members_[node]->begin();
-    wake(*members_[node]);
+    const auto& before = *members_[node];
+    const auto next = std::make_shared<member>(*this, node, before.said.node, scattered(next_epoch_++));
+    next->bytes = before.bytes;
+    members_[node] = next;
+    next->begin();
+    wake(*next);
 }
 
-void gossip_network::pause(std::size_t node, milliseconds span) {
+void gossip_network::pause(std::size_t node, std::chrono::microseconds span) {
     auto& m = *members_[node];
-    m.stopped_until = now_ + span;
-    schedule(m.stopped_until, node, nullptr);
+    m.stopped_until = time_.now() + span;
+    m.freeze();
+    m.time().at(m.stopped_until, [weak = m.weak_from_this()] {
+        if (const auto alive = weak.lock()) {
+            alive->thaw();
+        }
+    });
 }
 
-void gossip_network::jump(std::size_t node, milliseconds ahead) {
-    members_[node]->ahead += ahead;
-    run(*members_[node]);
-}
+void gossip_network::jump(std::size_t node, milliseconds ahead) { members_[node]->jump(ahead); }
 
 // Pauses are as long, and as far apart, as makes up their share of time.
-void gossip_network::plan_pause(std::size_t node) {
+void gossip_network::plan_pause(std::size_t node, time_point after) {
     if (weather_.paused == 0) {
         return;
     }
     const auto& w = weather_;
     const auto mean = (w.shortest_pause + w.max_pause) / 2;
     const auto apart = mean * (1000 - w.paused) / w.paused;
-    const auto begins = now_ + dice_.within(apart * 2);
+    const auto begins = after + dice_.within(apart * 2);
     const auto lasts = w.shortest_pause + dice_.within(w.max_pause - w.shortest_pause);
-    pauses_.push({begins, lasts, node});
-}
-
-void gossip_network::begin_pauses(time_point by) {
-    while (!pauses_.empty() && pauses_.top().begins <= by) {
-        const auto next = pauses_.top();
-        pauses_.pop();
-        auto& m = *members_[next.node];
-        m.stopped_until = next.begins + next.lasts;
-        schedule(m.stopped_until, next.node, nullptr);
-        const auto now = std::exchange(now_, m.stopped_until);
-        plan_pause(next.node);
-        now_ = now;
-    }
+    time_.at(begins, [this, node, lasts] {
+        pause(node, lasts);
+        plan_pause(node, members_[node]->stopped_until);
+    });
 }
 
 // -- what came of it -----------------------------------------------------------------------------------------------
@@ -360,7 +339,7 @@ std::size_t gossip_network::living() const {
         std::count_if(members_.begin(), members_.end(), [](const auto& m) { return m->alive; }));
 }
 
-bool gossip_network::is_steady(const member& m) const { return m.alive && m.stopped_until + settles <= now_; }
+bool gossip_network::is_steady(const member& m) const { return m.alive && m.stopped_until + settles <= time_.now(); }
 
 std::size_t gossip_network::missing() const {
     std::size_t lacking = 0;
@@ -383,28 +362,11 @@ std::size_t gossip_network::missing() const {
     return lacking;
 }
 
-bool gossip_network::whole() const { return missing() == 0; }
-
-std::size_t gossip_network::holding(std::size_t node) const {
-    std::size_t count = 0;
-    for (const auto& m : members_) {
-        if (m->alive && m->place != node) {
-            const auto k = m->others_known.find_member(members_[node]->said.node);
-            count += k && !k->suspect ? 1 : 0;
-        }
-    }
-    return count;
-}
-
-std::size_t gossip_network::suspecting(std::size_t node) const {
-    std::size_t count = 0;
-    for (const auto& m : members_) {
-        if (m->alive && m->place != node) {
-            const auto k = m->others_known.find_member(members_[node]->said.node);
-            count += k && k->suspect ? 1 : 0;
-        }
-    }
-    return count;
+std::size_t gossip_network::listing(std::size_t node, bool suspect) const {
+    return static_cast<std::size_t>(std::count_if(members_.begin(), members_.end(), [&](const auto& m) {
+        const auto k = m->others_known.find_member(members_[node]->said.node);
+        return m->alive && m != members_[node] && k && k->suspect == suspect;
+    }));
 }
 
 gossip_network::received gossip_network::take_received(milliseconds within) {

@@ -1,24 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "node/base/deadlines.hpp"
-#include "node/base/metrics.hpp"
-#include "node/membership/announcer.hpp"
-#include "node/membership/gossip.hpp"
-#include "node/membership/membership.hpp"
+#include "simulation/network/agenda.hpp"
 #include "simulation/network/dice.hpp"
 #include "simulation/network/planted.hpp"
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <functional>
 #include <map>
 #include <memory>
-#include <queue>
 #include <string>
-#include <string_view>
 #include <vector>
 
 namespace cles::simulation {
@@ -48,7 +41,7 @@ class gossip_network {
     /// Starts nodes within so long, of which the first few are the seeds of all; returns the first one's number.
     std::size_t start(std::size_t count, milliseconds within, std::size_t seeds = 3);
     /// Lets time go by.
-    void pass(milliseconds span);
+    void pass(milliseconds span) { time_.run_until(time_.now() + span); }
     /// Until it holds, looked at every half second, or the limit; how long it took.
     milliseconds pass_until(const std::function<bool()>& holds, milliseconds limit);
 
@@ -57,7 +50,7 @@ class gossip_network {
     /// Begins again: another epoch, the same name and address.
     void restart(std::size_t node);
     /// Its process stands still for so long.
-    void pause(std::size_t node, milliseconds span);
+    void pause(std::size_t node, std::chrono::microseconds span);
     /// Its clock goes ahead at once.
     void jump(std::size_t node, milliseconds ahead);
     /// What one node sends to another passes only where this allows it; empty: always.
@@ -65,14 +58,14 @@ class gossip_network {
     void set_weather(gossip_weather weather) { weather_ = weather; }
 
     /// Every node that lives, and has not been paused lately, holds every other such for live, in its current run.
-    [[nodiscard]] bool whole() const;
+    [[nodiscard]] bool whole() const { return missing() == 0; }
     /// Of all pairs of living nodes that have not been paused lately, those of which the first does not hold the second
     /// for live.
     [[nodiscard]] std::size_t missing() const;
     /// How many hold a node for live.
-    [[nodiscard]] std::size_t holding(std::size_t node) const;
+    [[nodiscard]] std::size_t holding(std::size_t node) const { return listing(node, false); }
     /// And for suspect.
-    [[nodiscard]] std::size_t suspecting(std::size_t node) const;
+    [[nodiscard]] std::size_t suspecting(std::size_t node) const { return listing(node, true); }
     [[nodiscard]] std::size_t clashes() const noexcept { return clashes_; }
     /// Live nodes that somebody took for gone, or for suspect.
     [[nodiscard]] std::size_t false_deaths() const noexcept { return false_deaths_; }
@@ -90,45 +83,26 @@ class gossip_network {
     [[nodiscard]] std::size_t living() const;
     /// The most that waited anywhere to be read.
     [[nodiscard]] std::size_t deepest_queue() const noexcept { return deepest_queue_; }
-    [[nodiscard]] std::uint64_t messages() const noexcept { return messages_; }
 
   private:
     class member;
     struct message;
-    struct event {
-        time_point when;
-        std::uint64_t order;
-        std::size_t node;
-        std::shared_ptr<message> what; // null: a timer
-        bool operator>(const event& e) const noexcept { return when != e.when ? when > e.when : order > e.order; }
-    };
-
-    struct coming_pause {
-        time_point begins;
-        std::chrono::nanoseconds lasts;
-        std::size_t node;
-        bool operator>(const coming_pause& p) const noexcept { return begins > p.begins; }
-    };
 
     void send(std::size_t from, std::size_t to, message what);
-    void schedule(time_point when, std::size_t node, std::shared_ptr<message> what);
+    void deliver(time_point when, std::size_t to, message what);
     [[nodiscard]] bool is_steady(const member& m) const;
+    [[nodiscard]] std::size_t listing(std::size_t node, bool suspect) const;
     std::chrono::microseconds delay_by_loss(std::size_t packets);
-    void run(member& m);
+    void run(member& m, message* what = nullptr);
     void wake(member& m);
     void handle(member& m, message& what);
-    void plan_pause(std::size_t node);
-    void begin_pauses(time_point by);
+    void plan_pause(std::size_t node, time_point after);
 
     dice dice_;
     gossip_weather weather_;
     planted fault_;
-    time_point now_{std::chrono::hours{1}};
-    std::uint64_t order_ = 0;
-    std::priority_queue<event, std::vector<event>, std::greater<>> events_;
-    std::priority_queue<coming_pause, std::vector<coming_pause>, std::greater<>> pauses_;
-    std::vector<std::unique_ptr<member>> members_;
-    std::vector<std::unique_ptr<member>> buried_;
+    agenda time_;
+    std::vector<std::shared_ptr<member>> members_;
     std::map<std::string, std::size_t, std::less<>> by_url_;
     std::vector<std::string> seeds_;
     std::function<bool(std::size_t, std::size_t)> passes_;
@@ -136,7 +110,6 @@ class gossip_network {
     std::size_t false_suspicions_ = 0;
     std::size_t clashes_ = 0;
     std::size_t deepest_queue_ = 0;
-    std::uint64_t messages_ = 0;
     std::uint32_t next_epoch_ = 1;
 };
 

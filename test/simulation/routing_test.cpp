@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 // A node that routes for a client, among others that work, and crash, stop and lose their links, in virtual time.
 #include "simulation/cluster.hpp"
+#include "simulation/seeds.hpp"
 
 #include <boost/test/unit_test.hpp>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <string>
@@ -21,17 +21,10 @@ constexpr auto trouble = 60s;
 
 /// That this fault breaks that rule, and no other, in one of a few lives.
 void finds(planted fault, rule broken) {
-    for (std::uint64_t seed = 1; seed <= 10; ++seed) {
-        cluster c{seed, fault};
-        c.live(trouble);
-        const auto& all = c.violations();
-        if (!all.empty() &&
-            std::all_of(all.begin(), all.end(), [broken](const violation& v) { return v.broken == broken; })) {
-            BOOST_TEST_MESSAGE(std::string{to_string(fault)} + " is found by seed " + std::to_string(seed));
-            return;
-        }
-    }
-    BOOST_ERROR(std::string{to_string(fault)} + " was not found");
+    const auto seed =
+        first_to_break(broken, 10, [&](std::uint64_t s) { return simulate_cluster(s, trouble, fault).violations; });
+    BOOST_TEST(seed != 0U, std::string{to_string(fault)} + " was not found");
+    BOOST_TEST_MESSAGE(std::string{to_string(fault)} + " is found by seed " + std::to_string(seed));
 }
 
 } // namespace
@@ -41,14 +34,13 @@ BOOST_AUTO_TEST_CASE(whatever_happens_each_request_ends_once_in_its_time_and_non
     std::size_t failed = 0;
     std::size_t refused = 0;
     for (std::uint64_t seed = 1; seed <= lives; ++seed) {
-        cluster c{seed};
-        c.live(trouble);
-        for (const auto& v : c.violations()) {
+        const auto r = simulate_cluster(seed, trouble);
+        for (const auto& v : r.violations) {
             BOOST_ERROR("seed " << seed << ": " << to_string(v.broken) << ": " << v.what);
         }
-        succeeded += c.succeeded();
-        failed += c.failed();
-        refused += c.refused();
+        succeeded += r.succeeded;
+        failed += r.failed;
+        refused += r.refused;
     }
     BOOST_TEST_MESSAGE(std::to_string(succeeded) + " succeeded, " + std::to_string(failed) + " failed, " +
                        std::to_string(refused) + " of them refused");

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "simulation/world/witness.hpp"
+
+#include <algorithm>
 #include <cstdint>
+#include <vector>
 
 namespace cles::simulation {
 
@@ -12,5 +16,17 @@ inline constexpr std::uint64_t long_seeds = is_slow ? 3 : 100;
 inline constexpr std::uint64_t seeds_for_planted = is_slow ? 150 : 400;
 inline constexpr unsigned steps_of_a_seed = 300;
 inline constexpr unsigned steps_of_a_long_seed = 3000;
+
+/// The first seed with which a simulation breaks this rule alone; 0 if none does.
+template <class Simulation>
+std::uint64_t first_to_break(rule broken, std::uint64_t count, Simulation violations_of) {
+    for (std::uint64_t seed = 1; seed <= count; ++seed) {
+        const std::vector<violation> all = violations_of(seed);
+        if (!all.empty() && std::all_of(all.begin(), all.end(), [&](const auto& v) { return v.broken == broken; })) {
+            return seed;
+        }
+    }
+    return 0;
+}
 
 } // namespace cles::simulation

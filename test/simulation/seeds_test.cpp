@@ -7,8 +7,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -55,9 +53,7 @@ BOOST_AUTO_TEST_CASE(what_once_failed) {
     std::sort(files.begin(), files.end());
     BOOST_TEST(!files.empty());
     for (const auto& path : files) {
-        std::ifstream file{path, std::ios::binary};
-        const std::string text{std::istreambuf_iterator<char>{file}, {}};
-        check(sim::simulate_twice(sim::plan_from(text)), path.string());
+        check(sim::simulate_twice(sim::plan_in_file(path.string())), path.string());
     }
 }
 

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <utility>
-#include <vector>
 
 namespace cles::simulation {
 
@@ -21,21 +21,17 @@ class agenda final : public core::clock {
 
     [[nodiscard]] time_point now() const override { return now_; }
     void at(time_point when, action what) {
-        if (over_) {
-            return;
+        if (!over_) {
+            entries_.emplace(std::max(when, now_), std::move(what)); // after those of the same time
         }
-        entries_.push_back({std::max(when, now_), order_++, std::move(what)});
-        std::push_heap(entries_.begin(), entries_.end(), later);
     }
     /// Lets time go by up to then.
     void run_until(time_point end) {
-        while (!entries_.empty() && entries_.front().when <= end) {
-            std::pop_heap(entries_.begin(), entries_.end(), later);
-            auto next = std::move(entries_.back());
-            entries_.pop_back();
-            now_ = next.when;
+        while (!entries_.empty() && entries_.begin()->first <= end) {
+            const auto next = entries_.extract(entries_.begin());
+            now_ = next.key();
             ++steps_;
-            next.what();
+            next.mapped()();
             if (every_ && steps_ % 64 == 0) {
                 every_();
             }
@@ -53,19 +49,9 @@ class agenda final : public core::clock {
     }
 
   private:
-    struct entry {
-        time_point when;
-        std::uint64_t order;
-        action what;
-    };
-    static bool later(const entry& a, const entry& b) noexcept {
-        return a.when != b.when ? a.when > b.when : a.order > b.order;
-    }
-
     time_point now_{std::chrono::hours{1}};
-    std::uint64_t order_ = 0;
     std::uint64_t steps_ = 0;
-    std::vector<entry> entries_;
+    std::multimap<time_point, action> entries_;
     action every_;
     bool over_ = false;
 };

@@ -16,10 +16,8 @@ link_ptr datagram_port::connect(const endpoint& peer) {
 }
 
 void datagram_port::receive(const endpoint& from, const std::string& datagram) {
-    const auto home = home_.lock();
-    constexpr std::size_t max_waiting = 256; // what the system keeps for a process that does not fetch it
-    if (home && home->waiting() < max_waiting) {
-        home->run([self = shared_from_this(), from, datagram] { self->hand_over(from, datagram); });
+    if (const auto home = home_.lock()) {
+        home->receive([self = shared_from_this(), from, datagram] { self->hand_over(from, datagram); });
     }
 }
 

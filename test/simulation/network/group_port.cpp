@@ -2,7 +2,7 @@
 #include "simulation/network/group_port.hpp"
 
 #include "protocol/datagram.hpp"
-#include "simulation/world/group_watch.hpp"
+#include "simulation/workload/part.hpp"
 #include "simulation/world/node_run.hpp"
 
 #include <chrono>
@@ -136,9 +136,8 @@ void group_port::drain() {
 // -- receiving -------------------------------------------------------------------------------------------------------
 
 void group_port::receive(const endpoint& from, const std::string& datagram) {
-    constexpr std::size_t most_unread = 256; // what the system keeps for a process that does not fetch it
-    if (const auto process = process_.lock(); process && process->waiting() < most_unread) {
-        process->run([weak = weak_from_this(), from, datagram] {
+    if (const auto process = process_.lock()) {
+        process->receive([weak = weak_from_this(), from, datagram] {
             if (const auto self = weak.lock(); self && self->owner_ != nullptr) {
                 self->hand_over(from, datagram);
             }

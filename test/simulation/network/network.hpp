@@ -8,7 +8,6 @@
 #include "simulation/network/dice.hpp"
 #include "simulation/network/place.hpp"
 #include "simulation/network/planted.hpp"
-#include "simulation/network/tampering.hpp"
 #include "simulation/world/witness.hpp"
 
 #include <chrono>

@@ -32,6 +32,13 @@ class place : public std::enable_shared_from_this<place> {
             what();
         }
     }
+    /// Something has arrived at a socket here.
+    void receive(agenda::action what) {
+        constexpr std::size_t max_unread = 256; // what the system keeps for a process that does not fetch it
+        if (waiting_.size() < max_unread) {
+            run(std::move(what));
+        }
+    }
     /// By its own clock.
     void at(time_point when, agenda::action what) { at_true(when - ahead_, std::move(what)); }
     /// By that of the network.
@@ -71,8 +78,6 @@ class place : public std::enable_shared_from_this<place> {
         run([this] { after_jump(); });
     }
     [[nodiscard]] bool frozen() const noexcept { return frozen_; }
-    /// How much waits.
-    [[nodiscard]] std::size_t waiting() const noexcept { return waiting_.size(); }
     /// Whether what happens now could not have happened before.
     [[nodiscard]] bool was_frozen_until_now() const { return thawed_ == now(); }
     /// When it last went on, and when after so long that it must have noticed.

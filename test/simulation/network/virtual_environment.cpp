@@ -13,61 +13,20 @@ namespace cles::simulation {
 
 using std::chrono::milliseconds;
 
-/// No other node shares this environment.
-class virtual_environment::local_acceptor final : public acceptor {
+/// Where a node listens; how that begins and ends is up to the transport.
+class virtual_environment::door final : public acceptor {
   public:
-    explicit local_acceptor(url where) : where_(std::move(where)) {}
+    door(url where, std::function<void(const on_link&)> open, std::function<void()> shut)
+        : where_(std::move(where)), open_(std::move(open)), shut_(std::move(shut)) {}
+    ~door() override { shut_(); }
     [[nodiscard]] url local() const override { return where_; }
-    void start(std::function<void(link_ptr)>) override {}
-    void close() override {}
+    void start(on_link arrived) override { open_(arrived); }
+    void close() override { shut_(); }
 
   private:
     url where_;
-};
-
-class virtual_environment::stream_acceptor final : public acceptor {
-  public:
-    stream_acceptor(virtual_environment& by, url where, const limits& bounds)
-        : by_(by), where_(std::move(where)), bounds_(bounds) {}
-    ~stream_acceptor() override { shut(); }
-    [[nodiscard]] url local() const override { return where_; }
-    void start(std::function<void(link_ptr)> on_link) override {
-        by_.net_.listen(
-            endpoint_of(where_), by_.process_->shared_from_this(), bounds_,
-            [by = &by_, on_link = std::move(on_link)](const link_ptr& made) { by->accepted(on_link, made); });
-    }
-    void close() override { shut(); }
-
-  private:
-    void shut() {
-        if (by_.process_ != nullptr) {
-            by_.net_.shut(endpoint_of(where_));
-        }
-    }
-
-    virtual_environment& by_;
-    url where_;
-    limits bounds_;
-};
-
-class virtual_environment::datagram_acceptor final : public acceptor {
-  public:
-    datagram_acceptor(virtual_environment& by, url where)
-        : by_(by), where_(std::move(where)),
-          port_(std::make_shared<datagram_port>(by.net_, by.process_->shared_from_this(), endpoint_of(where_),
-                                                by.strangers_)) {}
-    ~datagram_acceptor() override { port_->accept(nullptr); }
-    [[nodiscard]] url local() const override { return where_; }
-    void start(std::function<void(link_ptr)> on_link) override {
-        port_->accept([by = &by_, on_link = std::move(on_link)](const link_ptr& made) { by->accepted(on_link, made); });
-        port_->open();
-    }
-    void close() override { port_->accept(nullptr); }
-
-  private:
-    virtual_environment& by_;
-    url where_;
-    std::shared_ptr<datagram_port> port_;
+    std::function<void(const on_link&)> open_;
+    std::function<void()> shut_;
 };
 
 // -- time and tasks --------------------------------------------------------------------------------------------------
@@ -127,18 +86,26 @@ void virtual_environment::arm_timer() {
 
 void virtual_environment::on_timer() {
     const auto due = *std::exchange(due_, std::nullopt);
-    const auto call = on_due_;
     if (net_.fault() == planted::excuse_forgotten) { // the node goes through the time in which it was stopped
         constexpr milliseconds step{400};
-        for (auto shown = due; shown < process_->now() && on_due_; shown += step) {
-            shown_ = shown;
-            call();
+        for (auto shown = due; process_ != nullptr && shown < process_->now(); shown += step) {
+            run_timer_as_if(shown);
         }
-        shown_.reset();
     }
+    run_timer();
+}
+
+void virtual_environment::run_timer() {
     if (process_ != nullptr && on_due_) {
+        const auto call = on_due_; // which may stop it
         call();
     }
+}
+
+void virtual_environment::run_timer_as_if(time_point shown) {
+    shown_ = shown;
+    run_timer();
+    shown_.reset();
 }
 
 // -- links -----------------------------------------------------------------------------------------------------------
@@ -148,22 +115,33 @@ bool virtual_environment::has_transport(std::string_view scheme) const {
 }
 
 std::unique_ptr<acceptor> virtual_environment::listen(const url& where, const limits& bounds) {
+    if (where.scheme == "inproc") { // no other node shares this environment
+        return std::make_unique<door>(
+            where, [](const on_link&) {}, [] {});
+    }
+    const auto at = endpoint_of(where);
     if (where.scheme == "tcp") {
-        return std::make_unique<stream_acceptor>(*this, where, bounds);
+        const auto open = [this, at, bounds](const on_link& arrived) {
+            net_.listen(at, process_->shared_from_this(), bounds, [this, arrived](const link_ptr& made) {
+                remember(made, true);
+                arrived(made);
+            });
+        };
+        return std::make_unique<door>(where, open, [this, at] {
+            if (process_ != nullptr) {
+                net_.shut(at);
+            }
+        });
     }
-    if (where.scheme == "udp") {
-        return std::make_unique<datagram_acceptor>(*this, where);
-    }
-    return std::make_unique<local_acceptor>(where);
-}
-
-void virtual_environment::accepted(const std::function<void(link_ptr)>& on_link, const link_ptr& made) {
-    remember(made);
-    if (const auto stream = std::dynamic_pointer_cast<stream_half>(made)) {
-        std::erase_if(streams_in_, [](const auto& each) { return each.expired(); });
-        streams_in_.push_back(stream);
-    }
-    on_link(made);
+    const auto port = std::make_shared<datagram_port>(net_, process_->shared_from_this(), at, strangers_);
+    const auto open = [this, port](const on_link& arrived) {
+        port->accept([this, arrived](const link_ptr& made) {
+            remember(made, true);
+            arrived(made);
+        });
+        port->open();
+    };
+    return std::make_unique<door>(where, open, [port] { port->accept(nullptr); });
 }
 
 std::function<void()> virtual_environment::dial(const url& where, const limits& bounds, dial_callback done) {
@@ -177,7 +155,7 @@ std::function<void()> virtual_environment::dial(const url& where, const limits& 
             return;
         }
         if (made) {
-            remember(made);
+            remember(made, false);
         }
         done(code, made);
     };
@@ -199,15 +177,15 @@ std::function<void()> virtual_environment::dial(const url& where, const limits& 
     return [wanted] { *wanted = false; };
 }
 
-void virtual_environment::remember(const link_ptr& made) {
-    std::erase_if(links_, [](const auto& each) { return each.expired(); });
-    links_.push_back(made);
+void virtual_environment::remember(const link_ptr& made, bool incoming) {
+    std::erase_if(links_, [](const auto& each) { return each.first.expired(); });
+    links_.emplace_back(made, incoming);
 }
 
 std::size_t virtual_environment::most_held() const {
     std::size_t most = 0;
-    for (const auto& each : streams_in_) {
-        const auto stream = each.lock();
+    for (const auto& [weak, incoming] : links_) {
+        const auto stream = std::dynamic_pointer_cast<stream_half>(incoming ? weak.lock() : nullptr);
         most = stream ? std::max(most, stream->held()) : most;
     }
     return most;
@@ -238,8 +216,8 @@ void virtual_environment::end() {
     net_.close_doors(process_->host());
     process_ = nullptr;
     on_due_ = nullptr;
-    for (const auto& each : std::exchange(links_, {})) {
-        if (const auto open = each.lock()) {
+    for (const auto& [weak, incoming] : std::exchange(links_, {})) {
+        if (const auto open = weak.lock()) {
             open->output().clear();
             open->urgent_output().clear();
             open->close();

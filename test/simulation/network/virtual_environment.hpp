@@ -13,13 +13,13 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::simulation {
 
 class group_port;
 class node_run;
-class stream_half;
 
 /// The environment of one simulated node: virtual time, the simulated network, and chance from a seed.
 ///
@@ -56,6 +56,8 @@ class virtual_environment final : public core::environment {
     [[nodiscard]] bool has_ended() const noexcept { return process_ == nullptr; }
     /// Drops the tasks that did not run before `end`, and all that follow.
     void discard_tasks();
+    /// For planted faults: shows the node another time while its timer goes off.
+    void run_timer_as_if(time_point shown);
     /// The clock has jumped: a timer that is due by now goes off.
     void on_jump() { arm_timer(); }
     /// The most bytes that a link which others opened holds for its peer.
@@ -64,15 +66,14 @@ class virtual_environment final : public core::environment {
     [[nodiscard]] group_port* group() const noexcept { return group_.get(); }
 
   private:
-    class local_acceptor;
-    class stream_acceptor;
-    class datagram_acceptor;
+    class door;
+    using on_link = std::function<void(link_ptr)>;
 
     void run_next();
     void arm_timer();
     void on_timer();
-    void accepted(const std::function<void(link_ptr)>& on_link, const link_ptr& made);
-    void remember(const link_ptr& made);
+    void run_timer();
+    void remember(const link_ptr& made, bool incoming);
 
     network& net_;
     node_run* process_; // null: it has ended
@@ -82,10 +83,9 @@ class virtual_environment final : public core::environment {
     bool discards_ = false;
     std::function<void()> on_due_;
     std::optional<time_point> due_;
-    std::uint64_t timer_ = 0;         // the one that counts
-    std::optional<time_point> shown_; // the time as a planted fault shows it
-    std::vector<std::weak_ptr<link>> links_;
-    std::vector<std::weak_ptr<stream_half>> streams_in_; // that others opened
+    std::uint64_t timer_ = 0;                                 // the one that counts
+    std::optional<time_point> shown_;                         // the time as a planted fault shows it
+    std::vector<std::pair<std::weak_ptr<link>, bool>> links_; // and whether others opened them
     std::shared_ptr<group_port> group_;
 };
 

@@ -1,102 +1,269 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/workload/follower.hpp"
 
+#include "node/publish/feed_machine.hpp"
+#include "node/publish/group_feeds.hpp"
+#include "simulation/workload/body.hpp"
+
+#include <algorithm>
 #include <utility>
 
 namespace cles::simulation {
+namespace {
 
-/// The end of the first BIND. The follower's machine holds it, and so it does not hold the follower.
-class follower::first_answer final : public detail::pending {
+using std::chrono::milliseconds;
+
+class link_follower final : public follower, private core::feed_host {
   public:
-    explicit first_answer(std::weak_ptr<follower> owner) : owner_(std::move(owner)) {}
-    verdict offer(std::string_view) override {
-        const std::unique_ptr<first_answer> self{this};
-        if (const auto owner = owner_.lock()) {
-            owner->begin();
+    link_follower(node_run& node, manner what, core::feed_terms terms)
+        : follower(node, std::move(what)), terms_(std::move(terms)),
+          machine_(*this, node.node()->deadlines, node.node()->completions, node.bounds(), how().target, how().path,
+                   how().thinned, how().label * 7919U) {}
+    ~link_follower() override { leave(); }
+
+    void start() override {
+        local().feeds().enter(machine_, shared_from_this(), terms_);
+        // The machine holds it, and so it does not hold the follower.
+        machine_.start(when_ended(
+            [weak = weak_self()](std::string_view) {
+                if (const auto self = weak.lock()) {
+                    self->begin();
+                }
+            },
+            [weak = weak_self()](errc, std::string_view why) {
+                if (const auto self = weak.lock()) {
+                    self->at().watcher().saw(self->name(), "was refused", why);
+                }
+            }));
+        if (at().fault() == planted::rebind_hurried) {
+            hurry();
         }
-        return verdict::completed;
     }
-    void fail(boost::system::error_code, std::string_view why) override {
-        const std::unique_ptr<first_answer> self{this};
-        if (const auto owner = owner_.lock()) {
-            owner->at().watcher().saw(owner->name(), "was refused", why);
+    void close() override {
+        machine_.close(errc::cancelled);
+        leave();
+    }
+
+  private:
+    [[nodiscard]] std::weak_ptr<link_follower> weak_self() {
+        return std::static_pointer_cast<link_follower>(shared_from_this());
+    }
+    core::feed_mailbox& mail() override { return machine_.mail(); }
+    void leave() {
+        if (!std::exchange(left_, true)) {
+            local().feeds().leave(machine_);
         }
     }
+    // What a planted fault does: no pause lasts longer than this.
+    void hurry() {
+        at().later(milliseconds{20}, [weak = weak_self()] {
+            if (const auto self = weak.lock()) {
+                self->machine_.expedite(self->at().now());
+                self->hurry();
+            }
+        });
+    }
+
+    // Looks how the machine uses its host, and passes all on to the library's.
+    void bind(core::feed_machine& feed) override {
+        constexpr milliseconds shortest_pause{75}; // the first one, less a quarter
+        const auto now = at().now();
+        // In the group it may have heard that the publisher is back.
+        if (at().group() == nullptr && now < last_bind_ + shortest_pause) {
+            complain(rule::backs_off, "binds again without a pause");
+        }
+        last_bind_ = now;
+        local().feeds().bind(feed);
+    }
+    void unbind(core::feed_machine& feed) override { local().feeds().unbind(feed); }
+    void detach(core::feed_machine& feed) override { local().feeds().detach(feed); }
+    void renew(core::feed_machine& feed, time_point until) override { local().feeds().renew(feed, until); }
+
+    core::feed_terms terms_;
+    core::feed_machine machine_;
+    time_point last_bind_{};
+    bool left_ = false;
+};
+
+class group_follower final : public follower {
+  public:
+    group_follower(node_run& node, manner what)
+        : follower(node, std::move(what)), feed_(node.bounds(), node.node()->completions, how().target, how().path) {}
+    ~group_follower() override { leave(); }
+
+    void start() override {
+        local().group()->dispatcher().feeds().add(feed_, local().now());
+        begin();
+    }
+    void close() override {
+        leave();
+        static_cast<void>(feed_.mail().close());
+    }
+
+  private:
+    core::feed_mailbox& mail() override { return feed_.mail(); }
+    void leave() {
+        if (!std::exchange(left_, true)) {
+            local().group()->dispatcher().feeds().remove(feed_);
+        }
+    }
+
+    core::group_feed feed_;
+    bool left_ = false;
+};
+
+} // namespace
+
+std::shared_ptr<follower> follow_by_link(node_run& at, std::uint32_t label, std::string target, std::string path,
+                                         core::feed_terms terms, milliseconds slow) {
+    const bool thinned = terms.every_ms != 0;
+    return std::make_shared<link_follower>(
+        at,
+        follower::manner{
+            .label = label, .target = std::move(target), .path = std::move(path), .slow = slow, .thinned = thinned},
+        std::move(terms));
+}
+
+std::shared_ptr<follower> follow_by_group(node_run& at, std::uint32_t label, std::string target, std::string path,
+                                          milliseconds slow) {
+    return std::make_shared<group_follower>(
+        at, follower::manner{
+                .label = label, .target = std::move(target), .path = std::move(path), .slow = slow, .by_group = true});
+}
+
+std::string follower::name() const {
+    return node_.name() + (how_.by_group ? " group feed " : " feed ") + std::to_string(how_.label) + " of " +
+           how_.target + ":" + how_.path;
+}
+
+// -- fetching ------------------------------------------------------------------------------------------------------
+
+/// One wait for an event.
+class follower::next_event final : public detail::pending_event {
+  public:
+    explicit next_event(std::weak_ptr<follower> owner) : owner_(std::move(owner)) {}
+    bool deliver(const detail::raw_event& event) override {
+        if (!event.has_json()) {
+            return false;
+        }
+        const std::unique_ptr<next_event> self{this};
+        if (const auto owner = owner_.lock()) {
+            owner->take(event);
+        }
+        return true;
+    }
+    void fail(boost::system::error_code, std::string_view) override { delete this; }
     void discard() noexcept override { delete this; }
 
   private:
     std::weak_ptr<follower> owner_;
 };
 
-follower::follower(node_run& at, std::uint32_t label, unsigned to, core::feed_terms terms, std::string target,
-                   std::string path, std::chrono::milliseconds slow)
-    : feed_reader(at, label, slow), to_(to), terms_(std::move(terms)),
-      machine_(at.local().feeds(), at.node()->deadlines, at.node()->completions, at.bounds(), std::move(target),
-               std::move(path), terms_.every_ms != 0, label * 7919U) {}
-
-std::string follower::name() const { return at().name() + " feed " + std::to_string(label()) + " of " + terms_.noun; }
-
-void follower::start() {
-    const auto self = std::static_pointer_cast<follower>(shared_from_this());
-    local().feeds().enter(machine_, self, terms_);
-    machine_.start(detail::pending_ptr{new first_answer{self}});
+void follower::begin() {
+    begun_ = true;
+    node_.later({}, [self = shared_from_this()] { self->fetch(); });
 }
 
-void follower::close() {
-    machine_.close(errc::cancelled);
-    leave();
+void follower::hold(milliseconds time) {
+    held_ = true;
+    node_.later(time, [weak = weak_from_this()] {
+        if (const auto self = weak.lock()) {
+            self->held_ = false;
+            self->fetch();
+        }
+    });
 }
 
-void follower::leave() {
-    if (!std::exchange(left_, true)) {
-        local().feeds().leave(machine_);
+void follower::fetch() {
+    if (held_ || waits_ || !is_open()) {
+        return;
+    }
+    waits_ = true;
+    if (mail().next(core::feed_mailbox::event_ptr{new next_event{weak_from_this()}})) {
+        node_.later({}, [self = shared_from_this()] { self->mail().pump(); });
     }
 }
 
-void follower::on_event(const detail::raw_event& event) {
+void follower::take(const detail::raw_event& event) {
+    waits_ = false;
+    if (!std::exchange(fetch_planned_, true)) {
+        node_.later(how_.slow, [weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->fetch_planned_ = false;
+                self->fetch();
+            }
+        });
+    }
     if (event.kind == feed_event::gap) {
-        at().watcher().saw(name(), "missed", std::to_string(event.missed));
-        if (at().fault() != planted::gap_hidden) {
-            missed_ += event.missed;
-        }
-        if (is_thinned() && !event.publisher.empty()) {
-            complain(rule::gaps_told, "is thinned, and was told of a gap");
-        }
+        on_gap(event);
     } else if (event.kind == feed_event::update) {
         on_update(event);
-        if (at().fault() == planted::update_repeated && event.seq % 7 == 3) {
+        if (node_.fault() == (how_.by_group ? planted::group_repeated : planted::update_repeated) &&
+            event.seq % 7 == 3) {
             on_update(event);
         }
+    } else if (how_.by_group) {
+        complain(rule::update_order, "was told of more than updates and gaps");
     } else {
-        at().watcher().saw(name(),
-                           event.kind == feed_event::current   ? "is bound at"
-                           : event.kind == feed_event::rebound ? "is bound again"
-                                                               : "is lost",
-                           event.kind == feed_event::current ? event.body : event.text);
+        node_.watcher().saw(name(),
+                            event.kind == feed_event::current   ? "is bound at"
+                            : event.kind == feed_event::rebound ? "is bound again"
+                                                                : "is lost",
+                            event.kind == feed_event::current ? event.body : event.text);
+    }
+}
+
+// -- judging -------------------------------------------------------------------------------------------------------
+
+// In the group, what was shed before it was fetched is told for all publishers together.
+void follower::on_gap(const detail::raw_event& event) {
+    node_.watcher().saw(name(), "missed", std::to_string(event.missed));
+    if (node_.fault() != (how_.by_group ? planted::group_gap_hidden : planted::gap_hidden)) {
+        const auto who = publisher_of(event);
+        (who.empty() ? shed_ : sources_[who].missed) += event.missed;
+    }
+    if (how_.thinned && !event.publisher.empty()) {
+        complain(rule::gaps_told, "is thinned, and was told of a gap");
     }
 }
 
 void follower::on_update(const detail::raw_event& event) {
-    at().watcher().saw(name(), "got", event.body);
+    node_.watcher().saw(name(), "got", event.body);
     ++seen_;
-    const auto mark = mark_of(event.body);
-    if (mark.number == 0) { // published on request: it does not say by which run
+    const published_mark mark{.number = number_after(event.body, "{\"n\":"),
+                              .run = static_cast<unsigned>(number_after(event.body, "\"run\":"))};
+    if (mark.number == 0 && !how_.by_group) { // published on request: it does not say by which run
+        return;
+    }
+    const auto who = publisher_of(event);
+    if (!wants(who)) {
+        complain(rule::update_order, "got an update of " + who);
         return;
     }
     if (mark.number != event.seq) {
-        complain(rule::update_order,
-                 "got as " + std::to_string(event.seq) + " what was published as " + std::to_string(mark.number));
+        complain(rule::update_order, "got as " + std::to_string(event.seq) + " of " + who + " what was published as " +
+                                         std::to_string(mark.number));
     }
-    const auto before = std::exchange(last_, mark);
-    const auto told = std::exchange(missed_, 0);
+    auto& from = sources_[who];
+    const auto before = std::exchange(from.last, mark);
+    const auto told = std::exchange(from.missed, 0);
+    const auto text = [&](const published_mark& m) {
+        return std::to_string(m.number) + " of run " + std::to_string(m.run) + " of " + who;
+    };
     if (before.run > mark.run || (before.run == mark.run && before.number >= mark.number)) {
-        complain(rule::update_order, "got " + std::to_string(mark.number) + " of run " + std::to_string(mark.run) +
-                                         " after " + std::to_string(before.number) + " of run " +
-                                         std::to_string(before.run));
-    } else if (before.run == mark.run && !is_thinned() && before.number + told + 1 != mark.number) {
-        complain(rule::gaps_told, "got " + std::to_string(mark.number) + " after " + std::to_string(before.number) +
-                                      " and was told of " + std::to_string(told) + " missed");
+        complain(rule::update_order, "got " + text(mark) + " after " + text(before));
+        return;
     }
+    if (before.run != mark.run || how_.thinned) {
+        return;
+    }
+    const auto missed = mark.number - before.number - 1;
+    const auto untold = missed - std::min(missed, told);
+    if (told > missed || untold > shed_) {
+        complain(rule::gaps_told, "got " + text(mark) + " after " + text(before) + " and was told of " +
+                                      std::to_string(told) + " missed");
+    }
+    shed_ -= std::min(untold, shed_);
 }
 
 } // namespace cles::simulation

@@ -3,53 +3,101 @@
 
 #include <cles/feed_event.hpp>
 
-#include "node/publish/feed_machine.hpp"
-#include "simulation/workload/feed_reader.hpp"
+#include "node/publish/feed_links.hpp"
+#include "node/publish/feed_mailbox.hpp"
 #include "simulation/world/node_run.hpp"
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 
 namespace cles::simulation {
 
-/// A feed of a simulated program, that keeps account of what comes.
-class follower final : public feed_reader {
+/// What a published body says of itself.
+struct published_mark {
+    std::uint64_t number = 0; ///< of its noun, from 1; 0 where it says nothing
+    unsigned run = 0;         ///< of the publisher
+};
+
+/// A program that has a feed: fetches what comes, quickly, slowly, or not for a while, and keeps account of it.
+class follower : public std::enable_shared_from_this<follower> {
   public:
-    /// `to`: the host of the publisher, whose URL is in the terms.
-    follower(node_run& at, std::uint32_t label, unsigned to, core::feed_terms terms, std::string target,
-             std::string path, std::chrono::milliseconds slow);
-    ~follower() override { leave(); }
+    struct manner {
+        std::uint32_t label;
+        std::string target; ///< a node's name; in the group also "all"
+        std::string path;
+        std::chrono::milliseconds slow;
+        bool by_group = false;
+        bool thinned = false;
+    };
+    follower(const follower&) = delete;
+    follower& operator=(const follower&) = delete;
+    virtual ~follower() = default;
 
-    void start();
-    void close();
+    virtual void start() = 0;
+    virtual void close() = 0;
+    /// Does not fetch for so long.
+    void hold(std::chrono::milliseconds time);
 
-    [[nodiscard]] unsigned to() const noexcept { return to_; }
-    [[nodiscard]] const std::string& path() const noexcept { return machine_.path(); }
-    [[nodiscard]] bool is_thinned() const noexcept { return terms_.every_ms != 0; }
+    [[nodiscard]] node_run& at() noexcept { return node_; }
+    [[nodiscard]] const manner& how() const noexcept { return how_; }
+    [[nodiscard]] std::string name() const;
     /// It was bound and has not been closed: it is to receive what is published.
-    [[nodiscard]] bool is_open() const noexcept { return has_begun() && !machine_.closed(); }
+    [[nodiscard]] bool is_open() { return begun_ && !mail().closed(); }
+    /// Whether it is to receive what that node publishes.
+    [[nodiscard]] bool wants(std::string_view node) const noexcept {
+        return node != node_.name() && (how_.target == "all" || how_.target == node);
+    }
     [[nodiscard]] std::uint64_t seen() const noexcept { return seen_; }
-    /// The last update that it was given, or told to have missed.
-    [[nodiscard]] published_mark last() const noexcept { return last_; }
-    [[nodiscard]] std::string name() const override;
+    /// The last update that it was given of that publisher.
+    [[nodiscard]] published_mark last_of(const std::string& publisher) { return sources_[publisher].last; }
+
+  protected:
+    follower(node_run& at, manner how) : node_(at), local_(at.shared_local()), how_(std::move(how)) {}
+
+    /// From now on it fetches.
+    void begin();
+    /// Kept, as a feed keeps its service.
+    [[nodiscard]] core::local_node& local() noexcept { return *local_; }
+    void complain(rule which, const std::string& what) { node_.watcher().broken(which, name() + " " + what); }
 
   private:
-    class first_answer;
+    class next_event;
+    struct source {
+        published_mark last;
+        std::uint64_t missed = 0; // told since then
+    };
 
-    core::feed_mailbox& mail() override { return machine_.mail(); }
-    void on_event(const detail::raw_event& event) override;
+    virtual core::feed_mailbox& mail() = 0;
+    void fetch();
+    void take(const detail::raw_event& event);
+    void on_gap(const detail::raw_event& event);
     void on_update(const detail::raw_event& event);
-    void leave();
+    [[nodiscard]] std::string publisher_of(const detail::raw_event& event) const {
+        return how_.by_group ? std::string{event.publisher} : how_.target;
+    }
 
-    unsigned to_;
-    core::feed_terms terms_;
-    core::feed_machine machine_;
-    published_mark last_;
-    std::uint64_t missed_ = 0; // told since then
+    node_run& node_;
+    std::shared_ptr<core::local_node> local_;
+    manner how_;
+    std::map<std::string, source> sources_;
+    std::uint64_t shed_ = 0; // told as missed, but not of whom
     std::uint64_t seen_ = 0;
-    bool left_ = false;
+    bool begun_ = false;
+    bool waits_ = false;
+    bool held_ = false;
+    bool fetch_planned_ = false;
 };
+
+/// A feed by a link to the publisher, whose URL is in the terms.
+std::shared_ptr<follower> follow_by_link(node_run& at, std::uint32_t label, std::string target, std::string path,
+                                         core::feed_terms terms, std::chrono::milliseconds slow);
+/// A feed by the multicast group.
+std::shared_ptr<follower> follow_by_group(node_run& at, std::uint32_t label, std::string target, std::string path,
+                                          std::chrono::milliseconds slow);
 
 } // namespace cles::simulation

@@ -1,179 +1,310 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "simulation/workload/following.hpp"
-
+#include "protocol/datagram.hpp"
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+#include "simulation/network/group_port.hpp"
+#include "simulation/workload/follower.hpp"
 #include "simulation/world/world.hpp"
 
 #include <algorithm>
+#include <array>
+#include <map>
 #include <utility>
+#include <vector>
 
 namespace cles::simulation {
 namespace {
 
 using std::chrono::milliseconds;
 
-constexpr unsigned when_there_is_room = 2; // the noun that is published so
+constexpr std::size_t own_nouns = 3;         // that a node publishes by itself
+constexpr unsigned when_there_is_room = 2;   // the one of them that is published so
+constexpr const char* beacon = "beacon";     // published once by each run, and followed by nobody before the end
+constexpr milliseconds repeated_within{600}; // twice what a repeat is put off by, and the way
 
 std::string path_of(unsigned noun) {
-    if (noun == 3) {
+    if (noun == own_nouns) {
         return "notice";
     }
-    return noun == 4 ? "survey" : "fix/" + std::to_string(noun);
+    return noun > own_nouns ? "survey" : "fix/" + std::to_string(noun);
 }
 
-/// The end of an offer to publish.
-class offered_update final : public detail::pending {
+class following final : public part {
   public:
-    explicit offered_update(std::size_t& open) : open_(open) { ++open_; }
-    verdict offer(std::string_view) override {
-        delete this;
-        return verdict::completed;
+    explicit following(world& in) : world_(in), published_(in.hosts()) {}
+
+    void on_start(node_run& n) override {
+        n.node()->tasks.add(verb::bind, "fix", {});
+        published_[n.host()] = {};
+        if (world_.has_group()) {
+            n.node()->tasks.add(verb::bind, beacon, {});
+            n.local().publish(beacon, [&](json_writer& w) {
+                w.raw("{\"n\":1,\"run\":" + std::to_string(world_.runs(n.host())) + "}");
+            });
+        }
     }
-    void fail(boost::system::error_code, std::string_view) override { delete this; }
-    void discard() noexcept override { delete this; }
+
+    void on_crash(node_run& n) override {
+        std::erase_if(followers_, [&](const auto& each) { return &each.second->at() == &n; });
+        std::erase_if(nouns_, [&](const auto& each) { return each.first.first == &n; });
+    }
+
+    void perform(const action& a) override {
+        switch (a.what) {
+        case deed::follow: follow(a); break;
+        case deed::gather: gather(a); break;
+        case deed::hold:
+            if (const auto f = find(a["feed"])) {
+                f->hold(milliseconds{a["for"]});
+            }
+            break;
+        case deed::leave:
+            if (const auto f = find(a["feed"]); f && !f->at().frozen()) {
+                f->at().run([&] { f->close(); });
+                std::erase_if(followers_, [&](const auto& each) { return each.second == f; });
+            }
+            break;
+        case deed::publish: publish(a["host"], a["noun"], a["count"], a["size"]); break;
+        case deed::offer: offer(a["host"], a["count"], a["size"]); break;
+        default: break;
+        }
+    }
+
+    void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override {
+        if (datagram.ends_with('\n')) {
+            datagram.remove_suffix(1);
+        }
+        protocol::request_line bind;
+        protocol::malformed_request ignored;
+        if (from == at.group()->source() || !protocol::parse_request(datagram, bind, ignored) ||
+            bind.verb != verb::bind || bind.noun.task == "cles" ||
+            (bind.noun.target != "all" && bind.noun.target != at.name())) {
+            return;
+        }
+        std::string scratch;
+        auto& of = nouns_[{&at, std::string{protocol::canonical_path(bind.noun, scratch)}}];
+        if (bind.unbinds()) {
+            of.leases.erase(from);
+            return;
+        }
+        auto& until = of.leases[from];
+        of.newly_bound |= until <= at.now();
+        until = at.now() + milliseconds{bind.lease_ms.value_or(protocol::default_lease_ms)};
+    }
+
+    void on_group_sent(node_run& by, std::string_view line) override {
+        protocol::request_line update;
+        protocol::malformed_request ignored;
+        if (!protocol::parse_request(line.substr(0, line.size() - 1), update, ignored) || !update.is_update() ||
+            update.noun.task == "cles") {
+            return;
+        }
+        std::string scratch;
+        const std::string path{protocol::canonical_path(update.noun, scratch)};
+        auto& of = nouns_[{&by, path}];
+        const auto complain = [&](const std::string& what) {
+            world_.watcher().broken(rule::sent_once,
+                                    by.name() + " sends " + std::to_string(*update.seq) + " of " + path + " " + what);
+        };
+        const auto now = by.now();
+        // One that was stopped goes through all that was due meanwhile.
+        if (!by.was_frozen_until_now() &&
+            std::none_of(of.leases.begin(), of.leases.end(), [now](const auto& l) { return l.second >= now; })) {
+            complain("though nobody is bound");
+        }
+        if (*update.seq < of.sent) {
+            complain("after " + std::to_string(of.sent));
+        } else if (*update.seq == of.sent && !std::exchange(of.newly_bound, false)) {
+            complain("again, and nobody is newly bound");
+        }
+        of.sent = *update.seq;
+    }
+
+    void probe() override {
+        for (const auto& [key, f] : followers_) {
+            seen_before_probe_[f->how().label] = f->seen();
+        }
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            publish(host, 0, 2, 10);
+            publish(host, 1, 2, 10);
+            offer(host, 2, 10);
+            auto* n = world_.node(host);
+            n->run([n] {
+                for (const auto* noun : {"notice", "survey"}) {
+                    n->local().publish(noun, [](json_writer& w) { w.raw("{}"); });
+                }
+            });
+        }
+        if (world_.has_group()) {
+            probe_group();
+        }
+    }
+
+    void judge_probe() override {
+        for (const auto& [key, f] : followers_) {
+            if (!f->is_open()) {
+                continue;
+            }
+            const auto before = seen_before_probe_.find(f->how().label);
+            if (before != seen_before_probe_.end() && f->seen() == before->second) {
+                world_.watcher().broken(rule::feeds_receive, f->name() + " receives nothing though all is well");
+                continue;
+            }
+            for (unsigned host = 0; host < world_.hosts(); ++host) {
+                if (f->wants(world::name_of(host))) {
+                    judge_last(*f, host);
+                }
+            }
+        }
+    }
+
+    void wind_down() override {
+        for (const auto& [key, f] : followers_) {
+            f->at().run([closed = f] { closed->close(); });
+        }
+        followers_.clear();
+        // Whoever left without a word is noticed when something is written to him.
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            world_.node(host)->later(std::chrono::seconds{1}, [this, host] {
+                for (unsigned noun = 0; noun < own_nouns; ++noun) {
+                    publish(host, noun, 1, 0);
+                }
+            });
+        }
+    }
+
+    void judge_rest() override {
+        if (const auto open = offers_.use_count() - 1; open != 0) {
+            world_.watcher().broken(rule::at_rest, std::to_string(open) + " publications wait for room");
+        }
+    }
 
   private:
-    ~offered_update() { --open_; }
-    std::size_t& open_;
+    /// A publisher's noun, as the group has to do with it.
+    struct group_noun {
+        std::map<core::group_source, time_point> leases; // until when
+        std::uint64_t sent = 0;                          // the last update's number
+        bool newly_bound = false;                        // since the last update was repeated
+    };
+    using follower_ptr = std::shared_ptr<follower>;
+
+    [[nodiscard]] follower_ptr find(std::uint32_t label) const {
+        const auto found = std::find_if(followers_.begin(), followers_.end(),
+                                        [&](const auto& each) { return each.second->how().label == label; });
+        return found == followers_.end() ? nullptr : found->second;
+    }
+    follower_ptr add(node_run& n, const follower_ptr& made) {
+        followers_[{made->how().by_group, made->how().label}] = made;
+        n.run([&] { made->start(); });
+        return made;
+    }
+
+    void follow(const action& a) {
+        auto* n = world_.node(a["from"]);
+        if (n == nullptr || n->frozen() || find(a["feed"])) {
+            return;
+        }
+        const auto target = world::name_of(a["to"]);
+        const auto path = path_of(a["noun"]);
+        add(*n, follow_by_link(*n, a["feed"], target, path,
+                               {.noun = target + ":" + path,
+                                .at = url_of(a["to"], a["by"] == 0 ? carrier::stream : carrier::datagram),
+                                .every_ms = a["every"],
+                                .keep = a["keep"]},
+                               milliseconds{a["slow"]}));
+    }
+
+    void gather(const action& a) {
+        auto* n = world_.node(a["from"]);
+        if (world_.has_group() && n != nullptr && !n->frozen() && !find(a["feed"])) {
+            add(*n, follow_by_group(*n, a["feed"], a["all"] != 0 ? "all" : world::name_of(a["to"]), path_of(a["noun"]),
+                                    milliseconds{a["slow"]}));
+        }
+    }
+
+    // -- publishing ------------------------------------------------------------------------------------------------
+
+    [[nodiscard]] std::string next_body(unsigned host, unsigned noun, std::size_t size) {
+        std::string text =
+            "{\"n\":" + std::to_string(published_[host][noun] + 1) + ",\"run\":" + std::to_string(world_.runs(host));
+        if (size != 0) {
+            text += ",\"pad\":\"" + std::string(size, 'y') + "\"";
+        }
+        return text + "}";
+    }
+
+    void publish(unsigned host, unsigned noun, unsigned count, std::size_t size) {
+        auto* n = world_.node(host);
+        if (n == nullptr || n->frozen()) {
+            return;
+        }
+        n->run([&] {
+            for (; count != 0; --count) {
+                n->local().publish(path_of(noun), [&](json_writer& w) { w.raw(next_body(host, noun, size)); });
+                ++published_[host][noun];
+            }
+        });
+    }
+
+    void offer(unsigned host, unsigned count, std::size_t size) {
+        auto* n = world_.node(host);
+        if (n == nullptr || n->frozen()) {
+            return;
+        }
+        n->run([&] {
+            for (; count != 0; --count) {
+                n->local().publish_when_room(path_of(when_there_is_room), next_body(host, when_there_is_room, size),
+                                             when_ended([open = offers_](std::string_view) {}));
+                ++published_[host][when_there_is_room];
+            }
+        });
+    }
+
+    // -- judging ---------------------------------------------------------------------------------------------------
+
+    void probe_group() {
+        std::vector<follower_ptr> newcomers;
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            auto& n = *world_.node(host);
+            const auto target = host % 2 == 0 ? world::name_of((host + 1) % world_.hosts()) : "all";
+            newcomers.push_back(add(n, follow_by_group(n, ++next_probe_, target, beacon, milliseconds{0})));
+        }
+        world_.time().at(world_.time().now() + repeated_within, [this, newcomers] {
+            for (const auto& f : newcomers) {
+                for (unsigned host = 0; host < world_.hosts(); ++host) {
+                    const auto name = world::name_of(host);
+                    if (f->wants(name) && f->last_of(name).run != world_.runs(host)) {
+                        world_.watcher().broken(rule::first_soon,
+                                                f->name() + " has not got the last update of " + name);
+                    }
+                }
+            }
+        });
+    }
+
+    void judge_last(follower& f, unsigned host) {
+        const auto last = f.last_of(world::name_of(host));
+        for (unsigned noun = 0; noun < own_nouns; ++noun) {
+            const auto published = published_[host][noun];
+            if (f.how().path == path_of(noun) && (last.run != world_.runs(host) || last.number != published)) {
+                world_.watcher().broken(rule::feeds_receive, f.name() + " has got " + std::to_string(last.number) +
+                                                                 " of " + std::to_string(published) + " that " +
+                                                                 world::name_of(host) + " has published");
+            }
+        }
+    }
+
+    world& world_;
+    std::map<std::pair<bool, std::uint32_t>, follower_ptr> followers_; // by whether it is by the group, and label
+    std::map<std::uint32_t, std::uint64_t> seen_before_probe_;
+    std::vector<std::array<std::uint64_t, own_nouns>> published_; // by the present run of each host
+    std::map<std::pair<const node_run*, std::string>, group_noun> nouns_;
+    std::shared_ptr<void> offers_ = std::make_shared<bool>(); // shared by those that have not ended
+    std::uint32_t next_probe_ = 10'000'000;
 };
 
 } // namespace
 
-following::following(world& in) : world_(in), published_(in.hosts()) {}
-following::~following() = default;
-
-void following::on_start(node_run& n) {
-    n.node()->tasks.add(verb::bind, "fix", {});
-    published_[n.host()] = {};
-}
-
-void following::on_crash(node_run& n) { followers_.forget(n); }
-
-void following::perform(const action& a) {
-    switch (a.what) {
-    case deed::follow: follow(a); break;
-    case deed::hold: followers_.hold(a); break;
-    case deed::leave: followers_.leave(a); break;
-    case deed::publish: publish(a["host"], a["noun"], a["count"], a["size"]); break;
-    case deed::offer: offer(a["host"], a["count"], a["size"]); break;
-    default: break;
-    }
-}
-
-void following::follow(const action& a) {
-    auto* n = world_.node(a["from"]);
-    if (n == nullptr || n->frozen() || followers_.find(a["feed"])) {
-        return;
-    }
-    const auto target = world::name_of(a["to"]);
-    const auto path = path_of(a["noun"]);
-    const auto made = std::make_shared<follower>(
-        *n, a["feed"], a["to"],
-        core::feed_terms{.noun = target + ":" + path,
-                         .at = url_of(a["to"], a["by"] == 0 ? carrier::stream : carrier::datagram),
-                         .every_ms = a["every"],
-                         .keep = a["keep"]},
-        target, path, milliseconds{a["slow"]});
-    followers_.add(made);
-    n->run([&] { made->start(); });
-}
-
-// -- publishing ----------------------------------------------------------------------------------------------------
-
-std::string following::body(unsigned host, unsigned noun, std::size_t size) {
-    std::string text =
-        "{\"n\":" + std::to_string(published_[host][noun] + 1) + ",\"run\":" + std::to_string(world_.runs(host));
-    if (size != 0) {
-        text += ",\"pad\":\"" + std::string(size, 'y') + "\"";
-    }
-    return text + "}";
-}
-
-void following::publish(unsigned host, unsigned noun, unsigned count, std::size_t size) {
-    auto* n = world_.node(host);
-    if (n == nullptr || n->frozen()) {
-        return;
-    }
-    n->run([&] {
-        for (; count != 0; --count) {
-            n->local().publish(path_of(noun), [&](json_writer& w) { w.raw(body(host, noun, size)); });
-            ++published_[host][noun];
-        }
-    });
-}
-
-void following::offer(unsigned host, unsigned count, std::size_t size) {
-    auto* n = world_.node(host);
-    if (n == nullptr || n->frozen()) {
-        return;
-    }
-    n->run([&] {
-        for (; count != 0; --count) {
-            n->local().publish_when_room(path_of(when_there_is_room), body(host, when_there_is_room, size),
-                                         detail::pending_ptr{new offered_update{offers_}});
-            ++published_[host][when_there_is_room];
-        }
-    });
-}
-
-// -- judging -------------------------------------------------------------------------------------------------------
-
-void following::probe() {
-    for (const auto& f : followers_) {
-        seen_before_probe_[f->label()] = f->seen();
-    }
-    for (unsigned host = 0; host < world_.hosts(); ++host) {
-        publish(host, 0, 2, 10);
-        publish(host, 1, 2, 10);
-        offer(host, 2, 10);
-        auto* n = world_.node(host);
-        n->run([n] {
-            for (const auto* noun : {"notice", "survey"}) {
-                n->local().publish(noun, [](json_writer& w) { w.raw("{}"); });
-            }
-        });
-    }
-}
-
-void following::judge_probe() {
-    for (const auto& f : followers_) {
-        if (!f->is_open()) {
-            continue;
-        }
-        if (f->seen() == seen_before_probe_[f->label()]) {
-            world_.watcher().broken(rule::feeds_receive, f->name() + " receives nothing though all is well");
-            continue;
-        }
-        const auto to = f->to();
-        for (unsigned noun = 0; noun < own_nouns; ++noun) {
-            if (f->path() == path_of(noun) &&
-                (f->last().run != world_.runs(to) || f->last().number != published_[to][noun])) {
-                world_.watcher().broken(rule::feeds_receive, f->name() + " has got " +
-                                                                 std::to_string(f->last().number) + " of " +
-                                                                 std::to_string(published_[to][noun]) + " published");
-            }
-        }
-    }
-}
-
-void following::wind_down() {
-    for (const auto& f : followers_) {
-        f->at().run([&] { f->close(); });
-    }
-    followers_.clear();
-    // Whoever left without a word is noticed when something is written to him.
-    for (unsigned host = 0; host < world_.hosts(); ++host) {
-        world_.node(host)->later(std::chrono::seconds{1}, [this, host] {
-            for (unsigned noun = 0; noun < own_nouns; ++noun) {
-                publish(host, noun, 1, 0);
-            }
-        });
-    }
-}
-
-void following::judge_rest() {
-    if (offers_ != 0) {
-        world_.watcher().broken(rule::at_rest, std::to_string(offers_) + " publications wait for room");
-    }
-}
+std::unique_ptr<part> make_following(world& in) { return std::make_unique<following>(in); }
 
 } // namespace cles::simulation

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "simulation/workload/neighbouring.hpp"
-
 #include "node/membership/announcement.hpp"
 #include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 #include "simulation/world/world.hpp"
 
+#include <algorithm>
+#include <map>
+#include <set>
 #include <utility>
-#include <vector>
 
 namespace cles::simulation {
 namespace {
@@ -31,294 +31,309 @@ std::string run_text(std::string_view node, std::uint32_t epoch) {
 
 std::string door_of(unsigned host) { return url_of(host, carrier::stream); }
 
-} // namespace
-
-neighbouring::~neighbouring() {
-    for (const auto& [host, n] : namesakes_) {
-        n->crash();
-    }
-}
-
-void neighbouring::perform(const action& a) {
-    if (!world_.has_group()) {
-        return;
-    }
-    switch (a.what) {
-    case deed::depart: world_.depart(a["host"], milliseconds{a["down"]}); break;
-    case deed::namesake:
-        begin_namesake(a["host"]);
-        world_.time().at(world_.time().now() + milliseconds{a["for"]},
-                         [this, host = a["host"], silently = a["silent"] != 0] { end_namesake(host, silently); });
-        break;
-    default: break;
-    }
-}
-
-void neighbouring::on_start(node_run& n) {
-    record_begin(n);
-    if (world_.has_group() && !std::exchange(looking_, true)) {
-        look_at_all();
-    }
-}
-
-void neighbouring::on_crash(node_run& n) { accounts_.erase(&n); }
-
-// -- namesakes -----------------------------------------------------------------------------------------------------
-
-void neighbouring::begin_namesake(unsigned of) {
-    auto& n = namesakes_[of];
-    if (!n) {
-        n = world_.begin_stranger(world::name_of(of), world_.hosts() + of, ++namesake_runs_);
-        record_begin(*n);
-    }
-}
-
-void neighbouring::end_namesake(unsigned of, bool silently) {
-    const auto found = namesakes_.extract(of);
-    if (!found) {
-        return;
-    }
-    auto& n = *found.mapped();
-    if (!silently) {
-        n.stop();
-    }
-    world_.end_run(n);
-}
-
-// -- what is heard -------------------------------------------------------------------------------------------------
-
-void neighbouring::on_group_heard(node_run& at, const core::group_source&, std::string_view datagram) {
-    protocol::request_line update;
-    protocol::malformed_request ignored;
-    core::announcement said;
-    std::string why;
-    if (datagram.ends_with('\n')) {
-        datagram.remove_suffix(1);
-    }
-    if (!protocol::parse_request(datagram, update, ignored) || !update.is_update() || update.noun.task != "cles" ||
-        !read_announcement(update, said, why)) {
-        return;
-    }
-    auto& r = accounts_[&at].runs[*update.epoch];
-    if (*update.seq <= r.seq) { // overtaken
-        return;
-    }
-    if (said.leaving) {
-        const auto known = at.node()->peers.find_member(said.node);
-        r.left = known && known->epoch == *update.epoch;
-        r.seq = r.left ? *update.seq : r.seq;
-        return;
-    }
-    r.node = said.node;
-    r.seq = *update.seq;
-    r.at = at.now();
-    r.interval = said.interval;
-}
-
-// Silence counts from the last word, or from when whoever listens was back.
-time_point neighbouring::last_chance(const node_run& n, const heard_run& r) { return std::max(r.at, n.back_since()); }
-
-// Whether that run has been there for long enough, and within reach, to answer whoever asked it whether it is.
-bool neighbouring::could_answer(node_run& at, std::string_view node, std::uint32_t epoch) {
-    constexpr seconds enough{2};
-    const auto listens = [&](node_run& n) {
-        return !n.frozen() && n.thawed_at() + enough < n.now() && !n.was_frozen_until_now();
-    };
-    const auto is_it = [&](node_run* n) {
-        return n != nullptr && n->name() == node && n->node()->epoch == protocol::epoch_text(epoch);
-    };
-    node_run* asked = nullptr;
-    for (unsigned host = 0; host < world_.hosts(); ++host) {
-        asked = is_it(world_.node(host)) ? world_.node(host) : asked;
-    }
-    for (const auto& [host, n] : namesakes_) {
-        asked = is_it(n.get()) ? n.get() : asked;
-    }
-    return asked != nullptr && listens(at) && listens(*asked) &&
-           world_.net().undisturbed_since(world_.time().now() - enough);
-}
-
-void neighbouring::record_begin(node_run& n) { began_[*protocol::parse_epoch(n.node()->epoch)] = n.now(); }
-
-// Of two runs of one name the earlier one keeps it. A node that heard the later one first learns this by asking both.
-bool neighbouring::has_precedence(std::uint32_t epoch, std::uint32_t over) const {
-    const auto later = began_.at(epoch) - began_.at(over);
-    return later <= seconds{0} || (later <= core::name_conflicts::same_start_tolerance && epoch < over);
-}
-
-// -- what is made of it --------------------------------------------------------------------------------------------
-
-void neighbouring::on_neighbour(node_run& at, std::string_view node, membership::change what) {
-    auto& mine = accounts_[&at];
-    const auto known = at.node()->peers.find_member(node);
-    const auto owner = mine.owners.find(node);
-    const auto* before = owner == mine.owners.end() ? nullptr : &mine.runs[owner->second];
-    const auto audible_until = [&](milliseconds (*span)(milliseconds)) {
-        return before == nullptr || before->left ? time_point::min()
-                                                 : last_chance(at, *before) + span(before->interval);
-    };
-    const auto complain_if_heard = [&](time_point until, const char* as) {
-        if (at.now() < until) {
-            complain(rule::nobody_lost, at, "takes " + run_text(node, owner->second) + " for " + as);
-        }
-    };
-    switch (what) {
-    case membership::change::silent: complain_if_heard(audible_until(until_silent), "silent"); break;
-    case membership::change::gone: complain_if_heard(audible_until(until_gone), "gone"); break;
-    case membership::change::left:
-        if (before == nullptr || !before->left) {
-            complain(rule::nobody_lost, at, "says that " + std::string{node} + " has left, which it has not");
-        }
-        break;
-    case membership::change::moved:
-        if (known && owner != mine.owners.end() && known->epoch != owner->second && !mine.silent.contains(node) &&
-            !has_precedence(known->epoch, owner->second) && could_answer(at, node, owner->second)) {
-            complain_if_heard(audible_until(until_silent), "another");
-        }
-        break;
-    case membership::change::clash: mine.clashes.emplace(node); break;
-    default: break;
-    }
-    mine.silent.erase(std::string{node});
-    if (known && known->suspect) {
-        mine.silent.emplace(node);
-    }
-    if (known) {
-        mine.owners.insert_or_assign(std::string{node}, known->epoch);
-    } else if (what != membership::change::clash) {
-        mine.owners.erase(std::string{node});
-    }
-}
-
-void neighbouring::look_at_all() {
-    if (!looking_) {
-        return;
-    }
-    for (unsigned host = 0; host < world_.hosts(); ++host) {
-        if (auto* n = world_.node(host); n != nullptr && !n->frozen() && !n->was_frozen_until_now()) {
-            look_at(*n);
+class neighbouring final : public part {
+  public:
+    explicit neighbouring(world& in) noexcept : world_(in) {}
+    ~neighbouring() override {
+        for (const auto& [host, n] : namesakes_) {
+            n->crash();
         }
     }
-    world_.time().at(world_.time().now() + look_every, [this] { look_at_all(); });
-}
 
-void neighbouring::look_at(node_run& n) {
-    n.node()->peers.for_each([&](const membership::member& other) { look_at(n, other); });
-}
-
-void neighbouring::look_at(node_run& n, const membership::member& other) {
-    const auto& runs = accounts_[&n].runs;
-    const auto found = runs.find(other.epoch);
-    const auto who = run_text(other.node, other.epoch);
-    if (found == runs.end() || found->second.node != other.node) {
-        complain(rule::gone_in_time, n, "lists " + who + ", whom it has not heard");
-        return;
+    void perform(const action& a) override {
+        if (a.what == deed::namesake && world_.has_group()) {
+            begin_namesake(a["host"]);
+            world_.time().at(world_.time().now() + milliseconds{a["for"]},
+                             [this, host = a["host"], silently = a["silent"] != 0] { end_namesake(host, silently); });
+        }
     }
-    const auto& r = found->second;
-    const auto since = std::max(r.at, n.thawed_at());
-    if (r.left) {
-        complain(rule::gone_in_time, n, "lists " + who + ", who has left");
-    } else if (n.now() > since + until_gone(r.interval) + slack) {
-        complain(rule::gone_in_time, n, "lists " + who + ", who is silent");
-    } else if (!other.suspect && n.now() > since + until_silent(r.interval) + slack) {
-        complain(rule::gone_in_time, n, "does not suspect " + who + ", who is silent");
-    }
-}
 
-// -- judging -------------------------------------------------------------------------------------------------------
-
-void neighbouring::on_calm() {
-    if (!world_.has_group()) {
-        return;
+    void on_start(node_run& n) override {
+        record_begin(n);
+        if (world_.has_group() && !std::exchange(looking_, true)) {
+            look_at_all();
+        }
     }
-    while (!namesakes_.empty()) {
-        end_namesake(namesakes_.begin()->first, true);
-    }
-    world_.time().at(world_.time().now() + until_all_know, [this] { expect_all_known("soon"); });
-}
 
-void neighbouring::expect_all_known(const char* when) {
-    for (unsigned host = 0; host < world_.hosts(); ++host) {
-        auto& n = *world_.node(host);
-        const auto& others = n.node()->peers;
-        for (unsigned other = 0; other < world_.hosts(); ++other) {
-            const auto name = world::name_of(other);
-            const auto known = others.find_member(name);
-            if (other == host) {
-                continue;
+    void on_crash(node_run& n) override { accounts_.erase(&n); }
+
+    void on_group_heard(node_run& at, const core::group_source&, std::string_view datagram) override {
+        protocol::request_line update;
+        protocol::malformed_request ignored;
+        core::announcement said;
+        std::string why;
+        if (datagram.ends_with('\n')) {
+            datagram.remove_suffix(1);
+        }
+        if (!protocol::parse_request(datagram, update, ignored) || !update.is_update() || update.noun.task != "cles" ||
+            !read_announcement(update, said, why)) {
+            return;
+        }
+        auto& r = accounts_[&at].runs[*update.epoch];
+        if (*update.seq <= r.seq) { // overtaken
+            return;
+        }
+        if (said.leaving) {
+            const auto known = at.node()->peers.find_member(said.node);
+            r.left = known && known->epoch == *update.epoch;
+            r.seq = r.left ? *update.seq : r.seq;
+            return;
+        }
+        r.node = said.node;
+        r.seq = *update.seq;
+        r.at = at.now();
+        r.interval = said.interval;
+    }
+
+    void on_neighbour(node_run& at, std::string_view node, membership::change what) override {
+        auto& mine = accounts_[&at];
+        const auto known = at.node()->peers.find_member(node);
+        const auto owner = mine.owners.find(node);
+        const auto* before = owner == mine.owners.end() ? nullptr : &mine.runs[owner->second];
+        const auto audible_until = [&](milliseconds (*span)(milliseconds)) {
+            return before == nullptr || before->left ? time_point::min()
+                                                     : last_chance(at, *before) + span(before->interval);
+        };
+        const auto complain_if_heard = [&](time_point until, const char* as) {
+            if (at.now() < until) {
+                complain(rule::nobody_lost, at, "takes " + run_text(node, owner->second) + " for " + as);
             }
-            if (!known || known->suspect || protocol::epoch_text(known->epoch) != world_.node(other)->node()->epoch) {
-                complain(rule::others_known, n,
-                         "does not " + std::string{when} + " know " + name + " as it is" +
-                             (known ? ", but as " + run_text(name, known->epoch) : std::string{}));
-            } else if (known->where != door_of(other) || others.address_of(name) != door_of(other)) {
-                complain(rule::others_known, n, "takes " + name + " to be at " + std::string{known->where});
+        };
+        switch (what) {
+        case membership::change::silent: complain_if_heard(audible_until(until_silent), "silent"); break;
+        case membership::change::gone: complain_if_heard(audible_until(until_gone), "gone"); break;
+        case membership::change::left:
+            if (before == nullptr || !before->left) {
+                complain(rule::nobody_lost, at, "says that " + std::string{node} + " has left, which it has not");
             }
+            break;
+        case membership::change::moved:
+            if (known && owner != mine.owners.end() && known->epoch != owner->second && !mine.silent.contains(node) &&
+                !has_precedence(known->epoch, owner->second) && could_answer(at, node, owner->second)) {
+                complain_if_heard(audible_until(until_silent), "another");
+            }
+            break;
+        case membership::change::clash: mine.clashes.emplace(node); break;
+        default: break;
         }
-        if (others.size() >= world_.hosts()) {
-            complain(rule::others_known, n, "knows " + std::to_string(others.size()) + " others");
+        mine.silent.erase(std::string{node});
+        if (known && known->suspect) {
+            mine.silent.emplace(node);
+        }
+        if (known) {
+            mine.owners.insert_or_assign(std::string{node}, known->epoch);
+        } else if (what != membership::change::clash) {
+            mine.owners.erase(std::string{node});
         }
     }
-}
 
-void neighbouring::probe() {
-    if (!world_.has_group()) {
-        return;
-    }
-    expect_all_known("for long");
-    for (auto& [n, mine] : accounts_) {
-        mine.clashes.clear();
-    }
-    begin_namesake(0);
-    world_.time().at(world_.time().now() + namesake_lives, [this] {
-        for (unsigned host = 0; host < world_.hosts(); ++host) {
-            auto& n = *world_.node(host);
-            if (!accounts_[&n].clashes.contains(world::name_of(0))) {
-                complain(rule::clashes_told, n, "does not say that there is a second " + world::name_of(0));
-            }
-            const auto known = n.node()->peers.find_member(world::name_of(0));
-            if (host != 0 && (!known || protocol::epoch_text(known->epoch) != world_.node(0)->node()->epoch)) {
-                complain(rule::clashes_told, n, "asks a namesake for " + world::name_of(0));
-            }
+    void on_calm() override {
+        if (!world_.has_group()) {
+            return;
         }
-        end_namesake(0, false);
-    });
-}
+        while (!namesakes_.empty()) {
+            end_namesake(namesakes_.begin()->first, true);
+        }
+        world_.time().at(world_.time().now() + until_all_know, [this] { expect_all_known("soon"); });
+    }
 
-void neighbouring::judge_probe() {
-    if (!world_.has_group()) {
-        return;
-    }
-    expect_all_known("still");
-    for (unsigned host = 0; host < world_.hosts(); ++host) {
-        const auto& n = *world_.node(host)->node();
-        for (const auto& p : n.peers.list(n.time.now())) {
-            if (p.state == peer_state::clash) {
-                complain(rule::clashes_told, *world_.node(host), "still lists a second " + p.node);
-            }
+    void probe() override {
+        if (!world_.has_group()) {
+            return;
         }
-    }
-}
-
-void neighbouring::wind_down() {
-    looking_ = false;
-    for (unsigned host = 0; host < world_.hosts(); ++host) {
-        auto* n = world_.node(host);
-        if (n->group() == nullptr) {
-            continue;
+        expect_all_known("for long");
+        for (auto& [n, mine] : accounts_) {
+            mine.clashes.clear();
         }
-        n->run([&] {
-            if (host % 2 == 0) {
-                n->local().discovery().leave();
-            } else {
-                n->fall_silent();
+        begin_namesake(0);
+        world_.time().at(world_.time().now() + namesake_lives, [this] {
+            for (unsigned host = 0; host < world_.hosts(); ++host) {
+                auto& n = *world_.node(host);
+                if (!accounts_[&n].clashes.contains(world::name_of(0))) {
+                    complain(rule::clashes_told, n, "does not say that there is a second " + world::name_of(0));
+                }
+                const auto known = n.node()->peers.find_member(world::name_of(0));
+                if (host != 0 && (!known || protocol::epoch_text(known->epoch) != world_.node(0)->node()->epoch)) {
+                    complain(rule::clashes_told, n, "asks a namesake for " + world::name_of(0));
+                }
             }
+            end_namesake(0, false);
         });
     }
-}
 
-void neighbouring::complain(rule which, node_run& at, const std::string& what) {
-    world_.watcher().broken(which, at.name() + " " + what);
-}
+    void judge_probe() override {
+        if (!world_.has_group()) {
+            return;
+        }
+        expect_all_known("still");
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            const auto& n = *world_.node(host)->node();
+            for (const auto& p : n.peers.list(n.time.now())) {
+                if (p.state == peer_state::clash) {
+                    complain(rule::clashes_told, *world_.node(host), "still lists a second " + p.node);
+                }
+            }
+        }
+    }
+
+    void wind_down() override {
+        looking_ = false;
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            auto* n = world_.node(host);
+            if (n->group() == nullptr) {
+                continue;
+            }
+            n->run([&] {
+                if (host % 2 == 0) {
+                    n->local().discovery().leave();
+                } else {
+                    n->fall_silent();
+                }
+            });
+        }
+    }
+
+  private:
+    /// What a node has heard of a run of another one.
+    struct heard_run {
+        std::string node;
+        std::uint64_t seq = 0;
+        time_point at{};
+        milliseconds interval{0};
+        bool left = false; ///< said so, and was listed then
+    };
+    /// What a node has heard, and said of it.
+    struct account {
+        std::map<std::uint32_t, heard_run> runs;                  // by epoch
+        std::map<std::string, std::uint32_t, std::less<>> owners; // of names: their epochs
+        std::set<std::string, std::less<>> silent;
+        std::set<std::string, std::less<>> clashes;
+    };
+
+    void record_begin(node_run& n) { began_[*protocol::parse_epoch(n.node()->epoch)] = n.now(); }
+    void begin_namesake(unsigned of) {
+        auto& n = namesakes_[of];
+        if (!n) {
+            n = world_.begin_stranger(world::name_of(of), world_.hosts() + of, ++namesake_runs_);
+            record_begin(*n);
+        }
+    }
+
+    void end_namesake(unsigned of, bool silently) {
+        const auto found = namesakes_.extract(of);
+        if (!found) {
+            return;
+        }
+        auto& n = *found.mapped();
+        if (!silently) {
+            n.stop();
+        }
+        world_.end_run(n);
+    }
+
+    // -- judging ---------------------------------------------------------------------------------------------------
+
+    // Silence counts from the last word, or from when whoever listens was back.
+    [[nodiscard]] static time_point last_chance(const node_run& n, const heard_run& r) {
+        return std::max(r.at, n.back_since());
+    }
+
+    // Whether that run has been there for long enough, and within reach, to answer whoever asked it whether it is.
+    [[nodiscard]] bool could_answer(node_run& at, std::string_view node, std::uint32_t epoch) {
+        constexpr seconds enough{2};
+        const auto listens = [&](node_run& n) {
+            return !n.frozen() && n.thawed_at() + enough < n.now() && !n.was_frozen_until_now();
+        };
+        const auto is_it = [&](node_run* n) {
+            return n != nullptr && n->name() == node && n->node()->epoch == protocol::epoch_text(epoch);
+        };
+        node_run* asked = nullptr;
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            asked = is_it(world_.node(host)) ? world_.node(host) : asked;
+        }
+        for (const auto& [host, n] : namesakes_) {
+            asked = is_it(n.get()) ? n.get() : asked;
+        }
+        return asked != nullptr && listens(at) && listens(*asked) &&
+               world_.net().undisturbed_since(world_.time().now() - enough);
+    }
+
+    // Of two runs of one name the earlier one keeps it. Who heard the later one first learns this by asking both.
+    [[nodiscard]] bool has_precedence(std::uint32_t epoch, std::uint32_t over) const {
+        const auto later = began_.at(epoch) - began_.at(over);
+        return later <= seconds{0} || (later <= core::name_conflicts::same_start_tolerance && epoch < over);
+    }
+
+    void look_at_all() {
+        if (!looking_) {
+            return;
+        }
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            if (auto* n = world_.node(host); n != nullptr && !n->frozen() && !n->was_frozen_until_now()) {
+                n->node()->peers.for_each([&](const membership::member& other) { look_at(*n, other); });
+            }
+        }
+        world_.time().at(world_.time().now() + look_every, [this] { look_at_all(); });
+    }
+
+    void look_at(node_run& n, const membership::member& other) {
+        const auto& runs = accounts_[&n].runs;
+        const auto found = runs.find(other.epoch);
+        const auto who = run_text(other.node, other.epoch);
+        if (found == runs.end() || found->second.node != other.node) {
+            complain(rule::gone_in_time, n, "lists " + who + ", whom it has not heard");
+            return;
+        }
+        const auto& r = found->second;
+        const auto since = std::max(r.at, n.thawed_at());
+        if (r.left) {
+            complain(rule::gone_in_time, n, "lists " + who + ", who has left");
+        } else if (n.now() > since + until_gone(r.interval) + slack) {
+            complain(rule::gone_in_time, n, "lists " + who + ", who is silent");
+        } else if (!other.suspect && n.now() > since + until_silent(r.interval) + slack) {
+            complain(rule::gone_in_time, n, "does not suspect " + who + ", who is silent");
+        }
+    }
+
+    void expect_all_known(const char* when) {
+        for (unsigned host = 0; host < world_.hosts(); ++host) {
+            auto& n = *world_.node(host);
+            const auto& others = n.node()->peers;
+            for (unsigned other = 0; other < world_.hosts(); ++other) {
+                const auto name = world::name_of(other);
+                const auto known = others.find_member(name);
+                if (other == host) {
+                    continue;
+                }
+                if (!known || known->suspect ||
+                    protocol::epoch_text(known->epoch) != world_.node(other)->node()->epoch) {
+                    complain(rule::others_known, n,
+                             "does not " + std::string{when} + " know " + name + " as it is" +
+                                 (known ? ", but as " + run_text(name, known->epoch) : std::string{}));
+                } else if (known->where != door_of(other) || others.address_of(name) != door_of(other)) {
+                    complain(rule::others_known, n, "takes " + name + " to be at " + std::string{known->where});
+                }
+            }
+            if (others.size() >= world_.hosts()) {
+                complain(rule::others_known, n, "knows " + std::to_string(others.size()) + " others");
+            }
+        }
+    }
+
+    void complain(rule which, node_run& at, const std::string& what) {
+        world_.watcher().broken(which, at.name() + " " + what);
+    }
+
+    world& world_;
+    std::map<const node_run*, account> accounts_;
+    std::map<unsigned, std::shared_ptr<node_run>> namesakes_; // by host
+    std::map<std::uint32_t, time_point> began_;               // of each run, by epoch
+    unsigned namesake_runs_ = 0;
+    bool looking_ = false;
+};
+
+} // namespace
+
+std::unique_ptr<part> make_neighbouring(world& in) { return std::make_unique<neighbouring>(in); }
 
 } // namespace cles::simulation

@@ -2,9 +2,12 @@
 #include "simulation/world/node_run.hpp"
 
 #include "simulation/network/group_port.hpp"
+#include "simulation/workload/part.hpp"
 
 #include <algorithm>
 #include <array>
+#include <chrono>
+#include <memory>
 #include <utility>
 
 namespace cles::simulation {
@@ -17,7 +20,37 @@ std::string_view name_of(core::membership::change what) noexcept {
     return names[static_cast<std::size_t>(what)];
 }
 
+class ended_operation final : public detail::pending {
+  public:
+    ended_operation(std::function<void(std::string_view)> succeeded, std::function<void(errc, std::string_view)> failed)
+        : succeeded_(std::move(succeeded)), failed_(std::move(failed)) {}
+    verdict offer(std::string_view json) override {
+        if (!detail::is_valid_answer(json)) {
+            return verdict::malformed;
+        }
+        const std::unique_ptr<ended_operation> self{this};
+        succeeded_(json);
+        return verdict::completed;
+    }
+    void fail(boost::system::error_code code, std::string_view why) override {
+        const std::unique_ptr<ended_operation> self{this};
+        if (failed_) {
+            failed_(static_cast<errc>(code.value()), why);
+        }
+    }
+    void discard() noexcept override { delete this; }
+
+  private:
+    std::function<void(std::string_view)> succeeded_;
+    std::function<void(errc, std::string_view)> failed_;
+};
+
 } // namespace
+
+detail::pending_ptr when_ended(std::function<void(std::string_view json)> succeeded,
+                               std::function<void(errc code, std::string_view why)> failed) {
+    return detail::pending_ptr{new ended_operation{std::move(succeeded), std::move(failed)}};
+}
 
 node_run::node_run(network& net, unsigned host, unsigned run, std::string name, options how)
     : place(net.time(), host, std::move(name)), net_(net), run_(run), judge_(how.judge),
@@ -35,7 +68,12 @@ node_run::node_run(network& net, unsigned host, unsigned run, std::string name, 
 node_run::~node_run() { crash(); }
 
 void node_run::start() {
+    started_ = now();
     run([this] { local_->start({url_of(host(), carrier::stream), url_of(host(), carrier::datagram)}); });
+    if (fault() == planted::names_given_up) {
+        constexpr std::chrono::milliseconds soon{1};
+        later(soon, [this] { environment_->run_timer_as_if(now() + core::discovery_grace::length); });
+    }
 }
 
 void node_run::stop() {

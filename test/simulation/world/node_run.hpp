@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/error.hpp>
 #include <cles/pending.hpp>
 #include <cles/verb.hpp>
 
@@ -10,7 +11,6 @@
 #include "simulation/network/network.hpp"
 #include "simulation/network/place.hpp"
 #include "simulation/network/virtual_environment.hpp"
-#include "simulation/world/group_watch.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -20,6 +20,12 @@
 #include <string_view>
 
 namespace cles::simulation {
+
+class part;
+
+/// An operation whose end is passed to one of two functions, unless it is discarded.
+detail::pending_ptr when_ended(std::function<void(std::string_view json)> succeeded,
+                               std::function<void(errc code, std::string_view why)> failed = {});
 
 /// A request as a simulated program sends it.
 struct request_order {
@@ -35,9 +41,9 @@ class node_run final : public place, private core::membership::watcher {
     struct options {
         std::uint64_t seed = 0; ///< of its own chance
         limits bounds{};
-        bool strangers = false;       ///< sources of datagrams are sent little
-        bool multicast = false;       ///< it takes part in the group
-        group_watch* judge = nullptr; ///< of what it makes of the group; null: nobody
+        bool strangers = false; ///< sources of datagrams are sent little
+        bool multicast = false; ///< it takes part in the group
+        part* judge = nullptr;  ///< of what it makes of the group; null: nobody
         std::function<node_load()> load{};
         const detail::routing_part* routing = nullptr;
     };
@@ -56,12 +62,13 @@ class node_run final : public place, private core::membership::watcher {
     [[nodiscard]] core::local_node& local() noexcept { return *local_; }
     [[nodiscard]] const std::shared_ptr<core::local_node>& shared_local() const noexcept { return local_; }
     [[nodiscard]] const limits& bounds() const noexcept { return local_->bounds(); }
-    [[nodiscard]] network& net() noexcept { return net_; }
     [[nodiscard]] witness& watcher() noexcept { return net_.watcher(); }
     [[nodiscard]] planted fault() const noexcept { return net_.fault(); }
-    [[nodiscard]] group_watch* judge() const noexcept { return judge_; }
+    [[nodiscard]] part* judge() const noexcept { return judge_; }
     /// Which run of its host it is, from 1.
     [[nodiscard]] unsigned run_number() const noexcept { return run_; }
+    /// By its own clock.
+    [[nodiscard]] time_point started_at() const noexcept { return started_; }
     /// Null where it takes no part in multicast.
     [[nodiscard]] group_port* group() const noexcept { return environment_->group(); }
     /// Announces itself no more, and says no farewell that anybody hears.
@@ -84,10 +91,11 @@ class node_run final : public place, private core::membership::watcher {
 
     network& net_;
     unsigned run_;
-    group_watch* judge_;
+    part* judge_;
     std::shared_ptr<virtual_environment> environment_;
     std::shared_ptr<core::local_node> local_;
     core::membership::watcher& told_; // the node's own
+    time_point started_{};
 };
 
 } // namespace cles::simulation

@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <charconv>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 
 namespace cles::simulation {
@@ -139,6 +141,14 @@ plan plan_from(std::string_view text) {
         }
     }
     return p;
+}
+
+plan plan_in_file(const std::string& path) {
+    std::ifstream file{path, std::ios::binary};
+    if (!file) {
+        throw std::runtime_error{path + " cannot be read"};
+    }
+    return plan_from(std::string{std::istreambuf_iterator<char>{file}, {}});
 }
 
 } // namespace cles::simulation

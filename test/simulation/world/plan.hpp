@@ -67,6 +67,8 @@ struct plan {
 std::string to_text(const plan& p);
 /// \throws std::runtime_error naming the line that is none
 plan plan_from(std::string_view text);
+/// \throws std::runtime_error likewise, or if the file cannot be read
+plan plan_in_file(const std::string& path);
 
 /// Makes the plan of a seed, with so many actions.
 plan make_plan(std::uint64_t seed, unsigned actions);

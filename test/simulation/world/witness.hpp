@@ -2,7 +2,9 @@
 #pragma once
 
 #include "simulation/network/agenda.hpp"
-#include "simulation/world/rule.hpp"
+
+#include <boost/describe/enum.hpp>
+#include <boost/describe/enum_to_string.hpp>
 
 #include <cstdint>
 #include <functional>
@@ -11,6 +13,31 @@
 #include <vector>
 
 namespace cles::simulation {
+
+/// What has to hold, whatever happens (README.md of the folder above).
+BOOST_DEFINE_FIXED_ENUM_CLASS(rule, std::uint8_t,
+                              effects_once,  ///< PUSH, DELEGATE and UPDATE run at most once
+                              ends_in_time,  ///< every request ends once, by its deadline
+                              reply_order,   ///< anonymous requests are answered in their order
+                              update_order,  ///< a binder sees each update at most once, in order, as published
+                              gaps_told,     ///< what a binder saw and what it was told that it missed are all
+                              replies_match, ///< an answer is that to its request, and true
+                              well_formed,   ///< what crosses the network is a message of its size
+                              bounded,       ///< memory stays within the limits
+                              at_rest,       ///< nothing is kept when all is quiet
+                              asks_succeed,  ///< once the trouble is over, requests succeed
+                              feeds_receive, ///< once the trouble is over, feeds are bound and receive
+                              backs_off,     ///< a feed that was lost pauses before it binds again
+                              others_known,  ///< once the trouble is over, all know all who are there, and nobody else
+                              names_awaited, ///< a node that has just begun waits for names that it does not know yet
+                              nobody_lost,   ///< who was heard of late is not taken for silent, gone, or another one
+                              gone_in_time,  ///< who is silent is suspect and gone in time, who leaves at once
+                              clashes_told,  ///< a second live node of a name is reported, and has not the name
+                              sent_once,     ///< the group gets each update once, and again only for a new binder
+                              first_soon,    ///< who binds by the group soon gets the last update
+                              same_trace);   ///< a seed always gives the same
+
+inline std::string_view to_string(rule r) noexcept { return boost::describe::enum_to_string(r, ""); }
 
 /// A rule that was broken.
 struct violation {

@@ -1,13 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/world/world.hpp"
 
-#include "simulation/workload/asking.hpp"
-#include "simulation/workload/following.hpp"
-#include "simulation/workload/multicasting.hpp"
-#include "simulation/workload/neighbouring.hpp"
-#include "simulation/workload/talking.hpp"
-#include "simulation/workload/trouble.hpp"
-
 #include <algorithm>
 #include <utility>
 
@@ -39,22 +32,6 @@ limits small_limits() {
     return bounds;
 }
 
-/// Waits until a node has left in order.
-class end_of_departure final : public detail::pending {
-  public:
-    explicit end_of_departure(std::function<void()> then) : then_(std::move(then)) {}
-    verdict offer(std::string_view) override {
-        const std::unique_ptr<end_of_departure> self{this};
-        then_();
-        return verdict::completed;
-    }
-    void fail(boost::system::error_code, std::string_view) override { delete this; }
-    void discard() noexcept override { delete this; }
-
-  private:
-    std::function<void()> then_;
-};
-
 // What must never be: something that outlives a world.
 std::uint64_t leak(planted fault) {
     static std::uint64_t leaked = 0;
@@ -68,28 +45,14 @@ bool report::broke(rule which) const noexcept {
 }
 
 world::world(const plan& what, planted fault, witness::reader reader)
-    : plan_(what), fault_(fault), chance_(what.seed + leak(fault)), net_(time_, watcher_, chance_.next(), fault),
-      nodes_(what.hosts), runs_(what.hosts) {
+    : node_hosts(what.seed + leak(fault), fault), plan_(what), runs_(what.hosts) {
     watcher_.read_by(std::move(reader));
-    parts_.push_back(std::make_unique<asking>(*this));
-    auto feeds = std::make_unique<following>(*this);
-    const auto& published = *feeds;
-    parts_.push_back(std::move(feeds));
-    parts_.push_back(std::make_unique<multicasting>(*this, published));
-    parts_.push_back(std::make_unique<talking>(*this));
-    parts_.push_back(std::make_unique<neighbouring>(*this));
-    parts_.push_back(std::make_unique<trouble>(*this));
-}
-
-world::~world() {
-    time_.clear();
-    for (auto& n : nodes_) {
-        if (n) {
-            end_run(*n);
-            n.reset();
-        }
+    for (const auto make_part : {make_asking, make_following, make_talking, make_neighbouring}) {
+        parts_.push_back(make_part(*this));
     }
 }
+
+world::~world() { end_all(); }
 
 std::shared_ptr<node_run> world::make(const std::string& name, unsigned host, unsigned run) {
     return std::make_shared<node_run>(net_, host, run, name,
@@ -106,9 +69,7 @@ void world::start(unsigned host) {
     auto& n = *nodes_[host];
     watcher_.saw(n.name(), "starts", n.node()->epoch);
     n.start();
-    for (const auto& p : parts_) {
-        p->on_start(n);
-    }
+    each(&part::on_start, n);
 }
 
 std::shared_ptr<node_run> world::begin_stranger(const std::string& name, unsigned host, unsigned run) {
@@ -120,8 +81,38 @@ std::shared_ptr<node_run> world::begin_stranger(const std::string& name, unsigne
 
 void world::end_run(node_run& n) {
     n.crash();
-    for (const auto& p : parts_) {
-        p->on_crash(n);
+    each(&part::on_crash, n);
+    collect(n);
+}
+
+// -- what goes wrong -----------------------------------------------------------------------------------------------
+
+void world::perform(const action& a) {
+    each(&part::perform, a);
+    switch (a.what) {
+    case deed::crash: crash(a["host"], milliseconds{a["down"]}); break;
+    case deed::freeze: freeze(a["host"], milliseconds{a["for"]}); break;
+    case deed::jump: jump(a["host"], milliseconds{a["ahead"]}); break;
+    case deed::depart: depart(a["host"], milliseconds{a["down"]}); break;
+    case deed::retire: retire(a["host"], milliseconds{a["limit"]}, milliseconds{a["down"]}); break;
+    case deed::cut: net_.cut(a["host"], a["which"]); break;
+    case deed::part:
+        watcher_.saw("net", "is parted");
+        net_.part(a["a"], a["b"], time_.now() + milliseconds{a["for"]});
+        break;
+    case deed::mute:
+        watcher_.saw("net", "is parted one way");
+        net_.mute(a["from"], a["to"], time_.now() + milliseconds{a["for"]});
+        break;
+    case deed::weather:
+        watcher_.saw("net", "changes");
+        net_.set({.lost = a["lost"],
+                  .doubled = a["doubled"],
+                  .late = a["late"],
+                  .least = milliseconds{a["least"]},
+                  .spread = milliseconds{a["spread"]}});
+        break;
+    default: break;
     }
 }
 
@@ -133,24 +124,9 @@ void world::crash(unsigned host, milliseconds down) {
     end_node(host, down);
 }
 
-void world::end_node(unsigned host, milliseconds down) {
-    if (node(host) == nullptr) {
-        return;
-    }
-    const auto gone = nodes_[host];
-    end_run(*gone);
-    collect(*gone);
-    nodes_[host].reset();
-    time_.at(time_.now() + down, [this, host] {
-        if (node(host) == nullptr) {
-            start(host);
-        }
-    });
-}
-
 void world::depart(unsigned host, milliseconds down) {
     auto* n = node(host);
-    if (n == nullptr || n->frozen()) {
+    if (!has_group() || n == nullptr || n->frozen()) {
         return;
     }
     n->stop();
@@ -164,17 +140,13 @@ void world::retire(unsigned host, milliseconds limit, milliseconds down) {
     }
     watcher_.saw(n->name(), "leaves in order");
     departures_[host] = {runs_[host], time_.now(), time_.now() + limit};
-    for (const auto& p : parts_) {
-        p->on_leaving(*n);
-    }
+    each(&part::on_leaving, *n);
     const auto end = [this, host, down, run = runs_[host]] {
         if (runs_[host] == run) {
             end_node(host, down);
         }
     };
-    n->run([&] {
-        n->local().close(limit, detail::pending_ptr{new end_of_departure{[this, end] { time_.at(time_.now(), end); }}});
-    });
+    n->run([&] { n->local().close(limit, when_ended([this, end](std::string_view) { time_.at(time_.now(), end); })); });
     end_departure_by(*n, limit + n->bounds().discard + milliseconds{100}, end);
 }
 
@@ -192,22 +164,16 @@ void world::end_departure_by(node_run& n, milliseconds span, const agenda::actio
 }
 
 void world::on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) {
-    for (const auto& p : parts_) {
-        p->on_group_heard(at, from, datagram);
-    }
+    each(&part::on_group_heard, at, from, datagram);
 }
 
-void world::on_group_sent(node_run& by, std::string_view line) {
-    for (const auto& p : parts_) {
-        p->on_group_sent(by, line);
-    }
-}
+void world::on_group_sent(node_run& by, std::string_view line) { each(&part::on_group_sent, by, line); }
 
 void world::on_neighbour(node_run& at, std::string_view node, core::membership::change what) {
-    for (const auto& p : parts_) {
-        p->on_neighbour(at, node, what);
-    }
+    each(&part::on_neighbour, at, node, what);
 }
+
+// -- a life --------------------------------------------------------------------------------------------------------
 
 void world::collect(node_run& n) {
     for (const auto count : n.node()->counts.requests) {
@@ -216,26 +182,12 @@ void world::collect(node_run& n) {
     report_.updates += n.node()->counts.updates_received;
 }
 
-void world::end_trouble() {
-    watcher_.saw("world", "the trouble is over");
-    net_.calm();
-    for (unsigned host = 0; host < hosts(); ++host) {
-        if (node(host) == nullptr) {
-            start(host);
-        }
-        node(host)->thaw();
-    }
-    for (const auto& p : parts_) {
-        p->on_calm();
-    }
-}
-
 report world::live() {
     for (unsigned host = 0; host < hosts(); ++host) {
         start(host);
     }
     time_.watch([this] {
-        if (const auto& n = nodes_[time_.steps() / 64 % nodes_.size()]) {
+        if (auto* n = node(static_cast<unsigned>(time_.steps() / 64 % hosts()))) {
             n->check_bounds();
         }
     });
@@ -243,31 +195,21 @@ report world::live() {
     auto last = begun;
     for (const auto& a : plan_.actions) {
         last = std::max(last, begun + milliseconds{a.at_ms});
-        time_.at(begun + milliseconds{a.at_ms}, [this, &a] {
-            for (const auto& p : parts_) {
-                p->perform(a);
-            }
-        });
+        time_.at(begun + milliseconds{a.at_ms}, [this, &a] { perform(a); });
     }
     time_.run_until(last + milliseconds{1});
     report_.node_seconds = std::chrono::duration<double>(time_.now() - begun).count() * hosts();
+    watcher_.saw("world", "the trouble is over");
     end_trouble();
+    each(&part::on_calm);
     pass(memory_of_datagrams);
-    for (const auto& p : parts_) {
-        p->probe();
-    }
+    each(&part::probe);
     pass(probing);
-    for (const auto& p : parts_) {
-        p->judge_probe();
-    }
-    for (const auto& p : parts_) {
-        p->wind_down();
-    }
+    each(&part::judge_probe);
+    each(&part::wind_down);
     pass(quiet);
-    for (const auto& p : parts_) {
-        p->judge_rest();
-    }
-    for (const auto& n : nodes_) {
+    each(&part::judge_rest);
+    for (const auto& [host, n] : nodes_) {
         n->check_rest();
         collect(*n);
     }

@@ -1,21 +1,19 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "simulation/network/agenda.hpp"
-#include "simulation/network/dice.hpp"
-#include "simulation/network/network.hpp"
 #include "simulation/network/planted.hpp"
 #include "simulation/workload/part.hpp"
-#include "simulation/world/group_watch.hpp"
-#include "simulation/world/node_run.hpp"
+#include "simulation/world/node_hosts.hpp"
 #include "simulation/world/plan.hpp"
 #include "simulation/world/witness.hpp"
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 namespace cles::simulation {
@@ -34,30 +32,19 @@ struct report {
     [[nodiscard]] bool broke(rule which) const noexcept;
 };
 
-/// Nodes, what they do to each other, the network between them, and time. Lives through one plan.
-class world final : private group_watch {
+/// Nodes, what they do to each other, and what goes wrong. Lives through one plan.
+class world final : public node_hosts, private part {
   public:
     explicit world(const plan& what, planted fault = planted::none, witness::reader reader = {});
-    ~world();
+    ~world() override;
 
     report live();
 
     // For the parts.
-    [[nodiscard]] agenda& time() noexcept { return time_; }
-    [[nodiscard]] network& net() noexcept { return net_; }
-    [[nodiscard]] witness& watcher() noexcept { return watcher_; }
-    [[nodiscard]] planted fault() const noexcept { return fault_; }
     [[nodiscard]] unsigned hosts() const noexcept { return plan_.hosts; }
     [[nodiscard]] static std::string name_of(unsigned host) { return "n" + std::to_string(host); }
-    /// The node that runs there; null while none does.
-    [[nodiscard]] node_run* node(unsigned host) noexcept { return host < nodes_.size() ? nodes_[host].get() : nullptr; }
     /// How many runs have begun there.
     [[nodiscard]] unsigned runs(unsigned host) const noexcept { return runs_[host]; }
-    void crash(unsigned host, std::chrono::milliseconds down);
-    /// Ends the node there in order.
-    void depart(unsigned host, std::chrono::milliseconds down);
-    /// Has the node there leave in order, within that limit.
-    void retire(unsigned host, std::chrono::milliseconds limit, std::chrono::milliseconds down);
     /// The last time that a node there began to leave in order.
     struct departure {
         unsigned run = 0;
@@ -67,16 +54,24 @@ class world final : private group_watch {
     [[nodiscard]] const departure& departure_of(unsigned host) { return departures_[host]; }
     /// Begins a node that is none of the hosts'.
     std::shared_ptr<node_run> begin_stranger(const std::string& name, unsigned host, unsigned run);
-    /// Ends a node as a crash does.
-    void end_run(node_run& n);
+    void end_run(node_run& n) override;
     [[nodiscard]] bool has_group() const noexcept { return plan_.group; }
 
   private:
-    void start(unsigned host);
-    void end_node(unsigned host, std::chrono::milliseconds down);
-    void end_trouble();
+    template <class... Arguments>
+    void each(void (part::*what)(Arguments...), std::type_identity_t<Arguments>... arguments) {
+        for (const auto& p : parts_) {
+            ((*p).*what)(arguments...);
+        }
+    }
+    void start(unsigned host) override;
+    void perform(const action& what) override;
+    void crash(unsigned host, std::chrono::milliseconds down);
+    /// Ends the node there in order.
+    void depart(unsigned host, std::chrono::milliseconds down);
+    /// Has the node there leave in order, within that limit.
+    void retire(unsigned host, std::chrono::milliseconds limit, std::chrono::milliseconds down);
     void end_departure_by(node_run& n, std::chrono::milliseconds span, const agenda::action& end);
-    void pass(std::chrono::milliseconds time) { time_.run_until(time_.now() + time); }
     void collect(node_run& n);
     [[nodiscard]] std::shared_ptr<node_run> make(const std::string& name, unsigned host, unsigned run);
     void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override;
@@ -84,12 +79,6 @@ class world final : private group_watch {
     void on_neighbour(node_run& at, std::string_view node, core::membership::change what) override;
 
     const plan& plan_;
-    planted fault_;
-    agenda time_;
-    witness watcher_{time_};
-    dice chance_;
-    network net_;
-    std::vector<std::shared_ptr<node_run>> nodes_;
     std::vector<unsigned> runs_;
     std::map<unsigned, departure> departures_; // by host
     std::vector<std::unique_ptr<part>> parts_;
