@@ -31,8 +31,9 @@ struct telling final : core::next_hop {
         return asked.size();
     }
     void cancel(std::uint64_t) override {}
-    std::uint64_t bind(std::string_view, std::string_view, std::string_view, core::feed_events&) override { return 0; }
-    void unbind(std::uint64_t) override {}
+    std::shared_ptr<void> bind(std::string_view, std::string_view, std::string_view, core::feed_events&) override {
+        return {};
+    }
     void answer() {
         for (auto& [node, reply] : std::exchange(asked, {})) {
             reply.release()->offer(R"({"node":")" + node + R"(","tasks":[{"verb":"DELEGATE","task":"plan"}]})");

@@ -155,7 +155,7 @@ def add_subdirectory(consumer: Consumer) -> None:
                        "-DEXPECTED_TARGETS=cles;cles_command;cles_minimal")
     shutil.rmtree(consumer.scratch / "build")
 
-    build = consumer.configure("add_subdirectory", source, "-DCLES_UNITY=ON")
+    build = consumer.configure("add_subdirectory", source)
     consumer.run(consumer.options.cmake, "--build", build)
     consumer.check(build / "my_program")
     # Another project's installation is its own.

@@ -6,7 +6,7 @@
 #include "support/link_pair.hpp"
 #include "support/link_recorder.hpp"
 #include "support/run_until.hpp"
-#include "transport/udp_port.hpp"
+#include "transport/udp.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/udp.hpp>

@@ -230,16 +230,16 @@ BOOST_FIXTURE_TEST_CASE(the_others_hear_on_when_one_of_them_leaves_and_one_that_
 }
 
 BOOST_FIXTURE_TEST_CASE(members_of_one_executor_share_a_socket_and_those_of_others_do_not, fixture) {
-    using cles::transport::group_receiver;
+    using cles::transport::receiver_of;
     const auto by = cles::transport::find_interface("lo");
     const udp::endpoint group{asio::ip::make_address_v4(where.group), where.port};
     const udp::endpoint other_group{asio::ip::make_address_v4("239.255.25.38"), where.port};
     asio::io_context elsewhere;
-    const auto receiver = group_receiver::of(io.get_executor(), by, group);
-    BOOST_TEST((group_receiver::of(io.get_executor(), by, group) == receiver));
-    BOOST_TEST((group_receiver::of(io.get_executor(), by, other_group) != receiver));
-    BOOST_TEST((group_receiver::of(elsewhere.get_executor(), by, group) != receiver));
-    BOOST_TEST((group_receiver::of(asio::make_strand(io), by, group) != receiver));
+    const auto receiver = receiver_of(io.get_executor(), by, group);
+    BOOST_TEST((receiver_of(io.get_executor(), by, group) == receiver));
+    BOOST_TEST((receiver_of(io.get_executor(), by, other_group) != receiver));
+    BOOST_TEST((receiver_of(elsewhere.get_executor(), by, group) != receiver));
+    BOOST_TEST((receiver_of(asio::make_strand(io), by, group) != receiver));
 }
 
 BOOST_FIXTURE_TEST_CASE(datagrams_go_out_with_a_TTL_of_1, fixture) {

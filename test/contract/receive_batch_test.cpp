@@ -84,8 +84,7 @@ BOOST_AUTO_TEST_CASE(one_of_the_longest_is_whole_and_a_longer_one_shows_as_such)
 }
 
 BOOST_AUTO_TEST_CASE(a_turn_hands_over_so_many_and_leaves_the_rest_where_it_is) {
-    cles::transport::receive_batch::enable_gro(here);
-    here.set_option(asio::socket_base::receive_buffer_size{1 << 20});
+    cles::transport::receive_batch::prepare(here);
     one.connect(here.local_endpoint());
     std::string lines;
     constexpr std::size_t sent = 600;

@@ -88,7 +88,7 @@ BOOST_FIXTURE_TEST_SUITE(send_batch, fixture)
 
 BOOST_DATA_TEST_CASE(each_line_is_a_datagram_of_its_own, boost::unit_test::data::make({false, true}), together) {
     if (together) { // as another socket of this library takes them; else as any program does
-        cles::transport::receive_batch::enable_gro(to);
+        cles::transport::receive_batch::prepare(to);
     }
     int taken_so = 0;
     socklen_t size = sizeof taken_so;
@@ -115,7 +115,7 @@ BOOST_DATA_TEST_CASE(each_line_is_a_datagram_of_its_own, boost::unit_test::data:
 BOOST_AUTO_TEST_CASE(where_the_system_does_not_part_them_each_goes_alone) {
     const int off = 1; // without checksums it cannot
     BOOST_REQUIRE(::setsockopt(from.native_handle(), SOL_SOCKET, SO_NO_CHECK, &off, sizeof off) == 0);
-    cles::transport::receive_batch::enable_gro(to);
+    cles::transport::receive_batch::prepare(to);
     cles::transport::send_batch burst{from};
     const auto lines = lines_of(40, 80);
     for (int i = 0; i < 2; ++i) {

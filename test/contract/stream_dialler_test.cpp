@@ -8,6 +8,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/test/unit_test.hpp>
 
+#include <cstring>
 #include <memory>
 #include <string>
 #include <vector>
@@ -17,7 +18,8 @@ namespace {
 
 using boost::asio::ip::tcp;
 using cles::test::run_until;
-using dialler = cles::transport::stream_dialler<tcp>;
+using dialler = cles::transport::stream_dialler;
+using cles::transport::stream_socket;
 
 const auto loopback = boost::asio::ip::address_v4::loopback();
 
@@ -25,14 +27,17 @@ struct fixture {
     // Dials, and tells how that ended: "link to 4711", or the failure's words.
     std::string dial(std::vector<tcp::endpoint> where) {
         std::string ended;
-        const auto identify = [](tcp::socket& s) {
-            return cles::identity{.transport = "tcp", .address = std::to_string(s.remote_endpoint().port())};
+        const auto identify = [](stream_socket& s) {
+            const auto any = s.remote_endpoint();
+            tcp::endpoint peer;
+            std::memcpy(peer.data(), any.data(), any.size());
+            return cles::identity{.transport = "tcp", .address = std::to_string(peer.port())};
         };
         const auto d = std::make_shared<dialler>(io.get_executor(), cles::limits{}, identify,
                                                  [&](boost::system::error_code code, const cles::link_ptr& made) {
                                                      ended = code ? code.message() : "link to " + made->peer().address;
                                                  });
-        d->start(std::move(where));
+        d->start(std::vector<cles::transport::stream_address>(where.begin(), where.end()));
         run_until(io, [&] { return !ended.empty(); });
         return ended;
     }
@@ -67,7 +72,7 @@ BOOST_AUTO_TEST_CASE(fails_with_the_last_failure_where_nobody_answers) {
 BOOST_AUTO_TEST_CASE(nothing_comes_after_it_was_given_up) {
     bool called = false;
     const auto d = std::make_shared<dialler>(
-        io.get_executor(), cles::limits{}, [](tcp::socket&) { return cles::identity{}; },
+        io.get_executor(), cles::limits{}, [](stream_socket&) { return cles::identity{}; },
         [&](boost::system::error_code, const cles::link_ptr&) { called = true; });
     d->start({nobody(), listener.local_endpoint()});
     d->give_up();

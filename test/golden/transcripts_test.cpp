@@ -3,7 +3,6 @@
 #include <cles/error.hpp>
 #include <cles/verb.hpp>
 
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 #include "replay.hpp"

@@ -336,6 +336,9 @@ BOOST_AUTO_TEST_CASE(set_peer_says_where_a_node_is_now) {
     bearer.on_pull("who", [] { return 3; });
     tower.set_peer("friend", bearer.endpoints().front());
     BOOST_TEST(who() == "3");
+    tower.set_peer("Friend", two.endpoints().front()); // another name
+    tower.set_peer("nobody", "");                      // not configured
+    BOOST_TEST(who() == "3");
     tower.set_peer("friend", two.endpoints().front());
     BOOST_TEST(who() == unknown);
     tower.set_peer("friend", ""); // forgotten; but one of that name is on this context

@@ -3,7 +3,6 @@
 
 #include <cles/routing.hpp>
 
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 #include "simulation/world/node_hosts.hpp"

@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/gossip_network.hpp"
 
-#include "node/base/deadline_schedule.hpp"
 #include "node/base/deadlines.hpp"
 #include "node/base/metrics.hpp"
-#include "node/membership/announcer.hpp"
+#include "node/membership/discovery.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/membership/membership.hpp"
 #include "node/membership/peer_table.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 #include "simulation/network/place.hpp"

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Networks of hundreds of nodes that announce themselves, in virtual time, over a group that loses some of it.
 
-#include "node/membership/announcer.hpp"
+#include "node/membership/discovery.hpp"
 #include "node/membership/membership.hpp"
 #include "support/manual_clock.hpp"
 

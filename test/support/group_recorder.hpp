@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "node/publish/group_output.hpp"
-#include "port/group_source.hpp"
+#include "port/group_port.hpp"
 
+#include <algorithm>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -15,19 +16,34 @@ namespace cles::test {
 constexpr core::group_source source_at(std::uint16_t port) { return {.address = 0x7f000001, .port = port}; }
 
 /// Records what a node sends to its group, as far as the test lets it.
-class group_recorder final : public core::group_output {
+class group_recorder final : public core::group_port {
   public:
-    bool send(std::string_view line) override {
-        sent_.emplace_back(line.substr(0, line.size() - 1));
-        return true;
+    explicit group_recorder(const core::group_source& self = source_at(4000)) : self_(self) {}
+
+    void start(core::group_listener&) override {}
+    core::lines_done send(std::string_view lines) override {
+        const core::lines_done all{.lines = static_cast<std::size_t>(std::ranges::count(lines, '\n')),
+                                   .bytes = lines.size()};
+        while (!lines.empty()) {
+            const auto size = lines.find('\n');
+            sent_.emplace_back(lines.substr(0, size));
+            lines.remove_prefix(size + 1);
+        }
+        return all;
     }
-    [[nodiscard]] bool has_room() const override { return room; }
+    [[nodiscard]] std::size_t unsent() const noexcept override { return room ? 0 : 1; }
+    void close() override {}
+    [[nodiscard]] const core::group_source& source() const noexcept override { return self_; }
+
     std::vector<std::string> take() { return std::exchange(sent_, {}); }
     [[nodiscard]] std::size_t count() const { return sent_.size(); }
+    /// For a session, which does not own it.
+    [[nodiscard]] std::shared_ptr<core::group_port> share() { return {std::shared_ptr<void>{}, this}; }
 
     bool room = true;
 
   private:
+    core::group_source self_;
     std::vector<std::string> sent_;
 };
 

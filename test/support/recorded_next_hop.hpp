@@ -66,7 +66,6 @@ class recorded_next_hop final : public core::next_hop {
 
     /// A noun that is bound at another node.
     struct feed {
-        std::uint64_t ticket = 0;
         std::string text;                ///< "car2:pose hops=7 via=car1"
         core::feed_events* to = nullptr; ///< null: unbound
         std::uint64_t seq = 0;
@@ -91,21 +90,13 @@ class recorded_next_hop final : public core::next_hop {
             return line + "\n";
         }
     };
-    std::uint64_t bind(std::string_view node, std::string_view path, std::string_view adverbs,
-                       core::feed_events& to) override {
-        feeds_.push_back(std::make_unique<feed>());
-        auto& made = *feeds_.back();
-        made.ticket = ++last_ticket_;
-        made.text.append(node).append(":").append(path).append(" ").append(adverbs);
-        made.to = &to;
-        return made.ticket;
-    }
-    void unbind(std::uint64_t ticket) override {
-        for (const auto& f : feeds_) {
-            if (f->ticket == ticket) {
-                f->to = nullptr;
-            }
-        }
+    std::shared_ptr<void> bind(std::string_view node, std::string_view path, std::string_view adverbs,
+                               core::feed_events& to) override {
+        const auto made = std::make_shared<feed>();
+        made->text.append(node).append(":").append(path).append(" ").append(adverbs);
+        made->to = &to;
+        feeds_.push_back(made);
+        return {static_cast<void*>(made.get()), [made](void*) { made->to = nullptr; }};
     }
     /// The newest feed of this noun, whatever its state.
     feed& bound(const std::string& noun) {
@@ -153,7 +144,7 @@ class recorded_next_hop final : public core::next_hop {
 
   private:
     std::vector<std::unique_ptr<sent>> all_;
-    std::vector<std::unique_ptr<feed>> feeds_;
+    std::vector<std::shared_ptr<feed>> feeds_;
     std::uint64_t last_ticket_ = 0;
 };
 

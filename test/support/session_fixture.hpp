@@ -117,8 +117,8 @@ class test_link final : public recording_line_sink, public core::subscriber {
     /// What was sent, as "kind, kind, ...".
     std::string sent() { return kinds(take()); }
 
-    void overlong(std::string_view head) { session_.on_overlong(head, at_.clock.now()); }
-    void half_close() { session_.on_end(at_.clock.now()); }
+    void overlong(std::string_view head) { session_.on_overlong(head); }
+    void half_close() { session_.on_end(); }
     void reset() { session_.on_lost("the link was lost"); }
     void turn() override {
         if (session_.serving().has_more()) {
@@ -128,7 +128,7 @@ class test_link final : public recording_line_sink, public core::subscriber {
     /// The link has sent its output.
     void serve_more() { session_.serving().serve_more(at_.clock.now()); }
     /// The peer has ended in the middle of this line.
-    void cut(std::string_view rest) { session_.on_cut(rest, at_.clock.now()); }
+    void cut(std::string_view rest) { session_.on_cut(rest); }
     /// The link has room again.
     void make_room() {
         takes = true;

@@ -69,12 +69,23 @@ class json_reader {
         }
     }
     static constexpr bool is_space(char c) noexcept { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+    /// The next character that is not white space; 0 at the end.
+    char look() noexcept {
+        skip_space();
+        return at_ < text_.size() ? text_[at_] : '\0';
+    }
     bool expected(std::string_view what);
+    bool require(kind wanted);
     bool enter();
     bool fail_too_deep();
+    bool next(char close);
     bool literal(std::string_view word);
     bool scan_number(std::string_view& out, bool& integral);
-    bool scan_string(std::string_view& raw, bool& escaped);
+    bool scan_string(std::string_view& out, std::string& decoded);
+    template <class Integer>
+    bool read_integer(Integer& out, std::string_view out_of_range);
+    bool skip_value(std::size_t depth);
+    bool skip_values(char close, std::size_t depth);
 
     std::string_view text_;
     std::size_t at_ = 0;

@@ -461,8 +461,6 @@ class service : public registrar {
                          detail::pending_ptr operation);
     void start_bind(const detail::bind_withdrawal& withdraw, detail::binding_ptr operation, const std::string& noun,
                     const bind_options& options);
-    static std::shared_ptr<detail::feed_control> make_feed(const std::shared_ptr<detail::engine>& inside,
-                                                           std::string_view noun, const bind_options& options);
     [[nodiscard]] bool on_strand() const noexcept;
 
     std::shared_ptr<detail::engine> engine_;

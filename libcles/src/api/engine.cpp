@@ -1,9 +1,22 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "api/engine.hpp"
 
-#include "api/service_call.hpp"
+#include <cles/reply_operation.hpp>
+#include <cles/responder.hpp>
 
+#include "node/session/call.hpp"
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <exception>
+#include <functional>
+#include <map>
+#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -28,7 +41,245 @@ core::local_node_options options_of(service_options&& all) {
             .routing = all.routing};
 }
 
+/// What a responder holds: the call, and the service that received it. When the last copy is destroyed, the call has
+/// been answered one way or another.
+class service_call final : public call_control, public std::enable_shared_from_this<service_call> {
+  public:
+    service_call(std::shared_ptr<core::call> call, boost::asio::any_io_executor executor,
+                 std::weak_ptr<core::local_node> service)
+        : call_(std::move(call)), executor_(std::move(executor)), service_(std::move(service)) {}
+    ~service_call() override {
+        if (asked_) {
+            call_->forget_on_stop(); // it refers to this object
+        }
+        if (!call_->ended()) {
+            fail(errc::failed, "the handler ended without an answer");
+        }
+    }
+
+    void done(std::string_view json) override { call_->done(json); }
+    void fail(errc code, std::string_view message) override {
+        call_->fail({.code = code, .message = std::string{message}});
+    }
+    void refuse(std::string_view message, std::chrono::milliseconds retry) override {
+        constexpr std::chrono::milliseconds::rep most = 86'400'000; // a day, as for plugins
+        const auto ms = std::clamp<std::chrono::milliseconds::rep>(retry.count(), 0, most);
+        call_->fail({.code = errc::busy, .message = std::string{message}, .retry_ms = static_cast<std::uint64_t>(ms)});
+    }
+    bool progress(double fraction, std::string_view json) override { return call_->progress(fraction, json); }
+    void on_stop(std::function<void()> callback) override {
+        if (call_->stopped()) {
+            callback();
+        } else if (asked_) {
+            asked_->then = put(std::move(callback));
+        } else {
+            call_->on_stop(put(std::move(callback)));
+        }
+    }
+    [[nodiscard]] bool stopped() const noexcept override { return call_->stopped(); }
+    void delegate(std::string_view command, const call_options& options, answer_callback answered) override {
+        const auto by = service_.lock();
+        const auto refuse = [&](errc why, const char* words) { answer_later(std::move(answered), why, words); };
+        if (!by || by->stopped()) {
+            refuse(errc::stopped, "the service has been stopped");
+        } else if (call_->ended()) {
+            refuse(errc::cancelled, "the requesting job has already ended");
+        } else if (const auto left = std::chrono::floor<std::chrono::milliseconds>(call_->due() - by->now());
+                   left.count() <= 0) {
+            refuse(errc::deadline, "the requesting job has no time left");
+        } else {
+            send(*by, command, options, std::move(answered), left);
+        }
+    }
+    void log(log_level level, std::string_view text) override {
+        if (const auto by = service_.lock()) { // otherwise the log may be gone too
+            call_->write_log(level, text);
+        }
+    }
+    [[nodiscard]] boost::asio::any_io_executor executor() const override { return executor_; }
+
+  private:
+    /// Its own requests that are in flight.
+    struct asked {
+        std::uint64_t last = 0;
+        std::map<std::uint64_t, std::uint64_t> tickets; ///< for cancellation
+        std::function<void()> then;                     ///< the handler's own stop callback
+    };
+
+    /// Passes the handler's answer to its callback. An exception from it fails the call, if there still is one.
+    static void answer(const std::weak_ptr<service_call>& weak, const answer_callback& answered,
+                       boost::system::error_code code, std::string_view json, std::string_view why) {
+        try {
+            answered(code, json, why);
+        } catch (...) {
+            if (const auto self = weak.lock()) {
+                fail_with(*self, std::current_exception());
+            }
+        }
+    }
+
+    // Not from inside the requesting call: the caller may hold a lock, or may not have recorded its request yet.
+    void answer_later(answer_callback answered, errc why, const char* words) {
+        boost::asio::post(executor_, [weak = weak_from_this(), answered = std::move(answered), why, words] {
+            answer(weak, answered, why, "{}", words);
+        });
+    }
+
+    void send(core::local_node& by, std::string_view command, const call_options& options, answer_callback answered,
+              std::chrono::milliseconds left) {
+        if (!asked_) { // a call has one stop callback: this object takes it, and then calls the handler's
+            asked_ = std::make_unique<asked>();
+            asked_->then = call_->forget_on_stop();
+            call_->on_stop([this] { withdraw_asked(); });
+        }
+        const auto key = ++asked_->last;
+        asked_->tickets.emplace(key, 0);
+        const auto why = std::make_shared<std::string>();
+        auto completed = [weak = weak_from_this(), key, why,
+                          answered = std::move(answered)](boost::system::error_code code, const json_text& reply) {
+            const auto self = weak.lock(); // kept until the answer has been taken
+            if (self) {
+                self->asked_->tickets.erase(key);
+            }
+            answer(weak, answered, code, reply.text, *why);
+        };
+        auto chosen = options;
+        chosen.diagnostics(*why);
+        using operation = reply_operation<json_text, false, decltype(completed)>;
+        const auto ticket = by.send_command(
+            command, chosen, pending_ptr{make_operation<operation>(std::move(completed), executor_, why.get())}, left);
+        if (const auto found = asked_->tickets.find(key); found != asked_->tickets.end()) {
+            found->second = ticket;
+        }
+    }
+
+    /// Wraps the handler's callback so that it is called as user code. Posted: calls are stopped while the library
+    /// iterates over what a lost link has left.
+    [[nodiscard]] std::function<void()> put(std::function<void()> callback) const {
+        return [host = call_->host(), callback = std::move(callback)]() mutable {
+            host->completions.call(std::move(callback));
+        };
+    }
+
+    void withdraw_asked() {
+        const auto keep = weak_from_this().lock();
+        const auto by = service_.lock();
+        const auto then = std::exchange(asked_->then, nullptr);
+        const auto tickets = std::exchange(asked_->tickets, {});
+        const auto withdraw = [&] {
+            for (const auto& [key, ticket] : tickets) {
+                if (by) {
+                    by->cancel(ticket);
+                }
+            }
+        };
+        // First the job's own: it must know that it was stopped when its requests fail for that reason.
+        try {
+            if (then) {
+                then();
+            }
+        } catch (...) {
+            withdraw();
+            throw;
+        }
+        withdraw();
+    }
+
+    std::shared_ptr<core::call> call_;
+    boost::asio::any_io_executor executor_;
+    std::weak_ptr<core::local_node> service_;
+    std::unique_ptr<asked> asked_; ///< from its first request on
+};
+
 } // namespace
+
+/// Updates from any thread on their way to the service's executor: what a `publisher` writes to. They wait in a list of
+/// bounded length, whose oldest entries are dropped first.
+class posted_updates final : public update_sink, public std::enable_shared_from_this<posted_updates> {
+  public:
+    posted_updates(boost::asio::any_io_executor executor, std::weak_ptr<core::local_node> service)
+        : executor_(std::move(executor)), service_(std::move(service)) {}
+
+    void publish(std::string_view noun, std::string_view json) override {
+        const std::scoped_lock lock{mutex_};
+        if (closed_) {
+            return;
+        }
+        waiting_.push_back({std::string{noun}, std::string{json}});
+        bytes_ += waiting_.back().size();
+        while (waiting_.size() > max_waiting || (bytes_ > max_bytes && waiting_.size() > 1)) {
+            bytes_ -= waiting_.front().size();
+            waiting_.pop_front();
+            ++dropped_;
+        }
+        if (!std::exchange(asked_, true)) {
+            // Under the lock: once `close` returns, nothing is posted to an executor that may be gone.
+            boost::asio::post(executor_, [self = shared_from_this()] { self->drain(); });
+        }
+    }
+    /// After this, nothing is posted. Call it on the executor.
+    void close() {
+        const std::scoped_lock lock{mutex_};
+        closed_ = true;
+        waiting_.clear();
+    }
+
+  private:
+    static constexpr std::size_t max_waiting = 1024;
+    static constexpr std::size_t max_bytes = 4U << 20U;
+
+    struct entry {
+        [[nodiscard]] std::size_t size() const noexcept { return noun.size() + json.size(); }
+
+        std::string noun;
+        std::string json;
+    };
+
+    void drain() {
+        std::deque<entry> fetched;
+        std::size_t lost = 0;
+        {
+            const std::scoped_lock lock{mutex_};
+            asked_ = false;
+            if (closed_) {
+                return;
+            }
+            fetched.swap(waiting_);
+            bytes_ = 0;
+            lost = std::exchange(dropped_, 0);
+        }
+        if (lost != 0) {
+            if (const auto by = service_.lock()) {
+                by->write_log(log_level::warning,
+                              std::to_string(lost) + " updates were dropped: they come faster than they can be sent");
+            }
+        }
+        for (const auto& update : fetched) {
+            take(update);
+        }
+    }
+
+    void take(const entry& update) const {
+        const auto by = service_.lock();
+        if (!by) { // an earlier failure was logged, and the program then released the service
+            return;
+        }
+        try {
+            by->publish(update.noun, [&](json_writer& w) { write_text(w, update.json); });
+        } catch (const error& e) {
+            by->write_log(log_level::warning, "an update of '" + update.noun + "' was refused: " + e.message());
+        }
+    }
+
+    boost::asio::any_io_executor executor_;
+    std::weak_ptr<core::local_node> service_; // closes this when it stops
+    std::mutex mutex_;                        // guards what follows
+    std::deque<entry> waiting_;
+    std::size_t bytes_ = 0;
+    std::size_t dropped_ = 0;
+    bool asked_ = false;
+    bool closed_ = false;
+};
 
 engine::engine(const boost::asio::any_io_executor& executor, service_options options)
     : engine(std::make_shared<asio_port::asio_environment>(executor), std::move(options)) {}
@@ -36,23 +287,21 @@ engine::engine(const boost::asio::any_io_executor& executor, service_options opt
 engine::engine(std::shared_ptr<asio_port::asio_environment> by, service_options options)
     : local_node(by, options_of(std::move(options))), asio_(*by) {}
 
-std::weak_ptr<engine> engine::weak() { return std::static_pointer_cast<engine>(shared_from_this()); }
-
 void engine::add(registration offered) {
     core::handler entry{.info = std::move(offered.info)};
     if (offered.plain) {
         entry.plain = [this, handler = std::move(offered.plain)](const request& r, json_writer& w) {
-            const core::flush_scheduler::serving during{flush_scheduler()};
+            const auto during = flush_scheduler().serving();
             handler(r, w);
         };
     }
     if (offered.async) {
         entry.start = [this, handler = std::move(offered.async),
-                       self = weak()](const request& r, const std::shared_ptr<core::call>& call) {
+                       self = weak_from_this()](const request& r, const std::shared_ptr<core::call>& call) {
             // Held here too, so that the reply is the handler's exception, and not that its responder was destroyed
             // without one.
-            const auto control = std::make_shared<api::service_call>(call, executor(), self);
-            const core::flush_scheduler::serving during{flush_scheduler()};
+            const auto control = std::make_shared<service_call>(call, executor(), self);
+            const auto during = flush_scheduler().serving();
             try {
                 handler(r, responder{control});
             } catch (...) {
@@ -64,39 +313,18 @@ void engine::add(registration offered) {
 }
 
 std::shared_ptr<update_sink> engine::cross_thread_updates() {
-    if (!cross_thread_updates_) {
-        // The service outlives the updates that are taken: it closes this when it stops.
-        cross_thread_updates_ = std::make_shared<asio_port::cross_thread_updates>(
-            executor(),
-            [weak = weak()](std::string_view noun, std::string_view json) {
-                const auto self = weak.lock();
-                if (!self) { // an earlier failure was logged, and the program then released the service
-                    return;
-                }
-                try {
-                    self->publish(noun, [json](json_writer& w) { write_text(w, json); });
-                } catch (const error& e) {
-                    self->write_log(log_level::warning,
-                                    "an update of '" + std::string{noun} + "' was refused: " + e.message());
-                }
-            },
-            [weak = weak()](std::size_t count) {
-                if (const auto self = weak.lock()) {
-                    self->write_log(log_level::warning,
-                                    std::to_string(count) +
-                                        " updates were dropped: they come faster than they can be sent");
-                }
-            });
+    if (!posted_updates_) {
+        posted_updates_ = std::make_shared<posted_updates>(executor(), weak_from_this());
         if (stopped()) {
-            cross_thread_updates_->close();
+            posted_updates_->close();
         }
     }
-    return cross_thread_updates_;
+    return posted_updates_;
 }
 
 void engine::stop() {
-    if (cross_thread_updates_) {
-        cross_thread_updates_->close();
+    if (posted_updates_) {
+        posted_updates_->close();
     }
     local_node::stop();
 }

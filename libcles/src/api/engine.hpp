@@ -5,14 +5,16 @@
 #include <cles/service.hpp>
 
 #include "asio/asio_environment.hpp"
-#include "asio/cross_thread_updates.hpp"
 #include "node/local_node.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 
 #include <memory>
+#include <string_view>
 
 namespace cles::detail {
+
+class posted_updates;
 
 /// The implementation of a service: a node over Asio, the program's handlers, and its updates from other threads.
 class engine final : public core::local_node {
@@ -27,11 +29,13 @@ class engine final : public core::local_node {
 
   private:
     engine(std::shared_ptr<asio_port::asio_environment> by, service_options options);
-    [[nodiscard]] std::weak_ptr<engine> weak();
 
-    const asio_port::asio_environment& asio_; // the node's environment
-    std::shared_ptr<asio_port::cross_thread_updates>
-        cross_thread_updates_; ///< created when the program first publishes from other threads
+    const asio_port::asio_environment& asio_;        // the node's environment
+    std::shared_ptr<posted_updates> posted_updates_; // created when the program first publishes from other threads
 };
+
+/// The requested feed, or one whose `start` fails with the reason.
+std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std::string_view noun,
+                                        const bind_options& options);
 
 } // namespace cles::detail

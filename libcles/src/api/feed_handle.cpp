@@ -1,12 +1,23 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "api/feed_handle.hpp"
+#include <cles/error.hpp>
+#include <cles/feed.hpp>
+
+#include "api/engine.hpp"
+#include "node/publish/feed_machine.hpp"
+#include "node/publish/feed_mailbox.hpp"
+#include "node/publish/group_feeds.hpp"
+#include "protocol/grammar.hpp"
+#include "protocol/request_line.hpp"
 
 #include <boost/asio/post.hpp>
 
+#include <algorithm>
+#include <memory>
 #include <random>
+#include <string>
 #include <utility>
 
-namespace cles::api {
+namespace cles::detail {
 namespace asio = boost::asio;
 
 namespace {
@@ -16,118 +27,136 @@ std::uint32_t seed() {
     return static_cast<std::uint32_t>(draw());
 }
 
-class refused_feed final : public detail::feed_control {
+/// A feed whose `start` fails with this reason.
+class refused_feed final : public feed_control {
   public:
-    refused_feed(std::shared_ptr<detail::engine> host, boost::system::error_code code, std::string message)
+    refused_feed(std::shared_ptr<engine> host, boost::system::error_code code, std::string message)
         : host_(std::move(host)), code_(code), message_(std::move(message)) {}
 
-    void start(detail::pending_ptr bound) override { host_->fail_later(std::move(bound), code_, message_); }
-    void next(detail::event_ptr operation) override {
+    void start(pending_ptr bound) override { host_->fail_later(std::move(bound), code_, message_); }
+    void next(event_ptr operation) override {
         asio::post(host_->executor(), [operation = std::move(operation), code = code_, message = message_]() mutable {
             operation.release()->fail(code, message);
         });
     }
     void cancel_start() override {}
-    void cancel(const detail::pending_event*) override {}
+    void cancel(const pending_event*) override {}
     void close() override {}
     [[nodiscard]] const asio::any_io_executor& executor() const override { return host_->executor(); }
 
   private:
-    std::shared_ptr<detail::engine> host_;
+    std::shared_ptr<engine> host_;
     boost::system::error_code code_;
     std::string message_;
 };
 
-} // namespace
+/// A feed as its user holds it: what does not depend on how it is bound.
+class feed_handle : public feed_control, public std::enable_shared_from_this<feed_handle> {
+  public:
+    explicit feed_handle(std::shared_ptr<engine> host) : host_(std::move(host)) {}
 
-feed_handle::feed_handle(std::shared_ptr<detail::engine> host, std::string target, std::string path, bool thinned)
-    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
-                                       std::move(target), std::move(path), thinned, seed()) {}
-
-feed_handle::~feed_handle() {
-    if (!left_) {
-        host_->feeds().leave(machine_);
-    }
-}
-
-void feed_handle::start(detail::pending_ptr bound) { machine_.start(std::move(bound)); }
-
-void feed_handle::next(detail::event_ptr operation) {
-    fetch_next(machine_.mail(), executor(), shared_from_this(), std::move(operation));
-}
-
-void feed_handle::cancel_start() {
-    if (machine_.is_starting()) {
-        close();
-    }
-}
-
-void feed_handle::close() {
-    machine_.close(errc::cancelled);
-    host_->feeds().leave(machine_);
-    left_ = true;
-    // The feed may be closed from inside its own event: functions up the stack still need it.
-    asio::post(host_->executor(), [self = shared_from_this()] {});
-}
-
-std::shared_ptr<detail::feed_control> make_refused_feed(std::shared_ptr<detail::engine> host,
-                                                        boost::system::error_code code, std::string message) {
-    return std::make_shared<refused_feed>(std::move(host), code, std::move(message));
-}
-
-namespace asio = boost::asio;
-
-group_feed_handle::group_feed_handle(std::shared_ptr<detail::engine> host, std::string target, std::string path)
-    : host_(std::move(host)), feed_(host_->bounds(), host_->completions(), std::move(target), std::move(path)) {}
-
-group_feed_handle::~group_feed_handle() { leave(); }
-
-void group_feed_handle::leave() {
-    if (auto* group = std::exchange(left_, true) ? nullptr : host_->group()) {
-        group->dispatcher().feeds().remove(feed_);
-    }
-}
-
-void group_feed_handle::start(detail::pending_ptr bound) {
-    if (host_->stopped()) {
-        static_cast<void>(feed_.mail().close());
-        host_->fail_later(std::move(bound), errc::stopped, "the service has been stopped");
-        return;
-    }
-    host_->group()->dispatcher().feeds().add(feed_, host_->now());
-    starting_ = true;
-    asio::post(host_->executor(), [bound = std::move(bound), self = shared_from_this()]() mutable {
-        self->starting_ = false;
-        if (self->feed_.mail().closed()) {
-            const bool stopped = self->host_->stopped();
-            bound.release()->fail(stopped ? errc::stopped : errc::cancelled, "the feed was closed");
-        } else {
-            bound.release()->offer("{}");
+    void cancel_start() final {
+        if (is_starting()) {
+            close();
         }
-    });
-}
-
-void group_feed_handle::next(detail::event_ptr operation) {
-    fetch_next(feed_.mail(), executor(), shared_from_this(), std::move(operation));
-}
-
-void group_feed_handle::cancel_start() {
-    if (starting_) {
-        close();
     }
-}
+    [[nodiscard]] const asio::any_io_executor& executor() const final { return host_->executor(); }
 
-void group_feed_handle::close() {
-    leave();
-    if (auto waiting = feed_.mail().close()) {
-        host_->completions().put(core::completion{
-            core::completion::event_failure{std::move(waiting), errc::cancelled, "the feed was closed"}});
+  protected:
+    [[nodiscard]] engine& host() const noexcept { return *host_; }
+    [[nodiscard]] virtual bool is_starting() const = 0;
+    /// One call of `async_next`: completes with the next event or an error, never inside this call.
+    void fetch(core::feed_mailbox& from, event_ptr operation) {
+        if (from.closed() || from.has_waiter()) {
+            const auto code = make_error_code(from.closed() ? errc::stopped : errc::busy);
+            asio::post(executor(), [operation = std::move(operation), code]() mutable {
+                operation.release()->fail(code, code == errc::busy ? "another async_next of this feed waits"
+                                                                   : "the feed is closed");
+            });
+        } else if (from.next(std::move(operation))) {
+            asio::post(executor(), [&from, self = shared_from_this()] { from.pump(); });
+        }
     }
-    // The feed may be closed from inside its own event: functions up the stack still need it.
-    asio::post(host_->executor(), [self = shared_from_this()] {});
-}
+    /// It may be closed from inside its own event: functions up the stack still need it.
+    void keep_for_a_turn() {
+        asio::post(executor(), [self = shared_from_this()] {});
+    }
 
-namespace {
+  private:
+    std::shared_ptr<engine> host_;
+};
+
+/// A feed that is bound by a link.
+class link_feed final : public feed_handle {
+  public:
+    link_feed(const std::shared_ptr<engine>& by, std::string target, std::string path, bool thinned)
+        : feed_handle(by), machine_(by->feeds(), by->deadlines(), by->completions(), by->bounds(), std::move(target),
+                                    std::move(path), thinned, seed()) {}
+
+    [[nodiscard]] core::feed_machine& machine() noexcept { return machine_; }
+    void start(pending_ptr bound) override { machine_.start(std::move(bound)); }
+    void next(event_ptr operation) override { fetch(machine_.mail(), std::move(operation)); }
+    void cancel(const pending_event* operation) override { machine_.mail().cancel(operation); }
+    void close() override {
+        machine_.close(errc::cancelled);
+        keep_for_a_turn();
+    }
+
+  private:
+    [[nodiscard]] bool is_starting() const override { return machine_.is_starting(); }
+
+    core::feed_machine machine_;
+};
+
+/// A feed that is bound through the multicast group, in which the service takes part.
+class group_feed_handle final : public feed_handle {
+  public:
+    group_feed_handle(const std::shared_ptr<engine>& by, std::string target, std::string path)
+        : feed_handle(by), feed_(by->bounds(), by->completions(), std::move(target), std::move(path)) {}
+    ~group_feed_handle() override { leave(); }
+
+    /// Completes as soon as the BIND has been sent: it is not answered.
+    void start(pending_ptr bound) override {
+        if (host().stopped()) {
+            static_cast<void>(feed_.mail().close());
+            host().fail_later(std::move(bound), errc::stopped, "the service has been stopped");
+            return;
+        }
+        host().group()->feeds().add(feed_, host().now());
+        starting_ = true;
+        asio::post(executor(), [bound = std::move(bound), keep = shared_from_this(), this]() mutable {
+            starting_ = false;
+            if (feed_.mail().closed()) {
+                const bool stopped = host().stopped();
+                bound.release()->fail(stopped ? errc::stopped : errc::cancelled, "the feed was closed");
+            } else {
+                bound.release()->offer("{}");
+            }
+        });
+    }
+    void next(event_ptr operation) override { fetch(feed_.mail(), std::move(operation)); }
+    void cancel(const pending_event* operation) override { feed_.mail().cancel(operation); }
+    void close() override {
+        leave();
+        if (auto waiting = feed_.mail().close()) {
+            host().completions().put(core::completion{
+                core::completion::event_failure{std::move(waiting), errc::cancelled, "the feed was closed"}});
+        }
+        keep_for_a_turn();
+    }
+
+  private:
+    [[nodiscard]] bool is_starting() const override { return starting_; }
+    void leave() {
+        if (auto* group = std::exchange(left_, true) ? nullptr : host().group()) {
+            group->feeds().remove(feed_);
+        }
+    }
+
+    core::group_feed feed_;
+    bool starting_ = false;
+    bool left_ = false; // and may be destroyed on any thread
+};
 
 /// Why a noun cannot be bound through the group; `message` is empty if it can.
 struct refusal {
@@ -135,7 +164,7 @@ struct refusal {
     std::string message;
 };
 
-refusal objection_to(detail::engine& host, const protocol::noun_view& noun, const bind_options& options) {
+refusal objection_to(engine& host, const protocol::noun_view& noun, const bind_options& options) {
     const std::string target{noun.target};
     if (!options.at_.empty()) {
         return {errc::bad_request, "a binding by multicast takes no address: '" + options.at_ + "'"};
@@ -158,13 +187,41 @@ refusal objection_to(detail::engine& host, const protocol::noun_view& noun, cons
 
 } // namespace
 
-std::shared_ptr<detail::feed_control> make_group_feed(const std::shared_ptr<detail::engine>& host,
-                                                      const protocol::noun_view& noun, std::string path,
-                                                      const bind_options& options) {
-    if (auto why = objection_to(*host, noun, options); !why.message.empty()) {
-        return make_refused_feed(host, why.code, std::move(why.message));
+std::shared_ptr<feed_control> make_feed(const std::shared_ptr<engine>& host, std::string_view noun,
+                                        const bind_options& options) {
+    const auto refused = [&](errc code, std::string why) {
+        return std::make_shared<refused_feed>(host, code, std::move(why));
+    };
+    protocol::noun_view parts;
+    std::string why;
+    if (!protocol::parse_noun(noun, parts, why)) {
+        return refused(errc::bad_request, std::move(why));
     }
-    return std::make_shared<group_feed_handle>(host, std::string{noun.target}, std::move(path));
+    if (auto wrong = core::invalid_option_reason(options); !wrong.empty()) {
+        return refused(errc::invalid_option, std::move(wrong));
+    }
+    if (host->stopped()) {
+        return refused(errc::stopped, "the service has been stopped");
+    }
+    std::string scratch;
+    const std::string path{protocol::canonical_path(parts, scratch)};
+    const std::string target{parts.target};
+    const bool routes = host->node().active_router != nullptr; // then links bind `all`, through this service itself
+    if (options.multicast_ || (target == "all" && options.at_.empty() && !routes)) {
+        if (auto objection = objection_to(*host, parts, options); !objection.message.empty()) {
+            return refused(objection.code, std::move(objection.message));
+        }
+        return std::make_shared<group_feed_handle>(host, target, path);
+    }
+    auto made = std::make_shared<link_feed>(host, target, path, options.every_.count() > 0);
+    host->feeds().enter(made->machine(), made,
+                        {.noun = std::string{noun},
+                         .at = options.at_,
+                         .deadline = options.deadline_,
+                         .every_ms = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
+                             options.every_.count(), 0, static_cast<std::int64_t>(protocol::max_deadline_ms))),
+                         .keep = options.keep_});
+    return made;
 }
 
-} // namespace cles::api
+} // namespace cles::detail

@@ -2,7 +2,7 @@
 #include <cles/error.hpp>
 #include <cles/multicast.hpp>
 
-#include "json/characters.hpp"
+#include "json/json_scan.hpp"
 #include "transport/ip_interface.hpp"
 
 #include <boost/asio/ip/address_v4.hpp>

@@ -2,12 +2,6 @@
 #include <cles/service.hpp>
 
 #include "api/engine.hpp"
-#include "api/feed_handle.hpp"
-#include "node/session/command.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/grammar.hpp"
-#include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
 
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/io_context.hpp>
@@ -15,7 +9,6 @@
 #include <boost/asio/strand.hpp>
 #include <boost/asio/thread_pool.hpp>
 
-#include <algorithm>
 #include <future>
 #include <type_traits>
 #include <utility>
@@ -190,7 +183,7 @@ std::uint64_t service::send(detail::engine& inside, const detail::outgoing& requ
 
 std::uint64_t service::send_command(detail::engine& inside, std::string_view command, const call_options& options,
                                     detail::pending_ptr operation) {
-    return core::send_command(inside, command, options, std::move(operation));
+    return inside.send_command(command, options, std::move(operation));
 }
 
 void service::send_elsewhere(const detail::remote_withdrawal& withdraw, const detail::outgoing& request,
@@ -206,7 +199,7 @@ void service::send_command_elsewhere(const detail::remote_withdrawal& withdraw, 
                                      const call_options& options, detail::pending_ptr operation) {
     asio::dispatch(get_executor(), [inside = engine_, ticket = withdraw.ticket, command, options,
                                     operation = std::move(operation)]() mutable {
-        *ticket = core::send_command(*inside, command, options, std::move(operation));
+        *ticket = inside->send_command(command, options, std::move(operation));
     });
 }
 
@@ -230,7 +223,7 @@ void service::start_bind(const detail::bind_withdrawal& withdraw, detail::bindin
                          const std::string& noun, const bind_options& options) {
     constexpr auto start = [](const std::shared_ptr<detail::engine>& inside, std::weak_ptr<detail::feed_control>& made,
                               detail::binding_ptr bound, const std::string& target, const bind_options& chosen) {
-        const auto control = make_feed(inside, target, chosen);
+        const auto control = detail::make_feed(inside, target, chosen);
         made = control;
         bound->make_of(control);
         control->start(detail::pending_ptr{bound.release()});
@@ -243,36 +236,6 @@ void service::start_bind(const detail::bind_withdrawal& withdraw, detail::bindin
                                        operation = std::move(operation)]() mutable {
         start(inside, *made, std::move(operation), noun, options);
     });
-}
-
-std::shared_ptr<detail::feed_control> service::make_feed(const std::shared_ptr<detail::engine>& inside,
-                                                         std::string_view noun, const bind_options& options) {
-    protocol::noun_view parts;
-    std::string why;
-    if (!protocol::parse_noun(noun, parts, why)) {
-        return api::make_refused_feed(inside, errc::bad_request, why);
-    }
-    if (auto wrong = core::invalid_option_reason(options); !wrong.empty()) {
-        return api::make_refused_feed(inside, errc::invalid_option, std::move(wrong));
-    }
-    if (inside->stopped()) {
-        return api::make_refused_feed(inside, errc::stopped, "the service has been stopped");
-    }
-    std::string scratch;
-    const std::string path{protocol::canonical_path(parts, scratch)};
-    const bool routes = inside->node().active_router != nullptr; // then links bind `all`, through this service itself
-    if (options.multicast_ || (parts.target == "all" && options.at_.empty() && !routes)) {
-        return api::make_group_feed(inside, parts, path, options);
-    }
-    auto made = std::make_shared<api::feed_handle>(inside, std::string{parts.target}, path, options.every_.count() > 0);
-    inside->feeds().enter(made->machine(), made,
-                          {.noun = std::string{noun},
-                           .at = options.at_,
-                           .deadline = options.deadline_,
-                           .every_ms = static_cast<std::uint32_t>(std::clamp<std::int64_t>(
-                               options.every_.count(), 0, static_cast<std::int64_t>(protocol::max_deadline_ms))),
-                           .keep = options.keep_});
-    return made;
 }
 
 std::string service::request(std::string_view command, const call_options& options) {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "asio/asio_environment.hpp"
 
+#include <cles/error.hpp>
 #include <cles/link.hpp>
 
-#include "asio/boottime_timer.hpp"
 #include "transport/group_port.hpp"
 #include "transport/ip_interface.hpp"
 #include "transport/transports.hpp"
@@ -12,8 +12,14 @@
 #include <boost/asio/post.hpp>
 #include <boost/asio/query.hpp>
 
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
 #include <cstdint>
 #include <utility>
+
+#include <sys/timerfd.h>
+#include <unistd.h>
 
 namespace cles::asio_port {
 namespace asio = boost::asio;
@@ -40,50 +46,57 @@ class posted_task {
     std::shared_ptr<core::task> task_;
 };
 
+int make_timer() {
+    const int made = ::timerfd_create(CLOCK_BOOTTIME, TFD_NONBLOCK | TFD_CLOEXEC);
+    if (made < 0) {
+        throw error(boost::system::error_code{errno, boost::system::system_category()}, "cannot make a timer");
+    }
+    return made;
+}
+
 } // namespace
 
-class asio_environment::timer : public std::enable_shared_from_this<timer> {
-  public:
-    timer(const asio::any_io_executor& executor, std::function<void()> due) : timer_(executor), due_(std::move(due)) {}
+boottime_timer::boottime_timer(const asio::any_io_executor& executor, std::function<void()> due)
+    : timer_(executor, make_timer()), due_(std::move(due)) {}
 
-    void set(time_point due) {
-        timer_.set(due);
-        wait();
+void boottime_timer::set(time_point due) {
+    // Zero would disarm it.
+    const auto at = std::max(due.time_since_epoch(), time_point::duration{1});
+    const auto whole = std::chrono::floor<std::chrono::seconds>(at);
+    const itimerspec when{.it_interval = {}, .it_value = {.tv_sec = whole.count(), .tv_nsec = (at - whole).count()}};
+    ::timerfd_settime(timer_.native_handle(), TFD_TIMER_ABSTIME, &when, nullptr);
+    wait();
+}
+
+void boottime_timer::stop() {
+    due_ = nullptr;
+    boost::system::error_code ignored;
+    timer_.cancel(ignored);
+}
+
+void boottime_timer::wait() {
+    if (!due_ || std::exchange(waiting_, true)) {
+        return;
     }
-    void stop() {
-        due_ = nullptr;
-        timer_.cancel();
-    }
-
-  private:
-    void wait() {
-        if (!due_ || std::exchange(waiting_, true)) {
-            return;
-        }
-        timer_.async_wait([self = shared_from_this()](boost::system::error_code code) {
-            self->waiting_ = false;
-            if (code || !self->due_) {
-                return;
-            }
-            if (self->timer_.take()) {
-                self->due_();
-            } else { // it was set again while this was pending
-                self->wait();
-            }
-        });
-    }
-
-    boottime_timer timer_;
-    std::function<void()> due_; // empty: stopped
-    bool waiting_ = false;
-};
-
-asio_environment::~asio_environment() = default;
+    timer_.async_wait(asio::posix::descriptor_base::wait_read,
+                      [self = shared_from_this()](boost::system::error_code code) {
+                          self->waiting_ = false;
+                          if (code || !self->due_) {
+                              return;
+                          }
+                          std::uint64_t times = 0;
+                          if (::read(self->timer_.native_handle(), &times, sizeof times) > 0) {
+                              self->due_();
+                          } else { // it was set again while this was pending
+                              self->wait();
+                          }
+                      });
+}
 
 void asio_environment::post(std::shared_ptr<core::task> next) { asio::post(executor_, posted_task{std::move(next)}); }
 
 void asio_environment::start_timer(std::function<void()> due) {
-    timer_ = std::make_shared<timer>(executor_, std::move(due));
+    timer_ = std::make_shared<boottime_timer>(executor_, std::move(due));
 }
 
 void asio_environment::set_timer(time_point due) {

@@ -4,22 +4,44 @@
 #include "port/environment.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/posix/stream_descriptor.hpp>
 
 #include <functional>
 #include <memory>
 #include <random>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::asio_port {
+
+/// A timer on the clock of all deadlines, which continues while the machine is suspended: what became due meanwhile is
+/// due as soon as the machine wakes. (Asio's own timers use a clock that stops then, and would be late by the whole
+/// suspension.)
+class boottime_timer final : public std::enable_shared_from_this<boottime_timer> {
+  public:
+    /// `due` is called at the time that was set last, or soon after it. \throws cles::error if the system has no timer
+    /// to give
+    boottime_timer(const boost::asio::any_io_executor& executor, std::function<void()> due);
+
+    void set(time_point due);
+    /// `due` is not called any more.
+    void stop();
+
+  private:
+    void wait();
+
+    boost::asio::posix::stream_descriptor timer_;
+    std::function<void()> due_; // empty: stopped
+    bool waiting_ = false;
+};
 
 /// The environment of a node over Boost.Asio: the program's executor, its clock and timer, and the registered
 /// transports.
 class asio_environment final : public core::environment {
   public:
     explicit asio_environment(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
-    ~asio_environment() override;
 
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
 
@@ -44,11 +66,9 @@ class asio_environment final : public core::environment {
     std::shared_ptr<core::group_port> join(const core::network_interface& by, const multicast_options& where) override;
 
   private:
-    class timer;
-
     boost::asio::any_io_executor executor_;
     std::random_device random_;
-    std::shared_ptr<timer> timer_;
+    std::shared_ptr<boottime_timer> timer_;
 };
 
 } // namespace cles::asio_port

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/convert.hpp>
 
-#include <bitset>
+#include <boost/container/small_vector.hpp>
+
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -62,41 +64,9 @@ bool fail_count(json_reader& r, std::string_view which, std::size_t wanted) {
     return r.fail(std::string{which} + " than " + std::to_string(wanted) + " elements");
 }
 
-namespace {
-
-std::size_t find_field(std::span<const field> fields, std::string_view name) noexcept {
-    std::size_t i = 0;
-    while (i < fields.size() && fields[i].name != name) {
-        ++i;
-    }
-    return i;
-}
-
-// The fields that have been read; does not allocate for as many as most structs have.
-class seen_fields {
-  public:
-    explicit seen_fields(std::size_t count) : more_(count > few ? count - few : 0) {}
-
-    void add(std::size_t i) {
-        if (i < few) {
-            first_.set(i);
-        } else {
-            more_[i - few] = true;
-        }
-    }
-    [[nodiscard]] bool contains(std::size_t i) const { return i < few ? first_.test(i) : more_[i - few]; }
-
-  private:
-    static constexpr std::size_t few = 64;
-    std::bitset<few> first_;
-    std::vector<bool> more_;
-};
-
-} // namespace
-
 bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
-    seen_fields seen{fields.size()};
-    std::size_t next = 0; // members usually arrive in order
+    boost::container::small_vector<bool, 64> seen(fields.size()); // more than most structs have
+    std::size_t next = 0;                                         // members usually arrive in order
     std::string_view key;
     if (!r.begin_object()) {
         return false;
@@ -107,7 +77,7 @@ bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
         } else if (!r.next_key(key)) {
             break;
         } else {
-            next = find_field(fields, key);
+            next = static_cast<std::size_t>(std::ranges::find(fields, key, &field::name) - fields.begin());
         }
         if (next == fields.size()) {
             if (!r.skip()) {
@@ -119,13 +89,13 @@ bool read_fields(json_reader& r, void* object, std::span<const field> fields) {
             r.inside_member(fields[next].name);
             return false;
         }
-        seen.add(next++);
+        seen[next++] = true;
     }
     if (!r.ok()) {
         return false;
     }
     for (std::size_t i = 0; i < fields.size(); ++i) {
-        if (fields[i].required && !seen.contains(i)) {
+        if (fields[i].required && !seen[i]) {
             r.fail("is missing");
             r.inside_member(fields[i].name);
             return false;
@@ -139,11 +109,9 @@ bool read_choice(json_reader& r, std::span<const std::string_view> names, std::s
     if (!r.read(name)) {
         return false;
     }
-    for (std::size_t i = 0; i < names.size(); ++i) {
-        if (names[i] == name) {
-            index = i;
-            return true;
-        }
+    index = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+    if (index != names.size()) {
+        return true;
     }
     std::string choices;
     for (const auto choice : names) {

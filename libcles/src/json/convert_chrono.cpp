@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/convert_chrono.hpp>
 
+#include "json/json_scan.hpp"
+
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -24,13 +27,15 @@ constexpr double max_seconds = 9e18; // that fit into 64 bits
 
 wide floor_divide(wide a, wide b) { return a / b - static_cast<wide>(a % b != 0 && (a < 0) != (b < 0)); }
 
+bool narrow(wide value, std::int64_t& out) {
+    out = static_cast<std::int64_t>(value);
+    return out == value;
+}
+
 bool to_whole(wide nanoseconds, whole_time& value) {
     const auto seconds = floor_divide(nanoseconds, second);
-    if (seconds > std::numeric_limits<std::int64_t>::max() || seconds < std::numeric_limits<std::int64_t>::min()) {
-        return false;
-    }
-    value = {static_cast<std::int64_t>(seconds), static_cast<std::int64_t>(nanoseconds - seconds * second)};
-    return true;
+    value.nanoseconds = static_cast<std::int64_t>(nanoseconds - seconds * second);
+    return narrow(seconds, value.seconds);
 }
 
 /// Reads a text from its start.
@@ -57,46 +62,36 @@ class scanner {
         return true;
     }
     /// A number of exactly `count` digits, and at most `most`.
-    bool digits(std::size_t count, int most, int& out) noexcept {
+    bool digits(std::size_t count, unsigned most, unsigned& out) noexcept {
         if (text_.size() < count) {
             return false;
         }
-        out = 0;
-        for (std::size_t i = 0; i < count; ++i) {
-            if (!is_digit(text_[i])) {
-                return false;
-            }
-            out = out * 10 + (text_[i] - '0');
-        }
+        const auto* const end = text_.data() + count;
+        const bool all = std::from_chars(text_.data(), end, out).ptr == end;
         text_.remove_prefix(count);
-        return out <= most;
+        return all && out <= most;
     }
     /// A decimal without sign or exponent, in billionths; digits after the ninth are dropped. False if there is none,
     /// or it is too large.
     bool decimal(wide& billionths) noexcept {
         constexpr std::size_t max_digits = 19;
-        std::size_t count = 0;
-        billionths = 0;
-        while (!text_.empty() && is_digit(text_.front())) {
-            billionths = billionths * 10 + (text_.front() - '0');
-            text_.remove_prefix(1);
-            if (++count > max_digits) {
-                return false;
-            }
-        }
-        if (count == 0) {
+        std::uint64_t whole = 0;
+        const auto [end, code] = std::from_chars(text_.data(), text_.data() + text_.size(), whole);
+        const auto count = static_cast<std::size_t>(end - text_.data());
+        text_.remove_prefix(count);
+        if (code != std::errc{} || count > max_digits) {
             return false;
         }
-        billionths *= second;
+        billionths = static_cast<wide>(whole) * second;
         billionths += fraction();
         return true;
     }
     /// The fraction after a point or a comma, in billionths; 0 if there is neither.
     std::int64_t fraction() noexcept {
         std::int64_t billionths = 0;
-        if (text_.size() > 1 && (text_.front() == '.' || text_.front() == ',') && is_digit(text_[1])) {
+        if (text_.size() > 1 && (text_.front() == '.' || text_.front() == ',') && json_detail::is_digit(text_[1])) {
             text_.remove_prefix(1);
-            for (auto unit = second / 10; !text_.empty() && is_digit(text_.front()); unit /= 10) {
+            for (auto unit = second / 10; !text_.empty() && json_detail::is_digit(text_.front()); unit /= 10) {
                 billionths += (text_.front() - '0') * unit;
                 text_.remove_prefix(1);
             }
@@ -105,8 +100,6 @@ class scanner {
     }
 
   private:
-    static bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
-
     std::string_view text_;
 };
 
@@ -172,8 +165,8 @@ bool parse_zone(scanner& from, std::int64_t& ahead) {
         return true;
     }
     char sign = 0;
-    int hours = 0;
-    int minutes = 0;
+    unsigned hours = 0;
+    unsigned minutes = 0;
     if (!from.take_any("+-", &sign) || !from.digits(2, 23, hours)) {
         return false;
     }
@@ -190,13 +183,13 @@ bool parse_zone(scanner& from, std::int64_t& ahead) {
 std::string_view parse_time_point(std::string_view text, whole_time& value) {
     namespace chrono = std::chrono;
     scanner from{text};
-    int year = 0;
-    int month = 0;
-    int in_month = 0;
-    int hours = 0;
-    int minutes = 0;
-    int seconds = 0;
-    constexpr int leap = 60; // the next second, as POSIX counts
+    unsigned year = 0;
+    unsigned month = 0;
+    unsigned in_month = 0;
+    unsigned hours = 0;
+    unsigned minutes = 0;
+    unsigned seconds = 0;
+    constexpr unsigned leap = 60; // the next second, as POSIX counts
     if (!from.digits(4, 9999, year) || !from.take('-') || !from.digits(2, 12, month) || !from.take('-') ||
         !from.digits(2, 31, in_month) || !from.take_any("Tt ") || !from.digits(2, 23, hours) || !from.take(':') ||
         !from.digits(2, 59, minutes) || !from.take(':') || !from.digits(2, leap, seconds)) {
@@ -207,8 +200,8 @@ std::string_view parse_time_point(std::string_view text, whole_time& value) {
     if (!parse_zone(from, ahead)) {
         return "expected a time zone after the time, Z or such as +01:00";
     }
-    const chrono::year_month_day date{chrono::year{year}, chrono::month{static_cast<unsigned>(month)},
-                                      chrono::day{static_cast<unsigned>(in_month)}};
+    const chrono::year_month_day date{chrono::year{static_cast<int>(year)}, chrono::month{month},
+                                      chrono::day{in_month}};
     if (!from.at_end() || !date.ok()) {
         return time_expected;
     }
@@ -250,9 +243,18 @@ void append_fraction(std::string& out, std::int64_t nanoseconds) {
     out.append(digits);
 }
 
-void append_padded(std::string& out, int number, std::size_t width) {
-    const auto digits = std::to_string(number);
-    out.append(width - std::min(width, digits.size()), '0').append(digits);
+// A number of seconds, or a text that `parse` reads, which returns what is wrong.
+bool read_time(json_reader& r, whole_time& value, std::string_view (*parse)(std::string_view, whole_time&),
+               std::string_view expected) {
+    if (r.peek() == json_reader::kind::number) {
+        return read_seconds(r, value);
+    }
+    std::string_view text;
+    if (r.peek() != json_reader::kind::string || !r.read(text)) {
+        return r.fail(expected);
+    }
+    const auto wrong = parse(text, value);
+    return wrong.empty() || r.fail(wrong);
 }
 
 } // namespace
@@ -278,18 +280,18 @@ bool count_units(whole_time value, std::int64_t num, std::int64_t den, std::int6
         return false;
     }
     const auto units = floor_divide(nanoseconds, static_cast<wide>(num) * second);
-    count = static_cast<std::int64_t>(units);
-    return units <= std::numeric_limits<std::int64_t>::max() && units >= std::numeric_limits<std::int64_t>::min();
+    return narrow(units, count);
 }
 
 whole_time whole_of(std::int64_t count, std::int64_t num, std::int64_t den) {
     const auto units = static_cast<wide>(count) * num;
     const auto seconds = floor_divide(units, den);
-    if (seconds > std::numeric_limits<std::int64_t>::max() || seconds < std::numeric_limits<std::int64_t>::min()) {
+    whole_time value;
+    if (!narrow(seconds, value.seconds)) {
         throw_time_out_of_range();
     }
-    const auto nanoseconds = (units - seconds * den) * second / den;
-    return {static_cast<std::int64_t>(seconds), static_cast<std::int64_t>(nanoseconds)};
+    value.nanoseconds = static_cast<std::int64_t>((units - seconds * den) * second / den);
+    return value;
 }
 
 void write_duration(json_writer& w, whole_time value) {
@@ -298,12 +300,9 @@ void write_duration(json_writer& w, whole_time value) {
         ++value.seconds;
         value.nanoseconds = second - value.nanoseconds;
     }
-    auto digits = std::to_string(value.seconds);
-    if (digits.front() == '-') {
-        digits.erase(0, 1);
-    }
+    const auto seconds = static_cast<std::uint64_t>(value.seconds);
     std::string text{negative ? "-PT" : "PT"};
-    text.append(digits);
+    text.append(std::to_string(negative ? 0 - seconds : seconds));
     append_fraction(text, value.nanoseconds);
     w.value(std::string_view{text.append("S")});
 }
@@ -321,17 +320,7 @@ void write_duration(json_writer& w, double seconds) {
     w.value(std::string_view{text.append("S")});
 }
 
-bool read_duration(json_reader& r, whole_time& value) {
-    if (r.peek() == json_reader::kind::number) {
-        return read_seconds(r, value);
-    }
-    std::string_view text;
-    if (r.peek() != json_reader::kind::string || !r.read(text)) {
-        return r.fail(duration_expected);
-    }
-    const auto wrong = parse_duration(text, value);
-    return wrong.empty() || r.fail(wrong);
-}
+bool read_duration(json_reader& r, whole_time& value) { return read_time(r, value, parse_duration, duration_expected); }
 
 bool read_duration(json_reader& r, double& seconds) {
     if (r.peek() == json_reader::kind::number) {
@@ -352,8 +341,7 @@ bool read_duration(json_reader& r, double& seconds) {
     if (digits.starts_with("PT") && digits.ends_with('S') && digits.find_first_of("HM-") == std::string_view::npos) {
         digits = digits.substr(2, digits.size() - 3);
         double number = 0;
-        const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-        if (digits.empty() || !is_digit(digits.front()) || !is_digit(digits.back())) {
+        if (digits.empty() || !json_detail::is_digit(digits.front()) || !json_detail::is_digit(digits.back())) {
             return r.fail(duration_expected);
         }
         const auto* const end = digits.data() + digits.size();
@@ -382,28 +370,19 @@ void write_time_point(json_writer& w, whole_time since_1970) {
     const auto when = chrono::sys_seconds{chrono::seconds{since_1970.seconds}};
     const auto midnight = chrono::floor<chrono::days>(when);
     const chrono::year_month_day date{midnight};
-    const auto in_day = static_cast<int>((when - midnight).count());
-    std::string text;
-    append_padded(text, static_cast<int>(date.year()), 4);
-    append_padded(text.append("-"), static_cast<int>(static_cast<unsigned>(date.month())), 2);
-    append_padded(text.append("-"), static_cast<int>(static_cast<unsigned>(date.day())), 2);
-    append_padded(text.append("T"), in_day / static_cast<int>(hour), 2);
-    append_padded(text.append(":"), in_day % static_cast<int>(hour) / static_cast<int>(minute), 2);
-    append_padded(text.append(":"), in_day % static_cast<int>(minute), 2);
+    const chrono::hh_mm_ss in_day{when - midnight};
+    std::array<char, 80> digits;
+    std::snprintf(digits.data(), digits.size(), "%04d-%02u-%02uT%02d:%02d:%02d", static_cast<int>(date.year()),
+                  static_cast<unsigned>(date.month()), static_cast<unsigned>(date.day()),
+                  static_cast<int>(in_day.hours().count()), static_cast<int>(in_day.minutes().count()),
+                  static_cast<int>(in_day.seconds().count()));
+    std::string text{digits.data()};
     append_fraction(text, since_1970.nanoseconds);
     w.value(std::string_view{text.append("Z")});
 }
 
 bool read_time_point(json_reader& r, whole_time& since_1970) {
-    if (r.peek() == json_reader::kind::number) {
-        return read_seconds(r, since_1970);
-    }
-    std::string_view text;
-    if (r.peek() != json_reader::kind::string || !r.read(text)) {
-        return r.fail(time_expected);
-    }
-    const auto wrong = parse_time_point(text, since_1970);
-    return wrong.empty() || r.fail(wrong);
+    return read_time(r, since_1970, parse_time_point, time_expected);
 }
 
 } // namespace cles::detail

@@ -2,8 +2,13 @@
 #pragma once
 
 #include <cles/json_reader.hpp>
+#include <cles/json_writer.hpp>
 
+#include <cstdint>
+#include <string>
 #include <string_view>
+#include <type_traits>
+#include <vector>
 
 namespace cles::core {
 
@@ -21,6 +26,25 @@ bool read_members(json_reader& r, Member&& member) {
         }
     }
     return r.ok();
+}
+
+/// Writes a member of an object: text, a number, a flag or an array of texts. Its name needs no escapes.
+template <class T>
+void write_member(json_writer& w, std::string_view name, const T& value) {
+    w.plain_key(name);
+    if constexpr (std::is_convertible_v<const T&, std::string_view>) {
+        w.value(std::string_view{value});
+    } else if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+        w.begin_array();
+        for (const auto& each : value) {
+            w.value(std::string_view{each});
+        }
+        w.end_array();
+    } else if constexpr (std::is_unsigned_v<T> && !std::is_same_v<T, bool>) {
+        w.value(std::uint64_t{value});
+    } else {
+        w.value(value);
+    }
 }
 
 } // namespace cles::core

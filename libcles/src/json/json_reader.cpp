@@ -1,27 +1,23 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/json_reader.hpp>
 
-#include "json/characters.hpp"
 #include "json/json_scan.hpp"
 
+#include <array>
 #include <charconv>
 #include <system_error>
+#include <utility>
 
 namespace cles {
 namespace {
 
 std::string_view name_of(json_reader::kind k) noexcept {
-    switch (k) {
-    case json_reader::kind::object: return "an object";
-    case json_reader::kind::array: return "an array";
-    case json_reader::kind::string: return "a string";
-    case json_reader::kind::number: return "a number";
-    case json_reader::kind::boolean: return "true or false";
-    case json_reader::kind::null: return "null";
-    case json_reader::kind::invalid: break;
-    }
-    return "something that is not JSON";
+    constexpr std::array<std::string_view, 7> names{
+        "an object", "an array", "a string", "a number", "true or false", "null", "something that is not JSON"};
+    return names[static_cast<std::size_t>(k)];
 }
+
+std::string_view comma_or(char close) noexcept { return close == '}' ? "',' or '}'" : "',' or ']'"; }
 
 } // namespace
 
@@ -63,12 +59,7 @@ void json_reader::inside_member(std::string_view name) {
     path_.insert(0, name);
 }
 
-void json_reader::inside_element(std::size_t index) {
-    if (!path_.empty() && path_.front() != '[') {
-        path_.insert(0, ".");
-    }
-    path_.insert(0, "[" + std::to_string(index) + "]");
-}
+void json_reader::inside_element(std::size_t index) { inside_member("[" + std::to_string(index) + "]"); }
 
 std::string json_reader::error() const {
     if (ok()) {
@@ -82,11 +73,7 @@ std::string json_reader::error() const {
 }
 
 json_reader::kind json_reader::peek() noexcept {
-    skip_space();
-    if (at_ >= text_.size()) {
-        return kind::invalid;
-    }
-    switch (const auto c = text_[at_]) {
+    switch (const auto c = look()) {
     case '{': return kind::object;
     case '[': return kind::array;
     case '"': return kind::string;
@@ -96,6 +83,8 @@ json_reader::kind json_reader::peek() noexcept {
     default: return c == '-' || json_detail::is_digit(c) ? kind::number : kind::invalid;
     }
 }
+
+bool json_reader::require(kind wanted) { return ok() && (peek() == wanted || expected(name_of(wanted))); }
 
 bool json_reader::fail_too_deep() { return fail("deeper than " + std::to_string(max_depth_) + " brackets"); }
 
@@ -109,36 +98,42 @@ bool json_reader::enter() {
     return true;
 }
 
-bool json_reader::begin_object() { return ok() && (peek() == kind::object ? enter() : expected("an object")); }
+bool json_reader::begin_object() { return require(kind::object) && enter(); }
 
-bool json_reader::begin_array() { return ok() && (peek() == kind::array ? enter() : expected("an array")); }
+bool json_reader::begin_array() { return require(kind::array) && enter(); }
 
-bool json_reader::next_key(std::string_view& key) {
+// Moves to the next member or element. False at the end, which it consumes, and on failure.
+bool json_reader::next(char close) {
     if (!ok()) {
         return false;
     }
-    skip_space();
-    if (at_ < text_.size() && text_[at_] == '}') {
+    const auto c = look();
+    const bool is_first = std::exchange(first_, false);
+    if (c == close) {
         ++at_;
         --depth_;
-        first_ = false;
         return false;
     }
-    if (!first_) {
-        if (at_ >= text_.size() || text_[at_] != ',') {
-            return expected("',' or '}'");
+    if (!is_first) {
+        if (c != ',') {
+            return expected(comma_or(close));
         }
         ++at_;
     }
-    first_ = false;
-    if (peek() != kind::string) {
-        return expected("a member's name");
-    }
-    if (!read(key)) {
+    return true;
+}
+
+bool json_reader::next_key(std::string_view& key) {
+    if (!next('}')) {
         return false;
     }
-    skip_space();
-    if (at_ >= text_.size() || text_[at_] != ':') {
+    if (look() != '"') {
+        return expected("a member's name");
+    }
+    if (!scan_string(key, scratch_)) {
+        return false;
+    }
+    if (look() != ':') {
         return expected("':'");
     }
     ++at_;
@@ -167,26 +162,7 @@ bool json_reader::next_key_is(std::string_view name) noexcept {
     return true;
 }
 
-bool json_reader::next_element() {
-    if (!ok()) {
-        return false;
-    }
-    skip_space();
-    if (at_ < text_.size() && text_[at_] == ']') {
-        ++at_;
-        --depth_;
-        first_ = false;
-        return false;
-    }
-    if (!first_) {
-        if (at_ >= text_.size() || text_[at_] != ',') {
-            return expected("',' or ']'");
-        }
-        ++at_;
-    }
-    first_ = false;
-    return true;
-}
+bool json_reader::next_element() { return next(']'); }
 
 bool json_reader::literal(std::string_view word) {
     if (text_.substr(at_, word.size()) != word) {
@@ -196,26 +172,17 @@ bool json_reader::literal(std::string_view word) {
     return true;
 }
 
-bool json_reader::read_null() { return ok() && (peek() == kind::null ? literal("null") : expected("null")); }
+bool json_reader::read_null() { return require(kind::null) && literal("null"); }
 
 bool json_reader::read(bool& out) {
-    if (!ok()) {
+    if (!require(kind::boolean)) {
         return false;
-    }
-    if (peek() != kind::boolean) {
-        return expected("true or false");
     }
     out = text_[at_] == 't';
     return literal(out ? "true" : "false");
 }
 
 bool json_reader::scan_number(std::string_view& out, bool& integral) {
-    if (!ok()) {
-        return false;
-    }
-    if (peek() != kind::number) {
-        return expected("a number");
-    }
     const auto start = at_;
     if (const auto wrong = json_detail::scan_number(text_, at_, integral); !wrong.empty()) {
         return fail(wrong);
@@ -230,7 +197,7 @@ bool json_reader::read(double& out) {
     }
     std::string_view digits;
     bool integral = false;
-    if (!scan_number(digits, integral)) {
+    if (!require(kind::number) || !scan_number(digits, integral)) {
         return false;
     }
     if (std::from_chars(digits.data(), digits.data() + digits.size(), out).ec != std::errc{}) {
@@ -239,59 +206,38 @@ bool json_reader::read(double& out) {
     return true;
 }
 
-namespace {
-
 template <class Integer>
-bool to_integer(std::string_view digits, Integer& out) noexcept {
+bool json_reader::read_integer(Integer& out, std::string_view out_of_range) {
+    std::string_view digits;
+    bool integral = false;
+    if (!require(kind::number) || !scan_number(digits, integral)) {
+        return false;
+    }
     const auto end = digits.data() + digits.size();
     const auto [ptr, code] = std::from_chars(digits.data(), end, out);
-    return code == std::errc{} && ptr == end;
+    return (code == std::errc{} && ptr == end) || fail(integral ? out_of_range : "expected an integer");
 }
 
-} // namespace
+bool json_reader::read(std::int64_t& out) { return read_integer(out, "an integer out of range"); }
 
-bool json_reader::read(std::int64_t& out) {
-    std::string_view digits;
-    bool integral = false;
-    if (!scan_number(digits, integral)) {
-        return false;
-    }
-    return to_integer(digits, out) || fail(integral ? "an integer out of range" : "expected an integer");
-}
+bool json_reader::read(std::uint64_t& out) { return read_integer(out, "an integer out of range (0 or more)"); }
 
-bool json_reader::read(std::uint64_t& out) {
-    std::string_view digits;
-    bool integral = false;
-    if (!scan_number(digits, integral)) {
-        return false;
-    }
-    return to_integer(digits, out) || fail(integral ? "an integer out of range (0 or more)" : "expected an integer");
-}
-
-bool json_reader::scan_string(std::string_view& raw, bool& escaped) {
-    const auto wrong = json_detail::scan_string(text_, at_, raw, escaped);
-    return wrong.empty() || fail(wrong);
-}
-
-bool json_reader::read(std::string_view& out) {
-    if (!ok()) {
-        return false;
-    }
-    if (peek() != kind::string) {
-        return expected("a string");
-    }
+// `out` is a view of the text, or of `decoded` if there are escapes.
+bool json_reader::scan_string(std::string_view& out, std::string& decoded) {
     bool escaped = false;
-    if (!scan_string(out, escaped)) {
-        return false;
+    if (const auto wrong = json_detail::scan_string(text_, at_, out, escaped); !wrong.empty()) {
+        return fail(wrong);
     }
     if (escaped) {
-        if (!json_detail::unescape(out, scratch_)) {
+        if (!json_detail::unescape(out, decoded)) {
             return fail("half of a surrogate pair");
         }
-        out = scratch_;
+        out = decoded;
     }
     return true;
 }
+
+bool json_reader::read(std::string_view& out) { return require(kind::string) && scan_string(out, scratch_); }
 
 bool json_reader::read(std::string& out) {
     std::string_view text;
@@ -303,18 +249,66 @@ bool json_reader::read(std::string& out) {
 }
 
 bool json_reader::skip() {
-    if (!ok()) {
+    if (!ok() || !skip_value(max_depth_ - depth_)) {
         return false;
-    }
-    const auto flaw = json_detail::skip_json(text_, at_, max_depth_ - depth_);
-    switch (flaw.what) {
-    case json_detail::json_error::kind::none: break;
-    case json_detail::json_error::kind::expected: return expected(flaw.text);
-    case json_detail::json_error::kind::bad: return fail(flaw.text);
-    case json_detail::json_error::kind::too_deep: return fail_too_deep();
     }
     first_ = false;
     return true;
+}
+
+// Recursion is bounded by the depth.
+bool json_reader::skip_value(std::size_t depth) {
+    std::string_view raw;
+    switch (const auto c = look()) {
+    case '{': return depth == 0 ? fail_too_deep() : skip_values('}', depth - 1);
+    case '[': return depth == 0 ? fail_too_deep() : skip_values(']', depth - 1);
+    case '"': {
+        std::string ignored;
+        return scan_string(raw, ignored);
+    }
+    case 't': return literal("true");
+    case 'f': return literal("false");
+    case 'n': return literal("null");
+    default:
+        bool integral = false;
+        return c == '-' || json_detail::is_digit(c) ? scan_number(raw, integral) : expected("a value");
+    }
+}
+
+// What is in the brackets of an object or array.
+bool json_reader::skip_values(char close, std::size_t depth) {
+    ++at_;
+    if (look() == close) {
+        ++at_;
+        return true;
+    }
+    std::string_view key;
+    std::string decoded;
+    for (;;) {
+        if (close == '}') {
+            if (look() != '"') {
+                return expected("a member's name");
+            }
+            if (!scan_string(key, decoded)) {
+                return false;
+            }
+            if (look() != ':') {
+                return expected("':'");
+            }
+            ++at_;
+        }
+        if (!skip_value(depth)) {
+            return false;
+        }
+        const auto c = look();
+        if (c != ',' && c != close) {
+            return expected(comma_or(close));
+        }
+        ++at_;
+        if (c == close) {
+            return true;
+        }
+    }
 }
 
 bool json_reader::read_raw(std::string_view& out) {

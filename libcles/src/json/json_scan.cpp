@@ -1,32 +1,62 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "json/json_scan.hpp"
 
-#include "json/characters.hpp"
-
 #include <array>
 #include <charconv>
 #include <cstdint>
 #include <string>
 
 namespace cles::json_detail {
+
+std::size_t utf8_sequence(std::string_view text, std::size_t at) noexcept {
+    const auto byte = [&](std::size_t i) -> std::uint8_t {
+        return i < text.size() ? static_cast<std::uint8_t>(text[i]) : std::uint8_t{0};
+    };
+    const auto within = [](std::uint8_t b, std::uint8_t low, std::uint8_t high) { return b >= low && b <= high; };
+    const auto lead = byte(at);
+    if (at >= text.size()) {
+        return 0;
+    }
+    if (lead < 0x80) {
+        return 1;
+    }
+    if (within(lead, 0xC2, 0xDF)) {
+        return within(byte(at + 1), 0x80, 0xBF) ? 2 : 0;
+    }
+    if (within(lead, 0xE0, 0xEF)) {
+        const std::uint8_t low = lead == 0xE0 ? 0xA0 : 0x80;  // no overlong forms
+        const std::uint8_t high = lead == 0xED ? 0x9F : 0xBF; // no surrogates
+        return within(byte(at + 1), low, high) && within(byte(at + 2), 0x80, 0xBF) ? 3 : 0;
+    }
+    if (within(lead, 0xF0, 0xF4)) {
+        const std::uint8_t low = lead == 0xF0 ? 0x90 : 0x80;
+        const std::uint8_t high = lead == 0xF4 ? 0x8F : 0xBF; // nothing past U+10FFFF
+        return within(byte(at + 1), low, high) && within(byte(at + 2), 0x80, 0xBF) && within(byte(at + 3), 0x80, 0xBF)
+                   ? 4
+                   : 0;
+    }
+    return 0;
+}
+
+bool is_utf8(std::string_view text) noexcept {
+    for (std::size_t i = 0; i < text.size();) {
+        const auto length = utf8_sequence(text, i);
+        if (length == 0) {
+            return false;
+        }
+        i += length;
+    }
+    return true;
+}
+
 namespace {
 
 void append_utf8(std::string& out, std::uint32_t c) {
     const auto put = [&](std::uint32_t byte) { out.push_back(static_cast<char>(byte)); };
-    if (c < 0x80) {
-        put(c);
-    } else if (c < 0x800) {
-        put(0xC0U | (c >> 6U));
-        put(0x80U | (c & 0x3FU));
-    } else if (c < 0x10000) {
-        put(0xE0U | (c >> 12U));
-        put(0x80U | ((c >> 6U) & 0x3FU));
-        put(0x80U | (c & 0x3FU));
-    } else {
-        put(0xF0U | (c >> 18U));
-        put(0x80U | ((c >> 12U) & 0x3FU));
-        put(0x80U | ((c >> 6U) & 0x3FU));
-        put(0x80U | (c & 0x3FU));
+    const unsigned more = c < 0x80 ? 0 : c < 0x800 ? 1 : c < 0x10000 ? 2 : 3; // bytes after the first
+    put(more == 0 ? c : (0xFF00U >> (more + 1) & 0xFFU) | c >> (6 * more));
+    for (auto i = more; i-- > 0;) {
+        put(0x80U | (c >> (6 * i) & 0x3FU));
     }
 }
 
@@ -214,144 +244,6 @@ bool unescape(std::string_view raw, std::string& out) {
         }
     }
     return true;
-}
-
-namespace {
-
-using kind = json_error::kind;
-
-// Recursion is bounded by the depth.
-class skipper {
-  public:
-    skipper(std::string_view text, std::size_t at) noexcept : text_(text), at_(at) {}
-
-    [[nodiscard]] std::size_t at() const noexcept { return at_; }
-
-    json_error value(std::size_t depth) {
-        switch (look()) {
-        case '{': return depth == 0 ? json_error{kind::too_deep} : object(depth - 1);
-        case '[': return depth == 0 ? json_error{kind::too_deep} : array(depth - 1);
-        case '"': return string();
-        case 't': return literal("true");
-        case 'f': return literal("false");
-        case 'n': return literal("null");
-        case '-':
-        case '0':
-        case '1':
-        case '2':
-        case '3':
-        case '4':
-        case '5':
-        case '6':
-        case '7':
-        case '8':
-        case '9': return number();
-        default: return {kind::expected, "a value"};
-        }
-    }
-
-  private:
-    // The next character that is not white space; 0 at the end.
-    char look() noexcept {
-        while (at_ < text_.size()) {
-            const auto c = text_[at_];
-            if (c > ' ' || (c != ' ' && c != '\t' && c != '\n' && c != '\r')) {
-                return c;
-            }
-            ++at_;
-        }
-        return '\0';
-    }
-
-    json_error object(std::size_t depth) {
-        ++at_;
-        if (look() == '}') {
-            ++at_;
-            return {};
-        }
-        for (;;) {
-            if (look() != '"') {
-                return {kind::expected, "a member's name"};
-            }
-            if (const auto flaw = string(); flaw.what != kind::none) {
-                return flaw;
-            }
-            if (look() != ':') {
-                return {kind::expected, "':'"};
-            }
-            ++at_;
-            if (const auto flaw = value(depth); flaw.what != kind::none) {
-                return flaw;
-            }
-            const auto c = look();
-            if (c != ',' && c != '}') {
-                return {kind::expected, "',' or '}'"};
-            }
-            ++at_;
-            if (c == '}') {
-                return {};
-            }
-        }
-    }
-
-    json_error array(std::size_t depth) {
-        ++at_;
-        if (look() == ']') {
-            ++at_;
-            return {};
-        }
-        for (;;) {
-            if (const auto flaw = value(depth); flaw.what != kind::none) {
-                return flaw;
-            }
-            const auto c = look();
-            if (c != ',' && c != ']') {
-                return {kind::expected, "',' or ']'"};
-            }
-            ++at_;
-            if (c == ']') {
-                return {};
-            }
-        }
-    }
-
-    json_error string() {
-        std::string_view raw;
-        bool escaped = false;
-        if (const auto wrong = scan_string(text_, at_, raw, escaped); !wrong.empty()) {
-            return {kind::bad, wrong};
-        }
-        if (std::string ignored; escaped && !unescape(raw, ignored)) {
-            return {kind::bad, "half of a surrogate pair"};
-        }
-        return {};
-    }
-
-    json_error number() {
-        bool integral = false;
-        const auto wrong = scan_number(text_, at_, integral);
-        return wrong.empty() ? json_error{} : json_error{kind::bad, wrong};
-    }
-
-    json_error literal(std::string_view word) {
-        if (text_.substr(at_, word.size()) != word) {
-            return {kind::expected, word};
-        }
-        at_ += word.size();
-        return {};
-    }
-
-    std::string_view text_;
-    std::size_t at_;
-};
-
-} // namespace
-
-json_error skip_json(std::string_view text, std::size_t& at, std::size_t max_depth) {
-    skipper s{text, at};
-    const auto flaw = s.value(max_depth);
-    at = s.at();
-    return flaw;
 }
 
 } // namespace cles::json_detail

@@ -1,30 +1,60 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <array>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <string>
 #include <string_view>
 
-namespace cles::json_detail {
-
-/// Why a text is not JSON.
-struct json_error {
-    enum class kind : std::uint8_t { none, expected, bad, too_deep };
-    kind what = kind::none;
-    std::string_view text{}; ///< what was expected, or what is bad; static
-};
-
-/// Skips one JSON value of any kind and the white space before it, validating all of it. `at` is then after the value,
-/// or at the error.
-json_error skip_json(std::string_view text, std::size_t& at, std::size_t max_depth);
-
-} // namespace cles::json_detail
-
-/// The tokens of JSON (RFC 8259, sections 6 and 7). The scanners start at `at` and leave it after the token, or return
-/// what is wrong there; an empty result is success.
+/// The characters and tokens of JSON (RFC 8259, sections 6 and 7). The scanners start at `at` and leave it after the
+/// token, or return what is wrong there; an empty result is success.
 
 namespace cles::json_detail {
+
+/// Whether a JSON string may contain the character as it is, on its own: printable ASCII except quotation mark and
+/// backslash.
+constexpr bool is_plain(char c) noexcept {
+    const auto byte = static_cast<unsigned char>(c);
+    return byte >= 0x20 && byte < 0x80 && c != '"' && c != '\\';
+}
+
+/// The end of the run of plain characters that starts at `at`. Long runs are skipped eight characters at a time, since
+/// texts of many kilobytes delay what waits behind them.
+inline std::size_t plain_end(std::string_view text, std::size_t at) noexcept {
+    constexpr std::uint64_t each = 0x0101010101010101U;
+    constexpr std::uint64_t tops = each * 0x80U;
+    // A byte below `limit` has its top bit set in the result, as may bytes above the lowest such byte.
+    const auto below = [](std::uint64_t bytes, std::uint64_t limit) { return (bytes - each * limit) & ~bytes; };
+    for (std::uint64_t word = 0; text.size() - at >= sizeof word; at += sizeof word) {
+        std::memcpy(&word, text.data() + at, sizeof word);
+        const auto special = below(word, 0x20) | below(word ^ (each * '"'), 1) | below(word ^ (each * '\\'), 1) | word;
+        if ((special & tops) != 0) {
+            break;
+        }
+    }
+    while (at < text.size() && is_plain(text[at])) {
+        ++at;
+    }
+    return at;
+}
+
+/// As in the grammars of JSON and of the protocol: ASCII, whatever the locale.
+constexpr bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
+
+/// The length of the well-formed UTF-8 sequence (Unicode 15, table 3-7) that starts at `at`, or 0.
+std::size_t utf8_sequence(std::string_view text, std::size_t at) noexcept;
+
+bool is_utf8(std::string_view text) noexcept;
+
+template <class Number>
+void append_number(std::string& out, Number n) {
+    std::array<char, 32> digits;
+    const auto* const end = std::to_chars(digits.data(), digits.data() + digits.size(), n).ptr;
+    out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
+}
 
 std::string_view scan_number(std::string_view text, std::size_t& at, bool& integral) noexcept;
 

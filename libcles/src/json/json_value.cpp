@@ -21,15 +21,14 @@ bool read_number(json_reader& r, json::value& value) {
     json_reader number{raw};
     // -0 is the written form of a double; no integer has its sign.
     if (raw.find_first_of(".eE") == std::string_view::npos && raw != "-0") {
-        const auto end = raw.data() + raw.size();
-        std::int64_t i = 0;
-        if (const auto [ptr, code] = std::from_chars(raw.data(), end, i); code == std::errc{}) {
-            value = i;
-            return true;
-        }
-        std::uint64_t u = 0;
-        if (const auto [ptr, code] = std::from_chars(raw.data(), end, u); code == std::errc{}) {
-            value = u;
+        const auto fits = [&](auto integer) {
+            const bool good = std::from_chars(raw.data(), raw.data() + raw.size(), integer).ec == std::errc{};
+            if (good) {
+                value = integer;
+            }
+            return good;
+        };
+        if (fits(std::int64_t{}) || fits(std::uint64_t{})) {
             return true;
         }
     }

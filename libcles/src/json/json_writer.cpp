@@ -1,22 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/json_writer.hpp>
 
-#include "json/characters.hpp"
+#include "json/json_scan.hpp"
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 namespace cles {
 namespace {
-
-template <class Number>
-void append_number(std::string& out, Number n) {
-    std::array<char, 32> digits;
-    const auto* const end = std::to_chars(digits.data(), digits.data() + digits.size(), n).ptr;
-    out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
-}
 
 // Most measurements have few decimals, which this writes several times faster than the general algorithm. A decimal of
 // at most 15 digits is the only such decimal that reads back as the same double, so one that does, without trailing
@@ -138,18 +130,18 @@ void json_writer::value(double d) {
     }
     separate();
     if (!append_short_decimal(out_, d)) {
-        append_number(out_, d);
+        json_detail::append_number(out_, d);
     }
 }
 
 void json_writer::value(std::int64_t i) {
     separate();
-    append_number(out_, i);
+    json_detail::append_number(out_, i);
 }
 
 void json_writer::value(std::uint64_t u) {
     separate();
-    append_number(out_, u);
+    json_detail::append_number(out_, u);
 }
 
 void json_writer::value(std::string_view text) {

@@ -2,8 +2,6 @@
 #include "node/flush_scheduler.hpp"
 
 #include "node/publish/binding.hpp"
-#include "node/publish/publications.hpp"
-#include "node/publish/unsent_topics.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -13,7 +11,7 @@ namespace cles::core {
 void send_updates(unsent_topics& unsent, publications& published, time_point now) {
     auto topics = unsent.take();
     for (auto* t : topics) {
-        t->bindings().drain(now);
+        t->drain(now);
     }
     // The publications below may retire nouns that have neither subscribers nor waiters.
     std::erase_if(topics, [](topic* t) { return t->waiters().empty(); });
@@ -23,26 +21,22 @@ void send_updates(unsent_topics& unsent, publications& published, time_point now
     unsent.reuse(std::move(topics));
 }
 
-class flush_scheduler::round {
-  public:
-    explicit round(flush_scheduler& of) noexcept
-        : of_(of), these_(std::exchange(of.waiting_, std::exchange(of.spare_, {}))) {}
-    round(const round&) = delete;
-    round& operator=(const round&) = delete;
-    ~round() {
-        std::erase(these_, nullptr);
-        if (!these_.empty()) {
-            std::ranges::move(of_.waiting_, std::back_inserter(these_));
-            of_.waiting_.swap(these_);
-            these_.clear();
+// Calls `flush` for each link that waits now, without those that are added meanwhile; true: it is done. During the
+// call, it may start to wait again. Links that were not done, or not reached because `flush` threw, wait on.
+template <class F>
+void flush_scheduler::flush_waiting(F&& flush) {
+    auto these = std::exchange(waiting_, std::exchange(spare_, {}));
+    const auto keep_rest = [&] {
+        std::erase(these, nullptr);
+        if (!these.empty()) {
+            std::ranges::move(waiting_, std::back_inserter(these));
+            waiting_.swap(these);
+            these.clear();
         }
-        of_.spare_ = std::move(these_);
-    }
-
-    /// Calls `flush` for each; true: it is done. During the call it may start to wait again.
-    template <class F>
-    void each(F&& flush) {
-        for (auto& place : these_) {
+        spare_ = std::move(these);
+    };
+    try {
+        for (auto& place : these) {
             auto one = std::exchange(place, nullptr);
             one->waits_ = false;
             if (!flush(*one) && !one->waits_) {
@@ -50,12 +44,12 @@ class flush_scheduler::round {
                 place = std::move(one);
             }
         }
+    } catch (...) {
+        keep_rest();
+        throw;
     }
-
-  private:
-    flush_scheduler& of_;
-    std::vector<std::shared_ptr<flushable>> these_;
-};
+    keep_rest();
+}
 
 void flush_scheduler::schedule_turn() {
     if (!scheduled_ && !host_.stopped()) {
@@ -96,34 +90,33 @@ void flush_scheduler::turn() {
 }
 
 void flush_scheduler::run_turn() {
-    const auto now = time_.now();
+    const auto now = node_.time.now();
     host_.drain_routing(now);
     if (host_.stopped()) {
         return;
     }
-    send_updates(host_.node().unsent_relayed, host_.node().published, now);
+    send_updates(node_.unsent_relayed, node_.published, now);
     const auto gone = publish(false);
-    round{*this}.each([](flushable& one) {
+    flush_waiting([](flushable& one) {
         one.flush();
         return true;
     });
-    if (gone) {
-        coalescer_.gone(*gone, time_.now()); // afterwards: writing to many subscribers takes longer than updates wait
+    if (gone) { // as of now: writing to many subscribers takes longer than updates wait
+        coalescer_.gone(*gone, node_.time.now());
     }
 }
 
 std::optional<std::uint64_t> flush_scheduler::publish(bool alone) {
-    auto& node = host_.node();
-    if (node.unsent.empty()) {
+    if (node_.unsent.empty()) {
         return std::nullopt;
     }
-    const auto now = time_.now();
-    if (alone ? !coalescer_.alone(now) : coalescer_.waits(node.unsent.updates(), now)) {
+    const auto now = node_.time.now();
+    if (alone ? !coalescer_.alone(now) : coalescer_.waits(node_.unsent.updates(), now)) {
         return std::nullopt;
     }
-    const post_suppressor during{*this}; // it is flushed right after
-    send_updates(node.unsent, node.published, now);
-    return node.unsent.updates();
+    const scoped_flag during{scheduled_}; // it is flushed right after
+    send_updates(node_.unsent, node_.published, now);
+    return node_.unsent.updates();
 }
 
 void flush_scheduler::write_single_messages() {
@@ -131,15 +124,14 @@ void flush_scheduler::write_single_messages() {
         return;
     }
     const auto gone = publish(true);
-    round{*this}.each([&](flushable& one) { return (gone || one.has_single_request()) && one.write(); });
+    flush_waiting([&](flushable& one) { return (gone || one.has_single_request()) && one.write(); });
     if (gone) {
-        coalescer_.gone(*gone, time_.now());
+        coalescer_.gone(*gone, node_.time.now());
     }
 }
 
 void flush_scheduler::request_flush_if_pending() {
-    const auto& node = host_.node();
-    if (!node.unsent.empty() || !node.unsent_relayed.empty() || !waiting_.empty()) {
+    if (!node_.unsent.empty() || !node_.unsent_relayed.empty() || !waiting_.empty()) {
         schedule_turn();
     }
 }

@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/limits.hpp>
-
+#include "node/base/scoped_flag.hpp"
 #include "node/node_state.hpp"
-#include "port/clock.hpp"
 
 #include <chrono>
 #include <cstdint>
@@ -94,7 +92,6 @@ class flush_host {
     virtual void post_flush() = 0;
     /// Whether there are no more turns.
     [[nodiscard]] virtual bool stopped() const = 0;
-    [[nodiscard]] virtual node_state& node() noexcept = 0;
     /// Continues requests that wait to be forwarded or to start here. Handlers run.
     virtual void drain_routing(time_point now) = 0;
     /// Continues a graceful shutdown, if what it waits for has happened. Called after each turn.
@@ -111,7 +108,7 @@ class flush_host {
 /// a handler runs, until it first waits, so that a reply that it gives goes first.
 class flush_scheduler {
   public:
-    flush_scheduler(flush_host& host, const clock& time) noexcept : host_(host), time_(time) {}
+    flush_scheduler(flush_host& host, node_state& node) noexcept : host_(host), node_(node) {}
     flush_scheduler(const flush_scheduler&) = delete;
     flush_scheduler& operator=(const flush_scheduler&) = delete;
 
@@ -130,7 +127,10 @@ class flush_scheduler {
             return;
         }
         try {
-            call_unscheduled(std::forward<F>(call));
+            {
+                const scoped_flag during{scheduled_}; // what waits is handled below
+                std::forward<F>(call)();
+            }
             write_single_messages();
         } catch (...) {
             request_flush_if_pending();
@@ -142,39 +142,11 @@ class flush_scheduler {
     void stop();
 
     /// Marks that a handler runs. Do not hold it while the handler waits: the whole node shares one mark.
-    class serving {
-      public:
-        explicit serving(flush_scheduler& of) noexcept : of_(of), before_(std::exchange(of.serving_, true)) {}
-        serving(const serving&) = delete;
-        serving& operator=(const serving&) = delete;
-        ~serving() { of_.serving_ = before_; }
-
-      private:
-        flush_scheduler& of_;
-        bool before_;
-    };
+    [[nodiscard]] scoped_flag serving() noexcept { return scoped_flag{serving_}; }
 
   private:
-    /// Prevents turns from being posted; its owner handles what waits.
-    class post_suppressor {
-      public:
-        explicit post_suppressor(flush_scheduler& of) noexcept : of_(of), before_(std::exchange(of.scheduled_, true)) {}
-        post_suppressor(const post_suppressor&) = delete;
-        post_suppressor& operator=(const post_suppressor&) = delete;
-        ~post_suppressor() { of_.scheduled_ = before_; }
-
-      private:
-        flush_scheduler& of_;
-        bool before_;
-    };
-    /// The links that wait now, without those that are added meanwhile. Links that were not done wait on when it ends.
-    class round;
-
     template <class F>
-    void call_unscheduled(F&& call) {
-        const post_suppressor during{*this};
-        std::forward<F>(call)();
-    }
+    void flush_waiting(F&& flush);
     void run_turn();
     void write_single_messages();
     /// Hands published updates to their subscribers. Returns the total number so far; nothing if there were none, or if
@@ -183,11 +155,11 @@ class flush_scheduler {
     void request_flush_if_pending();
 
     flush_host& host_;
-    const clock& time_;
+    node_state& node_;
     update_coalescer coalescer_;
     std::vector<std::shared_ptr<flushable>> waiting_;
     std::vector<std::shared_ptr<flushable>> spare_; // empty, reused for its capacity
-    bool scheduled_ = false;
+    bool scheduled_ = false; // a turn is posted, or is not needed because what waits is handled afterwards
     bool serving_ = false;
 };
 

@@ -1,70 +1,117 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/local_node.hpp"
 
+#include <cles/error.hpp>
+#include <cles/json_reader.hpp>
 #include <cles/limit_ranges.hpp>
 
 #include "node/base/completion_drain.hpp"
-#include "node/base/deadlines.hpp"
 #include "node/membership/reachable_endpoints.hpp"
-#include "node/session/call.hpp"
-#include "node/session/command.hpp"
-#include "node/session/graceful_shutdown.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
+#include "protocol/grammar.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <optional>
 #include <utility>
 
-namespace cles::core {
+namespace cles {
 namespace {
 
-core::node_options complete(core::node_options setup, const std::shared_ptr<core::environment>& by) {
-    // Leaves room for the ids that one incarnation may draw, and is small enough for clients that read numbers as
-    // doubles.
-    constexpr std::uint64_t apart = 1U << 20U;
-    setup.epoch = by->random();
-    setup.first_datagram_id = std::uint64_t{by->random()} * apart;
-    setup.complete = [drain = std::make_shared<core::completion_drain>(by)](core::completion due) {
-        drain->put(std::move(due));
-    };
-    return setup;
-}
-
-void check_pool_name(const std::string& pool) {
-    if (!pool.empty() && !protocol::is_name(pool)) {
-        throw error(errc::invalid_name,
-                    protocol::quoted(pool) + " is not a pool's name (1 to 64 letters, digits, '_', '-', '.')");
-    }
-}
-
-void check_node_name(const std::string& name) {
-    if (!protocol::is_name(name)) {
-        throw error(errc::invalid_name,
-                    protocol::quoted(name) + " is not a node's name (1 to 64 letters, digits, '_', '-', '.')");
-    }
-    if (protocol::is_reserved_target(name)) {
-        throw error(errc::invalid_name, "a node cannot be named '" + name + "'");
+template <class T>
+void refuse_outside(std::string_view name, T value, T least, T most, const char* unit) {
+    if (value < least || value > most) {
+        throw error(errc::invalid_option, "limits." + std::string{name} + " is " + std::to_string(value) + unit +
+                                              ": must be " + std::to_string(least) + " to " + std::to_string(most) +
+                                              unit);
     }
 }
 
 } // namespace
 
+void check(const limits& bounds) {
+    for (const auto& range : count_ranges) {
+        refuse_outside(range.name, bounds.*range.member, range.least, range.most, "");
+    }
+    for (const auto& range : time_ranges) {
+        refuse_outside(range.name, (bounds.*range.member).count(), range.least.count(), range.most.count(), " ms");
+    }
+}
+
+} // namespace cles
+
+namespace cles::core {
+namespace {
+
+// Other adverbs would have to be ignored: the library writes them itself.
+std::string foreign_adverb(std::string_view command) {
+    protocol::part_reader parts{command};
+    parts.next(); // verb
+    parts.next(); // noun
+    for (auto part = parts.next(); !part.empty(); part = parts.next()) {
+        if (!part.starts_with("deadline=") && part != "urgent=yes") {
+            return "of the adverbs only 'deadline' and 'urgent' can be given here, not " + protocol::quoted(part);
+        }
+    }
+    return {};
+}
+
+std::string negative(const char* option, std::chrono::milliseconds value) {
+    return std::string{option} + " is " + std::to_string(value.count()) + " ms: a time from 0";
+}
+
+/// Checks the settings, and adds what a node draws for each incarnation, and who calls its completions.
+node_options complete(node_options setup, const std::shared_ptr<environment>& by) {
+    check_name(setup.name, "node");
+    if (protocol::is_reserved_target(setup.name)) {
+        throw error(errc::invalid_name, "a node cannot be named '" + setup.name + "'");
+    }
+    check(setup.bounds);
+    if (!setup.pool.empty()) {
+        check_name(setup.pool, "pool");
+    }
+    // Leaves room for the ids that one incarnation may draw, and is small enough for clients that read numbers as
+    // doubles.
+    constexpr std::uint64_t apart = 1U << 20U;
+    setup.epoch = by->random();
+    setup.first_datagram_id = std::uint64_t{by->random()} * apart;
+    setup.complete = [drain = std::make_shared<completion_drain>(by)](completion due) { drain->put(std::move(due)); };
+    return setup;
+}
+
+} // namespace
+
+std::string invalid_option_reason(const call_options& options) {
+    return options.deadline_.count() < 0 ? negative("call_options::deadline", options.deadline_) : std::string{};
+}
+
+std::string invalid_option_reason(const bind_options& options) {
+    if (options.deadline_.count() < 0) {
+        return negative("bind_options::deadline", options.deadline_);
+    }
+    if (options.every_.count() < 0) {
+        return negative("bind_options::every", options.every_);
+    }
+    if (options.keep_ > protocol::max_keep) {
+        return "bind_options::keep is " + std::to_string(options.keep_) + ": 1 to " +
+               std::to_string(protocol::max_keep) + ", or 0 for the default";
+    }
+    return {};
+}
+
+std::chrono::milliseconds time_limit(std::chrono::milliseconds deadline, verb of) {
+    if (deadline.count() <= 0) {
+        return std::chrono::milliseconds{protocol::default_deadline(of)};
+    }
+    return std::min(deadline, std::chrono::milliseconds{protocol::max_deadline_ms});
+}
+
 local_node::local_node(std::shared_ptr<core::environment> by, local_node_options options)
-    : environment_(std::move(by)), insecure_(options.insecure), networks_(options.networks),
-      multicast_(std::move(options.multicast)), gossip_(std::move(options.gossip)),
+    : environment_(std::move(by)), networks_(options.networks),
+      node_(std::make_shared<node_state>(complete(std::move(options.node), environment_), *environment_,
+                                         [this] { flush_scheduler_.schedule_turn(); })),
+      insecure_(options.insecure), multicast_(std::move(options.multicast)), gossip_(std::move(options.gossip)),
       on_name_taken_(std::move(options.on_name_taken)), routing_wanted_(options.routing) {
-    check_node_name(options.node.name);
-    check(options.node.bounds);
-    check_pool_name(options.node.pool);
     for (const auto& [name, where] : options.peers) {
         peer_channels_.set_peer(name, where);
     }
-    node_ = std::make_shared<core::node_state>(complete(std::move(options.node), environment_), *environment_,
-                                               [this] { flush_scheduler_.schedule_turn(); });
-    connections_.start();
     discovery_ = std::make_unique<core::discovery>(*this, environment_->random());
 }
 
@@ -99,7 +146,7 @@ void local_node::start(const std::vector<std::string>& listen_at) {
 
 void local_node::on_timer() {
     const auto at = now();
-    const core::deadline_schedule::expiry during{schedule_, node_->deadlines};
+    const deadline_schedule::expiry during{schedule_, node_->deadlines};
     if (schedule_.is_after_suspension(at)) {
         node_->peers.note_suspension(at);
     }
@@ -114,7 +161,9 @@ void local_node::check_shutdown() {
 
 void local_node::join_group() {
     try {
-        group_ = std::make_unique<core::multicast_group>(*this, multicast_, insecure_);
+        auto group = std::make_unique<multicast_group>(node_, environment_->random(), weak_from_this());
+        group->join(*environment_, multicast_, insecure_);
+        group_ = std::move(group);
         group_->start();
         discovery_->join(*group_);
     } catch (const error& e) {
@@ -135,7 +184,7 @@ void local_node::on_discovery_grace_over() {
 
 void local_node::on_name_taken(const std::string& where) {
     if (on_name_taken_) {
-        core::post(*environment_, [self = shared_from_this(), where] {
+        post(*environment_, [self = shared_from_this(), where] {
             if (!self->stopped_) {
                 self->on_name_taken_(where);
             }
@@ -152,67 +201,96 @@ std::string local_node::listen(std::string_view where) {
     return local;
 }
 
-void local_node::forget(core::connection& c, std::uint64_t received, std::uint64_t sent) {
+void local_node::forget(connection& c, std::uint64_t received, std::uint64_t sent) {
     if (connections_.forget(c, received, sent)) {
         peer_channels_.drop(c);
     }
 }
 
 std::string local_node::unverified_address(const identity& peer) const {
-    const auto host = core::host_of(peer);
+    const auto host = host_of(peer);
     return peer.local || !peer.name.empty() || networks_.contain(host) ? std::string{} : host;
 }
 
 // -- turns ---------------------------------------------------------------------------------------------------------
 
-void local_node::post_flush() { environment_->post(std::shared_ptr<core::task>{shared_from_this(), this}); }
+void local_node::post_flush() { environment_->post(std::shared_ptr<task>{shared_from_this(), this}); }
 
 void local_node::run() { flush_scheduler_.turn(); }
 
 void local_node::drain_routing(time_point now) {
     if (routing_) {
-        routing_->run_ready(now);
+        routing_->begin_ready(now);
     }
 }
 
 // -- requests ------------------------------------------------------------------------------------------------------
 
-void local_node::fail_later(detail::pending_ptr operation, boost::system::error_code code, std::string message,
-                            core::completion::progress_function progress) {
-    node_->completions.put(core::completion{
-        core::completion::failure{std::move(operation), code, std::move(message), std::move(progress)}});
+std::uint64_t local_node::fail_later(detail::pending_ptr operation, boost::system::error_code code, std::string message,
+                                     completion::progress_function progress) {
+    node_->completions.put(
+        completion{completion::failure{std::move(operation), code, std::move(message), std::move(progress)}});
+    return 0;
 }
 
 std::uint64_t local_node::send(verb how, std::string_view text, std::string_view body, const call_options& options,
                                detail::pending_ptr operation) {
     if (stopped_) {
-        fail_later(std::move(operation), errc::stopped, "the service has been stopped");
-        return 0;
+        return fail_later(std::move(operation), errc::stopped, "the service has been stopped");
     }
-    if (auto wrong = core::invalid_option_reason(options); !wrong.empty()) {
-        fail_later(std::move(operation), errc::invalid_option, std::move(wrong));
-        return 0;
+    if (auto wrong = invalid_option_reason(options); !wrong.empty()) {
+        return fail_later(std::move(operation), errc::invalid_option, std::move(wrong));
     }
     protocol::noun_view noun;
     std::string why;
     boost::system::error_code code = errc::bad_request;
     if (!protocol::parse_noun(text, noun, why)) {
-        fail_later(std::move(operation), code, std::move(why));
-        return 0;
+        return fail_later(std::move(operation), code, std::move(why));
     }
     auto* r = peer_channels_.to(noun.target, options.at_, options.urgent_, code, why);
     if (r == nullptr) {
-        fail_later(std::move(operation), code, std::move(why));
-        return 0;
+        return fail_later(std::move(operation), code, std::move(why));
     }
     const auto id = draw_id();
     const auto started = now();
     flush_scheduler_.run_user_call([&] {
         r->send({.verb = how, .noun = text, .id = id, .carried = {.urgent = options.urgent_}, .body = body},
-                core::saturating_add(started, core::time_limit(options.deadline_, how)), started, std::move(operation),
+                saturating_add(started, time_limit(options.deadline_, how)), started, std::move(operation),
                 options.on_progress_);
     });
     return id;
+}
+
+std::uint64_t local_node::send_command(std::string_view command, const call_options& options,
+                                       detail::pending_ptr operation, std::optional<std::chrono::milliseconds> left) {
+    protocol::request_line parsed;
+    protocol::malformed_request wrong;
+    std::string why;
+    if (!protocol::parse_request(command, parsed, wrong)) {
+        why = wrong.why;
+    } else if (parsed.is_update()) {
+        why = "an update with 'seq' and 'epoch' is not a request";
+    } else if (parsed.verb == verb::bind) {
+        why = "a binding is made by async_bind";
+    } else if (!parsed.body.empty()) {
+        is_valid_json(parsed.body, bounds().depth, &why);
+    }
+    if (why.empty()) {
+        why = foreign_adverb(command);
+    }
+    if (!why.empty()) {
+        return fail_later(std::move(operation), errc::bad_request, std::move(why));
+    }
+    auto chosen = options;
+    if (chosen.deadline_.count() == 0 && parsed.deadline_ms != protocol::default_deadline(parsed.verb)) {
+        chosen.deadline(std::chrono::milliseconds{parsed.deadline_ms});
+    }
+    if (left && chosen.deadline_.count() >= 0) {
+        chosen.deadline(chosen.deadline_.count() > 0 ? std::min(chosen.deadline_, *left) : *left);
+    }
+    chosen.urgent(chosen.urgent_ || parsed.urgent);
+    const auto noun = std::string{parsed.noun.target} + ":" + std::string{parsed.noun.path};
+    return send(parsed.verb, noun, parsed.body, chosen, std::move(operation));
 }
 
 void local_node::cancel(std::uint64_t ticket) {
@@ -230,7 +308,10 @@ void local_node::cancel(std::uint64_t ticket) {
 
 // -- serving and publishing ----------------------------------------------------------------------------------------
 
-void local_node::check_path(std::string_view noun) const {
+void local_node::check_noun(std::string_view noun) const {
+    if (node_->published.find(noun) != nullptr) {
+        return;
+    }
     protocol::noun_view parts;
     std::string why;
     const auto whole = "self:" + std::string{noun};
@@ -250,31 +331,26 @@ void local_node::publish(std::string_view noun, const std::function<void(json_wr
     if (stopped_) {
         return;
     }
-    if (node_->published.find(noun) == nullptr) {
-        check_path(noun);
-    }
+    check_noun(noun);
     flush_scheduler_.run_user_call([&] { node_->published.publish(noun, write); });
 }
 
 std::uint64_t local_node::publish_when_room(std::string_view noun, std::string_view json,
                                             detail::pending_ptr operation) {
     if (stopped_) {
-        fail_later(std::move(operation), errc::stopped, "the service has been stopped");
-        return 0;
+        return fail_later(std::move(operation), errc::stopped, "the service has been stopped");
     }
     const auto ticket = draw_id();
     bool waits = false;
     try {
-        if (node_->published.find(noun) == nullptr) {
-            check_path(noun);
-        }
+        check_noun(noun);
         flush_scheduler_.run_user_call(
             [&] { waits = !node_->published.publish_when_room(noun, json, operation, ticket); });
     } catch (const error& e) {
         if (operation == nullptr) { // it was taken, and completes elsewhere
             throw;
         }
-        fail_later(std::move(operation), e.code(), e.message());
+        return fail_later(std::move(operation), e.code(), e.message());
     }
     return waits ? ticket : 0;
 }
@@ -283,17 +359,15 @@ std::uint64_t local_node::publish_when_room(std::string_view noun, std::string_v
 
 std::uint64_t local_node::close(std::chrono::milliseconds limit, detail::pending_ptr operation) {
     if (stopped_ || graceful_shutdown_) {
-        fail_later(std::move(operation), errc::stopped, "the service is already closing");
-        return 0;
+        return fail_later(std::move(operation), errc::stopped, "the service is already closing");
     }
     const auto keep = shared_from_this();
     const auto ticket = draw_id();
     discovery_->leave();
     if (stopped_ || graceful_shutdown_) { // by the program's load function
-        fail_later(std::move(operation), errc::stopped, "the service is already closing");
-        return 0;
+        return fail_later(std::move(operation), errc::stopped, "the service is already closing");
     }
-    graceful_shutdown_ = std::make_unique<core::graceful_shutdown>(*this, ticket, limit, std::move(operation));
+    graceful_shutdown_.emplace(*this, ticket, limit, std::move(operation));
     listeners_.reject();
     connections_.refuse_new_requests();
     check_shutdown();
@@ -305,7 +379,7 @@ void local_node::stop() {
         return;
     }
     const auto keep = shared_from_this();
-    core::send_updates(node_->unsent, node_->published, now());
+    send_updates(node_->unsent, node_->published, now());
     stopped_ = true;
     listeners_.close();
     environment_->stop_timer();

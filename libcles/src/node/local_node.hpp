@@ -6,26 +6,24 @@
 #include <cles/line_link.hpp>
 #include <cles/multicast.hpp>
 
-#include "node/base/deadline_schedule.hpp"
+#include "node/base/deadlines.hpp"
 #include "node/base/ip_network.hpp"
 #include "node/flush_scheduler.hpp"
 #include "node/membership/discovery.hpp"
 #include "node/node_state.hpp"
 #include "node/publish/feed_links.hpp"
-#include "node/publish/feed_machine.hpp"
 #include "node/publish/multicast_group.hpp"
 #include "node/routing/peer_channels.hpp"
 #include "node/routing/router.hpp"
-#include "node/session/connection.hpp"
 #include "node/session/connections.hpp"
 #include "port/environment.hpp"
-#include "protocol/grammar.hpp"
 
 #include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -33,11 +31,9 @@
 
 namespace cles::core {
 
-class graceful_shutdown;
-
 /// The settings of a node, from service_options; the constructor of local_node checks them.
 struct local_node_options {
-    core::node_options node;
+    node_options node;
     std::map<std::string, std::string> peers{};
     bool insecure = false;
     std::vector<std::string> networks{};
@@ -47,9 +43,16 @@ struct local_node_options {
     const detail::routing_part* routing = nullptr;
 };
 
+/// Which option is invalid, and why; empty if none is.
+[[nodiscard]] std::string invalid_option_reason(const call_options& options);
+[[nodiscard]] std::string invalid_option_reason(const bind_options& options);
+
+/// The time limit for a given deadline: the verb's default if it is 0, and at most a day.
+[[nodiscard]] std::chrono::milliseconds time_limit(std::chrono::milliseconds deadline, verb of);
+
 /// The node of this process: its state, its links and its channels to others, and what drives them. It makes the
 /// decisions; all input and output goes through its environment.
-class local_node : public std::enable_shared_from_this<local_node>, private core::flush_host, private core::task {
+class local_node : public std::enable_shared_from_this<local_node>, private flush_host, private task {
   public:
     /// Draws the epoch and other random values, and has the environment call completions. \throws cles::error
     local_node(std::shared_ptr<core::environment> by, local_node_options options);
@@ -62,15 +65,15 @@ class local_node : public std::enable_shared_from_this<local_node>, private core
     /// Starts a graceful shutdown; the operation completes when the links have closed. Call `stop` afterwards.
     std::uint64_t close(std::chrono::milliseconds limit, detail::pending_ptr operation);
     /// Whether requests of others are no longer started.
-    [[nodiscard]] bool closing() const noexcept { return graceful_shutdown_ != nullptr; }
+    [[nodiscard]] bool closing() const noexcept { return graceful_shutdown_.has_value(); }
 
     // For the subsystems.
-    [[nodiscard]] core::node_state& node() noexcept final { return *node_; }
-    [[nodiscard]] const std::shared_ptr<core::node_state>& shared_node() const noexcept { return node_; }
+    [[nodiscard]] node_state& node() noexcept { return *node_; }
+    [[nodiscard]] const std::shared_ptr<node_state>& shared_node() const noexcept { return node_; }
     [[nodiscard]] const limits& bounds() const noexcept { return node_->bounds; }
-    [[nodiscard]] core::deadline_queue& deadlines() noexcept { return node_->deadlines; }
+    [[nodiscard]] deadline_queue& deadlines() noexcept { return node_->deadlines; }
     /// Calls the user's code.
-    [[nodiscard]] core::completion_queue& completions() noexcept { return node_->completions; }
+    [[nodiscard]] completion_queue& completions() noexcept { return node_->completions; }
     [[nodiscard]] core::environment& environment() noexcept { return *environment_; }
     [[nodiscard]] time_point now() const { return environment_->now(); }
     /// The address of a peer whose address may be forged, for which there is a limit on what is sent there; empty for
@@ -86,15 +89,13 @@ class local_node : public std::enable_shared_from_this<local_node>, private core
     [[nodiscard]] core::peer_channels& peer_channels() noexcept { return peer_channels_; }
     [[nodiscard]] core::discovery& discovery() noexcept { return *discovery_; }
     /// Null if multicast is off.
-    [[nodiscard]] core::multicast_group* group() noexcept { return group_.get(); }
+    [[nodiscard]] multicast_group* group() noexcept { return group_.get(); }
     void on_discovery_grace_over();
     /// This node's name belongs to the node at `where`.
     void on_name_taken(const std::string& where);
     /// `c` has ended.
-    void forget(core::connection& c, std::uint64_t received, std::uint64_t sent);
+    void forget(connection& c, std::uint64_t received, std::uint64_t sent);
     [[nodiscard]] core::flush_scheduler& flush_scheduler() noexcept { return flush_scheduler_; }
-    /// Null if routing is off.
-    [[nodiscard]] detail::routing_service* routing() noexcept { return routing_.get(); }
 
     // flush_host
     void post_flush() override;
@@ -108,39 +109,44 @@ class local_node : public std::enable_shared_from_this<local_node>, private core
     std::uint64_t publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
     std::uint64_t send(verb how, std::string_view text, std::string_view body, const call_options& options,
                        detail::pending_ptr operation);
+    /// Sends a command such as "PULL car0:localization". One that is malformed, or that cannot be sent as a request,
+    /// fails with `bad_request`. `left` also limits the time for the reply.
+    std::uint64_t send_command(std::string_view command, const call_options& options, detail::pending_ptr operation,
+                               std::optional<std::chrono::milliseconds> left = std::nullopt);
     void cancel(std::uint64_t ticket);
-    /// Completes an operation that failed at its start, but not from inside the call.
-    void fail_later(detail::pending_ptr operation, boost::system::error_code code, std::string message,
-                    core::completion::progress_function progress = {});
+    /// Completes an operation that failed at its start, but not from inside the call. Returns 0, the ticket of such an
+    /// operation.
+    std::uint64_t fail_later(detail::pending_ptr operation, boost::system::error_code code, std::string message,
+                             completion::progress_function progress = {});
 
     // For the feeds.
-    [[nodiscard]] core::feed_links& feeds() noexcept { return feeds_; }
+    [[nodiscard]] feed_links& feeds() noexcept { return feeds_; }
     [[nodiscard]] std::uint64_t draw_id() noexcept { return node_->next_id++; }
 
   private:
     void run() override; // one turn
     void join_group();
     void on_timer();
-    void check_path(std::string_view noun) const;
+    void check_noun(std::string_view noun) const;
 
     std::shared_ptr<core::environment> environment_;
-    std::shared_ptr<core::node_state> node_;
-    core::deadline_schedule schedule_{*environment_};
+    ip_networks networks_;
+    std::shared_ptr<node_state> node_;
+    deadline_schedule schedule_{*environment_};
     bool insecure_;
-    core::ip_networks networks_;
     multicast_options multicast_;
     gossip_options gossip_;
     core::peer_channels peer_channels_{*this};
     core::listeners listeners_{*this};
     core::connections connections_{*this};
-    core::feed_links feeds_{*this};
-    std::unique_ptr<core::multicast_group> group_;
+    feed_links feeds_{*this};
+    std::unique_ptr<multicast_group> group_;
     std::unique_ptr<core::discovery> discovery_;
     std::function<void(std::string_view)> on_name_taken_;
     const detail::routing_part* routing_wanted_;
-    std::unique_ptr<detail::routing_service> routing_; // null: off
-    core::flush_scheduler flush_scheduler_{*this, *environment_};
-    std::unique_ptr<core::graceful_shutdown> graceful_shutdown_; // set once a graceful shutdown has started
+    std::shared_ptr<router> routing_; // null: off
+    core::flush_scheduler flush_scheduler_{*this, *node_};
+    std::optional<graceful_shutdown> graceful_shutdown_; // set once a graceful shutdown has started
     bool stopped_ = false;
 };
 

@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/node_state.hpp"
 
-#include "protocol/datagram.hpp"
-#include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
-
 #include <utility>
 
 namespace cles::core {

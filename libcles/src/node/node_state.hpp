@@ -12,11 +12,9 @@
 #include "node/base/metrics.hpp"
 #include "node/membership/membership.hpp"
 #include "node/publish/publications.hpp"
-#include "node/publish/unsent_topics.hpp"
-#include "node/session/dedup.hpp"
-#include "node/session/reflection_limit.hpp"
-#include "node/session/task_registry.hpp"
-#include "port/clock.hpp"
+#include "node/session/datagram_rules.hpp"
+#include "node/session/task_execution.hpp"
+#include "port/environment.hpp"
 
 #include <cstdint>
 #include <functional>
@@ -27,7 +25,7 @@
 
 namespace cles::core {
 
-class peer_table_server;
+class gossip;
 
 /// The settings of a node.
 struct node_options {
@@ -69,7 +67,7 @@ struct node_state {
     task_registry tasks;
     deadline_queue deadlines;
     membership peers;
-    peer_table_server* gossip_responder = nullptr; ///< answers gossip requests; null if this node does not gossip
+    gossip* gossip_responder = nullptr; ///< answers gossip requests; null if this node does not gossip
     counters counts;
     latency_histogram handler_time; ///< of all handlers that reply later, and of a sample of the others
     std::uint64_t plain_runs = 0;   ///< of those others, for sampling

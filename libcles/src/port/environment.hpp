@@ -6,9 +6,7 @@
 #include <cles/multicast.hpp>
 #include <cles/url.hpp>
 
-#include "port/clock.hpp"
 #include "port/group_port.hpp"
-#include "port/network_interface.hpp"
 
 #include <cstdint>
 #include <functional>
@@ -19,6 +17,16 @@
 #include <vector>
 
 namespace cles::core {
+
+/// The time, if no caller passes it in, as when a handler replies. Tests set it.
+class clock {
+  public:
+    clock() = default;
+    clock(const clock&) = delete;
+    clock& operator=(const clock&) = delete;
+    virtual ~clock() = default;
+    [[nodiscard]] virtual time_point now() const = 0;
+};
 
 /// A function that an environment calls later.
 class task {

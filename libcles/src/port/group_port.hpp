@@ -1,13 +1,57 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "port/group_source.hpp"
 #include "protocol/request_line.hpp"
 
+#include <boost/container_hash/hash.hpp>
+
+#include <compare>
 #include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::core {
+
+/// A network interface of this host, as far as IPv4 multicast needs it.
+struct network_interface {
+    std::string name{};
+    int index = 0;
+    std::uint32_t address = 0; ///< the first one; 127.0.0.1 is 0x7f000001; 0: none
+    bool loopback = false;
+    bool running = false;        ///< up, and with a link
+    bool multicast = false;      ///< as the system reports it: false for loopback, which works nevertheless
+    bool point_to_point = false; ///< such as a tunnel
+};
+
+/// The interfaces that a node with `auto` uses for multicast (cles/multicast.hpp): loopback first.
+std::vector<network_interface> automatic(std::vector<network_interface> all);
+
+/// The sender of a datagram to the group: the IPv4 address and port of a socket that belongs to one node for as long as
+/// it runs.
+struct group_source {
+    std::uint32_t address = 0; ///< 127.0.0.1 is 0x7f000001
+    std::uint16_t port = 0;
+
+    // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the resulting zero for a pointer
+    auto operator<=>(const group_source&) const = default;
+    [[nodiscard]] bool is_loopback() const noexcept { return address >> 24U == 127; }
+};
+
+inline std::size_t hash_value(const group_source& s) noexcept {
+    std::size_t seed = s.port;
+    boost::hash_combine(seed, s.address);
+    return seed;
+}
+
+/// "10.0.0.2"
+std::string host_text(const group_source& s);
+/// "10.0.0.2:4000"
+std::string to_text(const group_source& s);
+/// Parses that; nothing if it is anything else.
+std::optional<group_source> parse_group_source(std::string_view text) noexcept;
 
 /// A datagram from a multicast group, parsed once for all nodes that receive it; valid during the call.
 struct group_datagram {

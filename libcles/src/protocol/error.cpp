@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/error.hpp>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
@@ -9,6 +10,7 @@ namespace cles {
 namespace {
 
 namespace conditions = boost::system::errc;
+using boost::system::error_condition;
 
 struct entry {
     errc code;
@@ -49,12 +51,8 @@ constexpr std::array entries{
 constexpr std::size_t wire_codes = 10;
 
 const entry* find(int value) noexcept {
-    for (const auto& e : entries) {
-        if (static_cast<int>(e.code) == value) {
-            return &e;
-        }
-    }
-    return nullptr;
+    const auto* const found = std::ranges::find(entries, static_cast<errc>(value), &entry::code);
+    return found == entries.end() ? nullptr : found;
 }
 
 class category final : public boost::system::error_category {
@@ -64,39 +62,24 @@ class category final : public boost::system::error_category {
         const auto* e = find(value);
         return e != nullptr ? e->text : "unknown error";
     }
-    boost::system::error_condition default_error_condition(int value) const noexcept override {
+    error_condition default_error_condition(int value) const noexcept override {
         const auto* e = find(value);
-        if (e == nullptr || !e->condition) {
-            return {value, *this};
-        }
-        return make_error_condition(*e->condition);
+        return e != nullptr && e->condition ? make_error_condition(*e->condition) : error_condition{value, *this};
     }
-    bool equivalent(int value, const boost::system::error_condition& condition) const noexcept override {
-        switch (static_cast<errc>(value)) {
-        case errc::busy:
-            if (condition == make_error_condition(conditions::device_or_resource_busy)) {
-                return true;
-            }
-            break;
-        case errc::unavailable:
-            if (condition == make_error_condition(conditions::connection_aborted)) {
-                return true;
-            }
-            break;
-        default: break;
-        }
-        return default_error_condition(value) == condition;
+    bool equivalent(int value, const error_condition& condition) const noexcept override {
+        const auto code = static_cast<errc>(value);
+        return default_error_condition(value) == condition ||
+               (code == errc::busy && condition == make_error_condition(conditions::device_or_resource_busy)) ||
+               (code == errc::unavailable && condition == make_error_condition(conditions::connection_aborted));
     }
 };
 
 std::string describe(const boost::system::error_code& code, const std::string& message) {
-    std::string text;
-    if (code.category() == error_category()) {
-        const auto* e = find(code.value());
-        text = e != nullptr ? e->name : std::string_view{"failed"};
-    } else {
+    if (code.category() != error_category()) {
         return message.empty() ? code.message() : message;
     }
+    const auto* e = find(code.value());
+    std::string text{e != nullptr ? e->name : "failed"};
     if (!message.empty()) {
         text.append(": ").append(message);
     }
@@ -116,12 +99,9 @@ std::string_view wire_name(errc e) noexcept {
 }
 
 errc errc_from_wire(std::string_view name) noexcept {
-    for (std::size_t i = 0; i < wire_codes; ++i) {
-        if (entries[i].name == name) {
-            return entries[i].code;
-        }
-    }
-    return errc::failed;
+    const auto* const end = entries.begin() + wire_codes;
+    const auto* const found = std::ranges::find(entries.begin(), end, name, &entry::name);
+    return found == end ? errc::failed : found->code;
 }
 
 error::error(errc code, std::string message) : error(make_error_code(code), std::move(message)) {}

@@ -1,10 +1,26 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/grammar.hpp"
 
-#include "json/characters.hpp"
+#include "json/json_scan.hpp"
 
+#include <algorithm>
 #include <array>
 #include <charconv>
+
+namespace cles {
+
+std::optional<verb> verb_from(std::string_view text) noexcept {
+    constexpr auto lower_case = 0x20; // the bit by which lower-case letters differ; the names are letters only
+    const auto upper = [](char c) { return static_cast<char>(c & ~lower_case); };
+    for (std::size_t i = 0; i < verb_count; ++i) {
+        if (std::ranges::equal(text, verb_names[i], {}, upper)) {
+            return static_cast<verb>(i);
+        }
+    }
+    return std::nullopt;
+}
+
+} // namespace cles
 
 namespace cles::protocol {
 namespace {
@@ -24,17 +40,13 @@ constexpr bool in_class(char c, std::uint8_t wanted) noexcept {
     return (classes[static_cast<unsigned char>(c)] & wanted) != 0;
 }
 
-constexpr int hex_value(char c) noexcept {
-    if (json_detail::is_digit(c)) {
-        return c - '0';
+// Reads the two hex digits of an escape whose '%' is at `at`.
+bool read_escape(std::string_view text, std::size_t at, std::uint8_t& byte) noexcept {
+    if (text.size() - at < 3) {
+        return false;
     }
-    if (c >= 'A' && c <= 'F') {
-        return c - 'A' + 10;
-    }
-    if (c >= 'a' && c <= 'f') {
-        return c - 'a' + 10;
-    }
-    return -1;
+    const auto* const end = text.data() + at + 3;
+    return std::from_chars(text.data() + at + 1, end, byte, 16).ptr == end;
 }
 
 bool has_control(std::string_view text) noexcept {
@@ -51,15 +63,8 @@ bool has_control(std::string_view text) noexcept {
 } // namespace
 
 bool is_name(std::string_view text) noexcept {
-    if (text.empty() || text.size() > max_name) {
-        return false;
-    }
-    for (const auto c : text) {
-        if (!in_class(c, name_char)) {
-            return false;
-        }
-    }
-    return true;
+    return !text.empty() && text.size() <= max_name &&
+           std::all_of(text.begin(), text.end(), [](char c) { return in_class(c, name_char); });
 }
 
 bool is_reserved_target(std::string_view name) noexcept { return name == "self" || name == "any" || name == "all"; }
@@ -81,9 +86,10 @@ std::optional<std::uint64_t> parse_number(std::string_view text) noexcept {
 
 bool is_parameter(std::string_view text) noexcept {
     bool escapes = false;
+    std::uint8_t ignored = 0;
     for (std::size_t i = 0; i < text.size(); ++i) {
         if (text[i] == '%') {
-            if (i + 2 >= text.size() || hex_value(text[i + 1]) < 0 || hex_value(text[i + 2]) < 0) {
+            if (!read_escape(text, i, ignored)) {
                 return false;
             }
             escapes = true;
@@ -101,9 +107,10 @@ bool is_parameter(std::string_view text) noexcept {
 }
 
 void decode_parameter(std::string_view text, std::string& out) {
+    std::uint8_t byte = 0;
     for (std::size_t i = 0; i < text.size(); ++i) {
-        if (text[i] == '%' && i + 2 < text.size()) {
-            out.push_back(static_cast<char>(hex_value(text[i + 1]) * 16 + hex_value(text[i + 2])));
+        if (text[i] == '%' && read_escape(text, i, byte)) {
+            out.push_back(static_cast<char>(byte));
             i += 2;
         } else {
             out.push_back(text[i]);
@@ -194,28 +201,13 @@ bool split_adverb(std::string_view part, adverb& out) noexcept {
         return false;
     }
     out = {part.substr(0, equals), part.substr(equals + 1)};
-    for (const auto c : out.key) {
-        if (!((c >= 'a' && c <= 'z') || c == '_')) {
-            return false;
-        }
-    }
-    for (const auto c : out.value) {
-        if (c <= 0x20 || c >= 0x7F) {
-            return false;
-        }
-    }
-    return true;
+    return std::all_of(out.key.begin(), out.key.end(), [](char c) { return (c >= 'a' && c <= 'z') || c == '_'; }) &&
+           std::all_of(out.value.begin(), out.value.end(), [](char c) { return c > 0x20 && c < 0x7F; });
 }
 
 std::optional<std::uint64_t> number_between(std::string_view text, std::uint64_t low, std::uint64_t high) noexcept {
     const auto value = parse_number(text);
     return value && *value >= low && *value <= high ? value : std::nullopt;
-}
-
-void append_number(std::string& out, std::uint64_t n) {
-    std::array<char, 20> digits;
-    const auto* const end = std::to_chars(digits.data(), digits.data() + digits.size(), n).ptr;
-    out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
 }
 
 } // namespace cles::protocol

@@ -3,6 +3,8 @@
 
 #include <cles/verb.hpp>
 
+#include "json/json_scan.hpp"
+
 #include <boost/container/static_vector.hpp>
 
 #include <cstddef>
@@ -53,13 +55,9 @@ bool split_adverb(std::string_view part, adverb& out) noexcept;
 /// Parses a number within the bounds; nothing for anything else.
 std::optional<std::uint64_t> number_between(std::string_view text, std::uint64_t low, std::uint64_t high) noexcept;
 
-void append_number(std::string& out, std::uint64_t n);
+using json_detail::append_number;
 
-} // namespace cles::protocol
-
-/// The elements of a line: names, numbers, parameters, nouns (paper, Fig. 2; docs/protocol.md, "The line").
-
-namespace cles::protocol {
+// --- The elements of a line: names, numbers, parameters, nouns (paper, Fig. 2; docs/protocol.md, "The line") ---
 
 inline constexpr std::size_t max_name = 64;
 inline constexpr std::size_t max_parameters = 32;

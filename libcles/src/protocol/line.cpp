@@ -96,12 +96,8 @@ bool is_http(std::string_view line) noexcept {
     if (line.ends_with(" HTTP/1.0") || line.ends_with(" HTTP/1.1")) {
         return true;
     }
-    bool begins = line.size() >= host.size();
-    for (std::size_t i = 0; begins && i < host.size(); ++i) {
-        const auto c = line[i];
-        begins = (c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c) == host[i];
-    }
-    return begins;
+    const auto lower = [](char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; };
+    return std::ranges::equal(line.substr(0, host.size()), host, {}, lower);
 }
 
 } // namespace cles::protocol

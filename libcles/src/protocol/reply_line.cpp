@@ -7,7 +7,6 @@
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
 
-#include <array>
 #include <charconv>
 
 namespace cles::protocol {
@@ -124,12 +123,10 @@ std::string mark_text(const std::optional<update_mark>& mark) {
 }
 
 void append_progress_head(std::string& out, std::uint64_t id, double fraction) {
-    std::array<char, 32> digits;
     out.append("id=");
     append_number(out, id);
     out.append(" progress=");
-    const auto* const end = std::to_chars(digits.data(), digits.data() + digits.size(), fraction).ptr;
-    out.append(digits.data(), static_cast<std::size_t>(end - digits.data()));
+    append_number(out, fraction);
     out.push_back(' ');
 }
 

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "protocol/request_line.hpp"
 
-#include "json/characters.hpp"
-#include "protocol/grammar.hpp"
+#include "json/json_scan.hpp"
+#include "protocol/line.hpp"
+#include "protocol/reply_line.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,10 +11,11 @@
 namespace cles::protocol {
 namespace {
 
-bool is_name_list(std::string_view text) noexcept {
+template <class F>
+bool is_list(std::string_view text, F is_element) {
     for (;;) {
         const auto comma = text.find(',');
-        if (!is_name(text.substr(0, comma))) {
+        if (!is_element(text.substr(0, comma))) {
             return false;
         }
         if (comma == std::string_view::npos) {
@@ -23,126 +25,87 @@ bool is_name_list(std::string_view text) noexcept {
     }
 }
 
-bool is_epoch_list(std::string_view text) noexcept {
+bool is_epoch_list(std::string_view text) {
     constexpr std::size_t each = 9; // including its comma
-    if (text.size() % each != each - 1 || text.size() > max_described * each) {
-        return false;
-    }
-    for (;; text.remove_prefix(each)) {
-        if (!parse_epoch(text.substr(0, each - 1))) {
-            return false;
-        }
-        if (text.size() < each) {
-            return true;
-        }
-        if (text[each - 1] != ',') {
-            return false;
-        }
-    }
+    return text.size() < max_described * each && is_list(text, [](auto part) { return parse_epoch(part).has_value(); });
 }
 
 /// Assigns the value if there is one; returns whether there is.
-template <class Target, class Source>
-bool take(Target& target, const std::optional<Source>& source) {
-    if (source) {
-        target = static_cast<std::uint32_t>(*source);
+template <class Target>
+bool take(Target& target, std::optional<std::uint64_t> value) {
+    if (value) {
+        target = static_cast<Target>(*value);
     }
-    return source.has_value();
+    return value.has_value();
 }
 
-enum class known : std::uint8_t {
-    id,
-    deadline,
-    reply,
-    hops,
-    progress,
-    urgent,
-    lease,
-    every,
-    keep,
-    seq,
-    epoch,
-    via,
-    since,
-    describe,
-    mark,
-    none
+/// Sets the flag if the adverb has the only value that it may have; returns whether it has.
+bool take_flag(bool& flag, bool meaning, bool given) noexcept {
+    flag = given ? meaning : flag;
+    return given;
+}
+
+std::optional<std::uint64_t> lease_from(std::string_view value) noexcept {
+    if (const auto lease = parse_number(value)) {
+        return std::min<std::uint64_t>(*lease, max_lease_ms);
+    }
+    return is_number(value) ? std::optional<std::uint64_t>{max_lease_ms} : std::nullopt; // too long for 64 bits
+}
+
+template <class... Verbs>
+constexpr unsigned on(Verbs... verbs) {
+    return ((1U << static_cast<unsigned>(verbs)) | ...);
+}
+
+/// An adverb that this version defines.
+struct known_adverb {
+    std::string_view key;
+    unsigned verbs;                                         ///< a bit for each on which it means something
+    bool (*apply)(std::string_view value, request_line& r); ///< returns whether the value is valid
 };
 
-constexpr std::array<std::string_view, 15> known_keys{"id",     "deadline", "reply", "hops",     "progress",
-                                                      "urgent", "lease",    "every", "keep",     "seq",
-                                                      "epoch",  "via",      "since", "describe", "mark"};
+constexpr auto on_all = on(verb::pull, verb::push, verb::delegate, verb::bind, verb::update);
+constexpr std::array known_adverbs{
+    known_adverb{"id", on_all,
+                 [](std::string_view v, request_line& r) { return take(r.id, number_between(v, 1, max_id)); }},
+    known_adverb{
+        "deadline", on_all,
+        [](std::string_view v, request_line& r) { return take(r.deadline_ms, number_between(v, 1, max_deadline_ms)); }},
+    known_adverb{"reply", on(verb::push, verb::update),
+                 [](std::string_view v, request_line& r) { return take_flag(r.wants_reply, false, v == "no"); }},
+    known_adverb{"hops", on_all,
+                 [](std::string_view v, request_line& r) { return take(r.hops, number_between(v, 0, max_hops)); }},
+    known_adverb{"progress", on(verb::delegate),
+                 [](std::string_view v, request_line& r) { return take_flag(r.wants_progress, true, v == "yes"); }},
+    known_adverb{"urgent", on(verb::pull, verb::push, verb::delegate),
+                 [](std::string_view v, request_line& r) { return take_flag(r.urgent, true, v == "yes"); }},
+    known_adverb{"lease", on(verb::bind),
+                 [](std::string_view v, request_line& r) { return take(r.lease_ms, lease_from(v)); }},
+    known_adverb{
+        "every", on(verb::bind),
+        [](std::string_view v, request_line& r) { return take(r.every_ms, number_between(v, 1, max_deadline_ms)); }},
+    known_adverb{"keep", on(verb::bind),
+                 [](std::string_view v, request_line& r) { return take(r.keep, number_between(v, 1, max_keep)); }},
+    known_adverb{"seq", on(verb::update),
+                 [](std::string_view v, request_line& r) { return take(r.seq, number_between(v, 1, max_id)); }},
+    known_adverb{"epoch", on(verb::update),
+                 [](std::string_view v, request_line& r) { return (r.epoch = parse_epoch(v)).has_value(); }},
+    known_adverb{"via", on_all, [](std::string_view v, request_line& r) { return is_list(r.via = v, is_name); }},
+    known_adverb{"since", on(verb::pull),
+                 [](std::string_view v, request_line& r) { return (r.since = v).size() <= max_since; }},
+    known_adverb{"describe", on(verb::pull),
+                 [](std::string_view v, request_line& r) { return is_epoch_list(r.describe = v); }},
+    known_adverb{"mark", on(verb::bind),
+                 [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }}};
 
-constexpr std::uint8_t on(std::initializer_list<verb> verbs) {
-    std::uint8_t mask = 0;
-    for (const auto v : verbs) {
-        mask = static_cast<std::uint8_t>(mask | (1U << static_cast<unsigned>(v)));
-    }
-    return mask;
-}
-
-constexpr std::uint8_t on_all = on({verb::pull, verb::push, verb::delegate, verb::bind, verb::update});
-constexpr std::array<std::uint8_t, 15> known_on{on_all,
-                                                on_all,
-                                                on({verb::push, verb::update}),
-                                                on_all,
-                                                on({verb::delegate}),
-                                                on({verb::pull, verb::push, verb::delegate}),
-                                                on({verb::bind}),
-                                                on({verb::bind}),
-                                                on({verb::bind}),
-                                                on({verb::update}),
-                                                on({verb::update}),
-                                                on_all,
-                                                on({verb::pull}),
-                                                on({verb::pull}),
-                                                on({verb::bind})};
-
-known find_known(std::string_view key, verb v) noexcept {
-    for (std::size_t i = 0; i < known_keys.size(); ++i) {
-        if (known_keys[i] == key) {
-            return (known_on[i] & (1U << static_cast<unsigned>(v))) != 0 ? static_cast<known>(i) : known::none;
+/// Its index; past the end: it is not defined for that verb.
+std::size_t find_known(std::string_view key, verb v) noexcept {
+    for (std::size_t i = 0; i < known_adverbs.size(); ++i) {
+        if (known_adverbs[i].key == key) {
+            return (known_adverbs[i].verbs & on(v)) != 0 ? i : known_adverbs.size();
         }
     }
-    return known::none;
-}
-
-bool apply(known k, std::string_view value, request_line& out) {
-    switch (k) {
-    case known::id:
-        if (const auto id = number_between(value, 1, max_id)) {
-            out.id = *id;
-            return true;
-        }
-        return false;
-    case known::deadline: return take(out.deadline_ms, number_between(value, 1, max_deadline_ms));
-    case known::reply: out.wants_reply = false; return value == "no";
-    case known::hops:
-        if (const auto hops = number_between(value, 0, max_hops)) {
-            out.hops = static_cast<std::uint8_t>(*hops);
-            return true;
-        }
-        return false;
-    case known::progress: out.wants_progress = true; return value == "yes";
-    case known::urgent: out.urgent = true; return value == "yes";
-    case known::lease: {
-        auto lease = parse_number(value);
-        if (!lease && is_number(value)) {
-            lease = max_lease_ms; // too long for 64 bits, so the maximum
-        }
-        return lease && take(out.lease_ms, std::optional{std::min<std::uint64_t>(*lease, max_lease_ms)});
-    }
-    case known::every: return take(out.every_ms, number_between(value, 1, max_deadline_ms));
-    case known::keep: return take(out.keep, number_between(value, 1, max_keep));
-    case known::seq: out.seq = number_between(value, 1, max_id); return out.seq.has_value();
-    case known::epoch: out.epoch = parse_epoch(value); return out.epoch.has_value();
-    case known::via: out.via = value; return is_name_list(value);
-    case known::since: out.since = value; return value.size() <= max_since;
-    case known::describe: out.describe = value; return is_epoch_list(value);
-    case known::mark: out.wants_mark = true; return value == "yes";
-    case known::none: break;
-    }
-    return true;
+    return known_adverbs.size();
 }
 
 bool parse_adverbs(part_reader& parts, request_line& out, std::string& why) {
@@ -158,21 +121,21 @@ bool parse_adverbs(part_reader& parts, request_line& out, std::string& why) {
             why = "more than 16 adverbs";
             return false;
         }
-        const auto k = find_known(a.key, out.verb);
-        if (k == known::none) {
+        const auto known = find_known(a.key, out.verb);
+        if (known == known_adverbs.size()) {
             if (a.key.starts_with("must_")) {
                 why = "the adverb " + quoted(a.key) + " is not known here";
                 return false;
             }
             continue;
         }
-        const auto bit = 1U << static_cast<unsigned>(k);
+        const auto bit = 1U << known;
         if ((seen & bit) != 0) {
             why = "the adverb " + quoted(a.key) + " stands twice";
             return false;
         }
         seen |= bit;
-        if (!apply(k, a.value, out)) {
+        if (!known_adverbs[known].apply(a.value, out)) {
             why = "the adverb '" + std::string{a.key} + "' has the bad value " + quoted(a.value);
             return false;
         }
@@ -229,7 +192,22 @@ bool parse_request(std::string_view line, request_line& out, malformed_request& 
     return false;
 }
 
-bool is_known_adverb(std::string_view key, verb on) noexcept { return find_known(key, on) != known::none; }
+bool parse_group_message(std::string_view datagram, request_line& out) {
+    if (datagram.size() > datagram_bytes) {
+        return false;
+    }
+    if (datagram.ends_with('\n')) {
+        datagram.remove_suffix(1);
+    }
+    const auto line = trim(datagram);
+    if (line.empty() || has_many_lines(line) || is_reply(line)) {
+        return false;
+    }
+    malformed_request ignored;
+    return parse_request(line, out, ignored);
+}
+
+bool is_known_adverb(std::string_view key, verb v) noexcept { return find_known(key, v) != known_adverbs.size(); }
 
 malformed_request salvage(std::string_view line) {
     malformed_request result;
@@ -342,6 +320,72 @@ std::string epoch_text(std::uint32_t epoch) {
         text[i] = digits[epoch & 0xFU];
     }
     return text;
+}
+
+// --- The heads of updates ---
+
+namespace {
+
+constexpr std::size_t max_head = 256;
+constexpr std::size_t after_size = std::string_view{" epoch=5f3a09c1 "}.size();
+
+bool may_be_json(std::string_view body) noexcept {
+    return body.size() >= 2 &&
+           ((body.front() == '{' && body.back() == '}') || (body.front() == '[' && body.back() == ']'));
+}
+
+} // namespace
+
+void update_head::remember(std::string_view line, const request_line& update) {
+    forget();
+    const auto head = line.substr(0, line.size() - update.body.size());
+    const auto number = head.find(" seq=");
+    if (!update.is_update() || head.size() > max_head || number == std::string_view::npos ||
+        std::count(head.begin(), head.begin() + static_cast<std::ptrdiff_t>(number), ' ') != 1) {
+        return;
+    }
+    const auto start = number + 5;
+    auto end = start;
+    while (end < head.size() && json_detail::is_digit(head[end])) {
+        ++end;
+    }
+    const auto rest = head.substr(end);
+    if (rest.size() != after_size || !rest.starts_with(" epoch=") || rest.back() != ' ') {
+        return;
+    }
+    text_ = head;
+    update_ = std::make_unique<request_line>();
+    malformed_request ignored;
+    if (parse_request(text_, *update_, ignored)) {
+        before_ = head.substr(0, start);
+        after_ = rest;
+    }
+}
+
+const request_line* update_head::recognise(std::string_view line) noexcept {
+    if (before_.empty() || !line.starts_with(before_)) {
+        return nullptr;
+    }
+    const auto whole = line;
+    line.remove_prefix(before_.size());
+    constexpr std::size_t max_digits = 18; // longer ones are left to the parser
+    std::uint64_t seq = 0;
+    std::size_t digits = 0;
+    while (digits < line.size() && digits <= max_digits && json_detail::is_digit(line[digits])) {
+        seq = seq * 10 + static_cast<std::uint64_t>(line[digits] - '0');
+        ++digits;
+    }
+    if (digits == 0 || digits > max_digits || line[0] == '0' || !line.substr(digits).starts_with(after_)) {
+        return nullptr;
+    }
+    line.remove_prefix(digits + after_.size());
+    if (!may_be_json(line)) {
+        return nullptr;
+    }
+    update_->seq = seq;
+    update_->body = line;
+    update_->text = whole;
+    return update_.get();
 }
 
 } // namespace cles::protocol

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -78,8 +79,18 @@ struct malformed_request {
 /// for it.
 bool parse_request(std::string_view line, request_line& out, malformed_request& error);
 
+/// The maximum size of a datagram, its LF included: small enough that no network fragments it.
+inline constexpr std::size_t datagram_bytes = 1200;
+
+/// Whether the text of a datagram, without its last LF, has more than one line.
+constexpr bool has_many_lines(std::string_view text) noexcept { return text.find('\n') != std::string_view::npos; }
+
+/// Parses a datagram of a multicast group, which holds one request. False if it is not valid: too long, of several
+/// lines, a reply, or malformed. Views are into the datagram.
+bool parse_group_message(std::string_view datagram, request_line& out);
+
 /// Whether this version defines an adverb of that key for that verb.
-bool is_known_adverb(std::string_view key, verb on) noexcept;
+bool is_known_adverb(std::string_view key, verb v) noexcept;
 
 /// What the parts before the body contain for a reply to a malformed line.
 malformed_request salvage(std::string_view line);
@@ -137,6 +148,23 @@ class owned_request {
   private:
     std::string line_;
     protocol::request_line parsed_;
+};
+
+/// The head of a publisher's updates, of which only `seq` changes from one to the next: recognises the next one without
+/// parsing it again, which halves the cost of reading a stream of updates.
+class update_head {
+  public:
+    /// Remembers the head of this line, parsed to `update`, if it has the form that nodes write.
+    void remember(std::string_view line, const request_line& update);
+    /// The parsed line if its head is the remembered one except for the `seq`; else null. Valid until the next call.
+    [[nodiscard]] const request_line* recognise(std::string_view line) noexcept;
+    void forget() noexcept { before_.clear(); }
+
+  private:
+    std::string before_;                   // "UPDATE car1:localization seq="
+    std::string after_;                    // " epoch=5f3a09c1 "
+    std::string text_;                     // what `update_` points into
+    std::unique_ptr<request_line> update_; // large, and most links receive no updates
 };
 
 } // namespace cles::protocol

@@ -3,6 +3,8 @@
 #include <cles/url.hpp>
 
 #include <charconv>
+#include <cstdint>
+#include <optional>
 
 namespace cles {
 namespace {
@@ -11,36 +13,25 @@ namespace {
     throw error(errc::invalid_url, "'" + std::string{text} + "': " + std::string{why});
 }
 
-std::uint16_t parse_port(std::string_view whole, std::string_view text) {
-    std::uint16_t port = 0;
+// Nothing: it is not a number from 0 to `highest`.
+std::optional<std::uint16_t> parse_number(std::string_view text, std::uint16_t highest) {
+    std::uint16_t value = 0;
     const auto end = text.data() + text.size();
-    const auto [ptr, code] = std::from_chars(text.data(), end, port);
-    if (text.empty() || code != std::errc{} || ptr != end) {
-        refuse(whole, "the port is not a number from 0 to 65535");
-    }
-    return port;
-}
-
-std::uint8_t parse_dscp(std::string_view whole, std::string_view query) {
-    constexpr std::string_view key = "dscp=";
-    constexpr unsigned highest = 63; // six bits (RFC 2474)
-    unsigned value = highest + 1;
-    if (query.starts_with(key)) {
-        query.remove_prefix(key.size());
-        const auto end = query.data() + query.size();
-        const auto [ptr, code] = std::from_chars(query.data(), end, value);
-        value = code == std::errc{} && ptr == end ? value : highest + 1;
-    }
-    if (value > highest) {
-        refuse(whole, "only 'dscp=' and a number from 0 to 63 may follow '?'");
-    }
-    return static_cast<std::uint8_t>(value);
+    const auto [ptr, code] = std::from_chars(text.data(), end, value);
+    return code == std::errc{} && ptr == end && value <= highest ? std::optional{value} : std::nullopt;
 }
 
 void parse_host_and_port(std::string_view whole, std::string_view rest, url& out) {
     out.port = default_port;
     if (const auto query = rest.find('?'); query != std::string_view::npos) {
-        out.dscp = parse_dscp(whole, rest.substr(query + 1));
+        constexpr std::string_view key = "?dscp=";
+        constexpr std::uint16_t highest = 63; // six bits (RFC 2474)
+        const auto given = rest.substr(query);
+        const auto dscp = given.starts_with(key) ? parse_number(given.substr(key.size()), highest) : std::nullopt;
+        if (!dscp) {
+            refuse(whole, "only 'dscp=' and a number from 0 to 63 may follow '?'");
+        }
+        out.dscp = static_cast<std::uint8_t>(*dscp);
         rest = rest.substr(0, query);
     }
     std::string_view after;
@@ -75,7 +66,11 @@ void parse_host_and_port(std::string_view whole, std::string_view rest, url& out
         refuse(whole, "a " + out.scheme + " URL ends after its port, or with ?dscp=...");
     }
     if (!after.empty()) {
-        out.port = parse_port(whole, after.substr(1));
+        const auto port = parse_number(after.substr(1), UINT16_MAX);
+        if (!port) {
+            refuse(whole, "the port is not a number from 0 to 65535");
+        }
+        out.port = *port;
     }
 }
 

@@ -46,7 +46,10 @@ std::size_t receive_batch::length_of_each(std::size_t place) noexcept {
     return longest;
 }
 
-void receive_batch::enable_gro(boost::asio::ip::udp::socket& socket) noexcept {
+void receive_batch::prepare(boost::asio::ip::udp::socket& socket) noexcept {
+    boost::system::error_code ignored;
+    socket.non_blocking(true, ignored);
+    socket.set_option(boost::asio::socket_base::receive_buffer_size{1 << 20}, ignored);
     const int on = 1;
     static_cast<void>(::setsockopt(socket.native_handle(), SOL_UDP, UDP_GRO, &on, sizeof on)); // else one at a time
 }
@@ -123,12 +126,21 @@ send_batch::send_batch(udp::socket& socket) noexcept : socket_(socket) {
 }
 
 core::lines_done send_batch::send(std::string_view lines, const udp::endpoint* to) noexcept {
-    if (segments_) {
-        if (const auto done = send_runs(lines, max_in_run, to)) {
-            return *done;
+    const auto done = segments_ ? send_runs(lines, max_in_run, to) : std::nullopt;
+    return done ? *done : *send_runs(lines, 1, to);
+}
+
+core::lines_done send_batch::send_all(std::string_view lines, const udp::endpoint* to) noexcept {
+    core::lines_done all;
+    while (all.bytes < lines.size()) {
+        const auto done = send(lines.substr(all.bytes), to);
+        if (done.lines == 0) {
+            break;
         }
+        all.lines += done.lines;
+        all.bytes += done.bytes;
     }
-    return *send_runs(lines, 1, to);
+    return all;
 }
 
 std::optional<core::lines_done> send_batch::send_runs(std::string_view lines, std::size_t longest,

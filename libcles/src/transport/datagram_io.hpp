@@ -31,6 +31,8 @@ class send_batch {
     /// Sends to the connected peer, or else to `to`. A line that cannot be sent counts as lost in the network, and as
     /// done. \return what is done; nothing if there is no room \pre there is a line
     core::lines_done send(std::string_view lines, const udp::endpoint* to = nullptr) noexcept;
+    /// The same, as long as there is room.
+    core::lines_done send_all(std::string_view lines, const udp::endpoint* to) noexcept;
 
   private:
     // Nothing: the first run cannot be sent as one.
@@ -63,8 +65,9 @@ class receive_batch {
     /// \pre not empty
     datagram take() noexcept;
 
-    /// Lets the system combine datagrams that arrive together, if it can.
-    static void enable_gro(boost::asio::ip::udp::socket& socket) noexcept;
+    /// Makes a socket non-blocking, lets a burst wait in it while other tasks run, and lets the system combine
+    /// datagrams that arrive together, if it can.
+    static void prepare(boost::asio::ip::udp::socket& socket) noexcept;
 
     /// Receives datagrams and passes each to `each`, up to a number per turn; what `each` throws passes through. Ends
     /// if the socket is closed meanwhile. \return whether some may be left for the next turn: do not wait for more

@@ -4,9 +4,7 @@
 #include <cles/multicast.hpp>
 
 #include "port/group_port.hpp"
-#include "port/network_interface.hpp"
 #include "transport/datagram_io.hpp"
-#include "transport/group_receiver.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/udp.hpp>
@@ -17,6 +15,13 @@
 #include <string_view>
 
 namespace cles::transport {
+
+class group_receiver;
+
+/// The socket that nodes on this executor share, or a new one, which joins. \throws boost::system::system_error
+std::shared_ptr<group_receiver> receiver_of(const boost::asio::any_io_executor& executor,
+                                            const core::network_interface& by,
+                                            const boost::asio::ip::udp::endpoint& group);
 
 /// An endpoint in a multicast group over UDP: receives through a socket that nodes on one executor share, and sends
 /// through its own.

@@ -4,9 +4,14 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/system/system_error.hpp>
 
+#include <cerrno>
 #include <string>
 #include <utility>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
 
 namespace cles::transport {
 namespace asio = boost::asio;
@@ -18,6 +23,8 @@ std::optional<asio::ip::address> literal_address(const url& where) {
     return is_name ? std::nullopt : std::optional{address};
 }
 
+namespace {
+
 std::vector<asio::ip::address> addresses_of(const asio::ip::tcp::resolver::results_type& found) {
     std::vector<asio::ip::address> addresses;
     for (const auto& each : found) {
@@ -26,22 +33,47 @@ std::vector<asio::ip::address> addresses_of(const asio::ip::tcp::resolver::resul
     return addresses;
 }
 
-asio::ip::address resolve(const url& where, error_code& code) {
-    code = {};
+} // namespace
+
+asio::ip::address resolve(const url& where) {
     if (const auto literal = literal_address(where)) {
         return *literal;
     }
     asio::io_context lookup;
     asio::ip::tcp::resolver resolver{lookup};
+    error_code code;
     const auto addresses = addresses_of(resolver.resolve(where.host, "", code));
     if (!code && addresses.empty()) {
         code = asio::error::host_not_found;
     }
-    return code ? asio::ip::address{} : addresses.front();
+    if (code) {
+        throw boost::system::system_error{code};
+    }
+    return addresses.front();
 }
 
-namespace asio = boost::asio;
-using boost::system::error_code;
+bool is_beyond_loopback(const url& where) {
+    try {
+        return !resolve(where).is_loopback();
+    } catch (const boost::system::system_error&) {
+        return false;
+    }
+}
+
+void set_traffic_class(int socket, const url& where, error_code& code) {
+    if (!where.dscp) {
+        return;
+    }
+    constexpr int congestion_bits = 2; // the lower bits, not ours to set (RFC 3168)
+    const int value = *where.dscp << congestion_bits;
+    int family = 0;
+    socklen_t size = sizeof family;
+    if (::getsockopt(socket, SOL_SOCKET, SO_DOMAIN, &family, &size) != 0 ||
+        (family == AF_INET6 ? ::setsockopt(socket, IPPROTO_IPV6, IPV6_TCLASS, &value, sizeof value)
+                            : ::setsockopt(socket, IPPROTO_IP, IP_TOS, &value, sizeof value)) != 0) {
+        code.assign(errno, boost::system::system_category());
+    }
+}
 
 void host_lookup::start(const url& where, std::chrono::milliseconds within, callback done) {
     done_ = std::move(done);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/identity.hpp>
 #include <cles/url.hpp>
 
 #include <boost/asio/any_io_executor.hpp>
@@ -9,7 +10,6 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/system/error_code.hpp>
 
-#include <cerrno>
 #include <chrono>
 #include <functional>
 #include <memory>
@@ -18,28 +18,10 @@
 #include <string_view>
 #include <vector>
 
-#include <netinet/in.h>
-#include <sys/socket.h>
-
 namespace cles::transport {
 
 /// Marks what an open socket sends with the DSCP of its URL, if there is one (RFC 2474; RFC 3542 for IPv6).
-template <class Socket>
-void set_traffic_class(Socket& socket, const url& where, boost::system::error_code& code) {
-    if (!where.dscp) {
-        return;
-    }
-    const bool is_v6 = socket.local_endpoint(code).address().is_v6();
-    if (code) {
-        return;
-    }
-    constexpr int congestion_bits = 2; // the lower bits, not ours to set (RFC 3168)
-    const int value = *where.dscp << congestion_bits;
-    const int level = is_v6 ? IPPROTO_IPV6 : IPPROTO_IP;
-    if (::setsockopt(socket.native_handle(), level, is_v6 ? IPV6_TCLASS : IP_TOS, &value, sizeof value) != 0) {
-        code.assign(errno, boost::system::system_category());
-    }
-}
+void set_traffic_class(int socket, const url& where, boost::system::error_code& code);
 
 /// Looks up a host's addresses without blocking, on the resolver thread that Asio has for each execution context. The
 /// first name that is looked up starts it; addresses never do.
@@ -67,16 +49,27 @@ class host_lookup : public std::enable_shared_from_this<host_lookup> {
 /// The address of a URL's host if it is an address or `localhost`. Nothing: it is a name that has to be looked up.
 std::optional<boost::asio::ip::address> literal_address(const url& where);
 
-/// The addresses found for a host, in the system's order of preference.
-std::vector<boost::asio::ip::address> addresses_of(const boost::asio::ip::tcp::resolver::results_type& found);
-
 /// The first address of a URL's host; a name is looked up, which blocks. Only for listening; use `host_lookup` to dial.
-boost::asio::ip::address resolve(const url& where, boost::system::error_code& code);
+/// \throws boost::system::system_error
+boost::asio::ip::address resolve(const url& where);
+
+/// Whether a listener on this URL is reachable from other hosts. Without an address it is not: listening fails anyway.
+bool is_beyond_loopback(const url& where);
 
 /// The URL of a socket's endpoint.
 template <class Endpoint>
 url url_of(std::string_view scheme, const Endpoint& end) {
     return {.scheme = std::string{scheme}, .host = end.address().to_string(), .port = end.port(), .path = {}};
+}
+
+/// The identity of the peer at an endpoint.
+template <class Endpoint>
+identity identity_at(std::string_view scheme, const Endpoint& end) {
+    return {.transport = std::string{scheme},
+            .address = to_string(url_of(scheme, end)),
+            .name = {},
+            .uid = {},
+            .local = end.address().is_loopback()};
 }
 
 } // namespace cles::transport

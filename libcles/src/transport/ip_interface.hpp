@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "port/network_interface.hpp"
+#include "port/group_port.hpp"
 
 #include <string>
 #include <vector>

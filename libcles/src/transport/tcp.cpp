@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSL-1.0
-#include <cles/error.hpp>
-
 #include "transport/ip_host.hpp"
 #include "transport/stream_endpoint.hpp"
 #include "transport/transports.hpp"
@@ -10,6 +8,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstring>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -26,7 +25,7 @@ using boost::system::error_code;
 namespace {
 
 // Detects after `limits::stall` that a peer's host is gone or unreachable, whether data is in transit to it or not.
-void notice_loss(tcp::socket& socket, const limits& bounds) {
+void notice_loss(stream_socket& socket, const limits& bounds) {
     constexpr int least = 6; // seconds
     constexpr int most = 3600;
     const auto wanted = std::chrono::duration_cast<std::chrono::seconds>(bounds.stall).count();
@@ -42,119 +41,33 @@ void notice_loss(tcp::socket& socket, const limits& bounds) {
     socket.set_option(asio::socket_base::keep_alive{true}, ignored);
 }
 
-void tune(tcp::socket& socket, const url& where, const limits& bounds) {
+tcp::endpoint ip_endpoint(const stream_address& any) {
+    tcp::endpoint end;
+    std::memcpy(end.data(), any.data(), any.size());
+    end.resize(any.size());
+    return end;
+}
+
+// Sets the options of a connected socket, too.
+identity identify(stream_socket& socket, const url& where, const limits& bounds) {
     error_code ignored;
-    set_traffic_class(socket, where, ignored);
+    set_traffic_class(socket.native_handle(), where, ignored);
     socket.set_option(tcp::no_delay{true}, ignored);
     notice_loss(socket, bounds);
-}
-
-identity identify(tcp::socket& socket, const url& where, const limits& bounds) {
-    tune(socket, where, bounds);
     error_code gone;
     const auto peer = socket.remote_endpoint(gone);
-    identity who{.transport = "tcp", .address = {}, .name = {}, .uid = {}};
-    if (!gone) {
-        who.address = to_string(url_of("tcp", peer));
-        who.local = peer.address().is_loopback();
-    }
-    return who;
+    return gone ? identity{.transport = "tcp", .address = {}, .name = {}, .uid = {}}
+                : identity_at("tcp", ip_endpoint(peer));
 }
-
-class tcp_acceptor final : public acceptor {
-  public:
-    tcp_acceptor(tcp::acceptor socket, const url& where, const limits& bounds)
-        : inside_(
-              std::make_shared<stream_acceptor<tcp>>(std::move(socket), bounds, [where, bounds](tcp::socket& accepted) {
-                  return identify(accepted, where, bounds);
-              })) {}
-    ~tcp_acceptor() override { inside_->close(); }
-
-    [[nodiscard]] url local() const override {
-        error_code ignored;
-        return url_of("tcp", inside_->socket().local_endpoint(ignored));
-    }
-    void start(std::function<void(link_ptr)> on_link) override { inside_->start(std::move(on_link)); }
-    void accept_waiting() override { inside_->accept_waiting(); }
-    void close() override { inside_->close(); }
-
-  private:
-    std::shared_ptr<stream_acceptor<tcp>> inside_;
-};
-
-/// Makes one connection to a host: looks up its name, if it has one, and tries its addresses.
-class tcp_call : public std::enable_shared_from_this<tcp_call> {
-  public:
-    tcp_call(const asio::any_io_executor& executor, url where, const limits& bounds, dial_callback done)
-        : executor_(executor), where_(std::move(where)), bounds_(bounds), done_(std::move(done)) {}
-
-    void start() {
-        if (const auto literal = literal_address(where_)) {
-            connect({*literal}, bounds_.connect);
-            return;
-        }
-        lookup_ = std::make_shared<host_lookup>(executor_);
-        lookup_->start(where_, bounds_.connect,
-                       [self = shared_from_this(), begun = std::chrono::steady_clock::now()](
-                           error_code code, const std::vector<asio::ip::address>& found) {
-                           if (code) {
-                               const auto done = std::move(self->done_);
-                               done(code, nullptr);
-                               return;
-                           }
-                           const auto spent = std::chrono::steady_clock::now() - begun;
-                           self->connect(found,
-                                         std::chrono::ceil<std::chrono::milliseconds>(self->bounds_.connect - spent));
-                       });
-    }
-
-    void give_up() {
-        if (lookup_) {
-            lookup_->give_up();
-        }
-        if (dialler_) {
-            dialler_->give_up();
-        }
-    }
-
-  private:
-    void connect(const std::vector<asio::ip::address>& addresses, std::chrono::milliseconds left) {
-        std::vector<tcp::endpoint> endpoints;
-        endpoints.reserve(addresses.size());
-        for (const auto& address : addresses) {
-            endpoints.emplace_back(address, where_.port);
-        }
-        dialler_ = std::make_shared<stream_dialler<tcp>>(
-            executor_, bounds_,
-            [where = where_, bounds = bounds_](tcp::socket& made) { return identify(made, where, bounds); },
-            std::move(done_));
-        dialler_->start(std::move(endpoints), left);
-    }
-
-    asio::any_io_executor executor_;
-    url where_;
-    limits bounds_;
-    dial_callback done_;
-    std::shared_ptr<host_lookup> lookup_;
-    std::shared_ptr<stream_dialler<tcp>> dialler_;
-};
 
 class tcp_transport final : public link_transport {
   public:
-    [[nodiscard]] bool is_exposed(const url& where) const override {
-        error_code code;
-        const auto address = resolve(where, code);
-        return !code && !address.is_loopback(); // without an address, listening fails anyway
-    }
+    [[nodiscard]] bool is_exposed(const url& where) const override { return is_beyond_loopback(where); }
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
-        error_code code;
-        const tcp::endpoint endpoint{resolve(where, code), where.port};
-        if (code) {
-            throw boost::system::system_error{code};
-        }
-        tcp::acceptor socket{executor};
+        const tcp::endpoint endpoint{resolve(where), where.port};
+        listening_socket socket{executor};
         socket.open(endpoint.protocol());
         socket.set_option(asio::socket_base::reuse_address{true});
         if (endpoint.address().is_v6()) {
@@ -162,14 +75,41 @@ class tcp_transport final : public link_transport {
         }
         socket.bind(endpoint);
         socket.listen();
-        return std::make_unique<tcp_acceptor>(std::move(socket), where, bounds);
+        auto local = url_of("tcp", ip_endpoint(socket.local_endpoint()));
+        return handle_of(std::make_shared<stream_acceptor>(
+            std::move(socket), std::move(local), bounds,
+            [where, bounds](stream_socket& accepted) { return identify(accepted, where, bounds); }));
     }
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
-        const auto call = std::make_shared<tcp_call>(executor, where, bounds, std::move(done));
-        call->start();
-        return [call] { call->give_up(); };
+        const auto dialler = std::make_shared<stream_dialler>(
+            executor, bounds, [where, bounds](stream_socket& made) { return identify(made, where, bounds); },
+            std::move(done));
+        const auto connect = [dialler, port = where.port](const std::vector<asio::ip::address>& found) {
+            std::vector<stream_address> endpoints;
+            for (const auto& address : found) {
+                endpoints.emplace_back(tcp::endpoint{address, port});
+            }
+            dialler->start(std::move(endpoints));
+        };
+        if (const auto literal = literal_address(where)) {
+            connect({*literal});
+            return [dialler] { dialler->give_up(); };
+        }
+        const auto lookup = std::make_shared<host_lookup>(executor);
+        lookup->start(where, bounds.connect,
+                      [dialler, connect](error_code code, const std::vector<asio::ip::address>& found) {
+                          if (code) {
+                              dialler->fail(code);
+                          } else {
+                              connect(found);
+                          }
+                      });
+        return [lookup, dialler] {
+            lookup->give_up();
+            dialler->give_up();
+        };
     }
 };
 

@@ -25,7 +25,25 @@ table& transports() {
     return instance;
 }
 
+class acceptor_handle final : public acceptor {
+  public:
+    explicit acceptor_handle(std::shared_ptr<acceptor> shared) : shared_(std::move(shared)) {}
+    ~acceptor_handle() override { shared_->close(); }
+
+    [[nodiscard]] url local() const override { return shared_->local(); }
+    void start(std::function<void(link_ptr)> on_link) override { shared_->start(std::move(on_link)); }
+    void accept_waiting() override { shared_->accept_waiting(); }
+    void close() override { shared_->close(); }
+
+  private:
+    std::shared_ptr<acceptor> shared_;
+};
+
 } // namespace
+
+std::unique_ptr<acceptor> transport::handle_of(std::shared_ptr<acceptor> shared) {
+    return std::make_unique<acceptor_handle>(std::move(shared));
+}
 
 link_transport* find_transport(std::string_view scheme) {
     const auto found = transports().find(scheme);

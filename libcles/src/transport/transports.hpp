@@ -21,6 +21,9 @@ std::unique_ptr<link_transport> make_udp();
 /// `inproc://name`: services of one process, each on an executor of its own or all on one.
 std::unique_ptr<link_transport> make_inproc();
 
+/// A handle of an acceptor that its links or pending operations share: destroying the handle closes the acceptor.
+std::unique_ptr<acceptor> handle_of(std::shared_ptr<acceptor> shared);
+
 /// Whether a service of this process listens at that name.
 bool is_open(const std::string& name);
 

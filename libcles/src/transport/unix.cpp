@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: BSL-1.0
-#include <cles/error.hpp>
-
 #include "transport/stream_endpoint.hpp"
 #include "transport/transports.hpp"
 
@@ -21,7 +19,7 @@ using boost::system::error_code;
 
 namespace {
 
-local_protocol::endpoint endpoint_of(const url& where) {
+stream_address address_of(const url& where) {
     auto path = where.path;
     if (path.starts_with('@')) {
         path.front() = '\0';
@@ -29,8 +27,12 @@ local_protocol::endpoint endpoint_of(const url& where) {
     return local_protocol::endpoint{path};
 }
 
-identity identify(local_protocol::socket& socket, const std::string& address) {
-    identity who{.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
+identity identify(const std::string& address) {
+    return {.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
+}
+
+identity identify_client(stream_socket& socket, const std::string& address) {
+    auto who = identify(address);
     ucred credentials{};
     socklen_t size = sizeof credentials;
     if (::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
@@ -41,52 +43,43 @@ identity identify(local_protocol::socket& socket, const std::string& address) {
 
 // Whether it is a socket file that a dead process has left behind. Connecting alone is not enough: a regular file
 // refuses too, and belongs to someone.
-bool is_stale(const std::string& path, const local_protocol::endpoint& endpoint) {
+bool is_stale(const std::string& path, const stream_address& endpoint) {
     struct stat what {};
     if (::lstat(path.c_str(), &what) != 0 || !S_ISSOCK(what.st_mode)) {
         return false;
     }
     asio::io_context unused;
-    local_protocol::socket probe{unused};
+    stream_socket probe{unused};
     error_code code;
     probe.connect(endpoint, code);
     return code == asio::error::connection_refused;
 }
 
-class unix_acceptor final : public acceptor {
+// Removes its socket file.
+class unix_acceptor final : public stream_acceptor {
   public:
-    unix_acceptor(local_protocol::acceptor socket, url where, const limits& bounds)
-        : where_(std::move(where)),
-          inside_(std::make_shared<stream_acceptor<local_protocol>>(
-              std::move(socket), bounds,
-              [address = to_string(where_)](local_protocol::socket& s) { return identify(s, address); })) {
+    unix_acceptor(listening_socket socket, const url& where, const limits& bounds)
+        : stream_acceptor(std::move(socket), where, bounds,
+                          [address = to_string(where)](stream_socket& s) { return identify_client(s, address); }) {
         struct stat made {};
-        if (!is_abstract() && ::stat(where_.path.c_str(), &made) == 0) {
+        if (!where.path.starts_with('@') && ::stat(where.path.c_str(), &made) == 0) {
             device_ = made.st_dev;
             inode_ = made.st_ino;
         }
     }
-    ~unix_acceptor() override { close(); }
 
-    [[nodiscard]] url local() const override { return where_; }
-    void start(std::function<void(link_ptr)> on_link) override { inside_->start(std::move(on_link)); }
-
-    void accept_waiting() override { inside_->accept_waiting(); }
     void close() override {
-        inside_->close();
+        stream_acceptor::close();
+        const auto path = local().path;
         struct stat now {};
         // Another process may have put its own socket there meanwhile.
-        if (inode_ != 0 && ::stat(where_.path.c_str(), &now) == 0 && now.st_dev == device_ && now.st_ino == inode_) {
-            ::unlink(where_.path.c_str());
+        if (inode_ != 0 && ::stat(path.c_str(), &now) == 0 && now.st_dev == device_ && now.st_ino == inode_) {
+            ::unlink(path.c_str());
         }
         inode_ = 0;
     }
 
   private:
-    [[nodiscard]] bool is_abstract() const noexcept { return where_.path.starts_with('@'); }
-
-    url where_;
-    std::shared_ptr<stream_acceptor<local_protocol>> inside_;
     dev_t device_ = 0;
     ino_t inode_ = 0;
 };
@@ -97,8 +90,8 @@ class unix_transport final : public link_transport {
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
-        const auto endpoint = endpoint_of(where);
-        local_protocol::acceptor socket{executor};
+        const auto endpoint = address_of(where);
+        listening_socket socket{executor};
         socket.open(endpoint.protocol());
         error_code code;
         bind_privately(socket, endpoint, code);
@@ -110,18 +103,15 @@ class unix_transport final : public link_transport {
             throw boost::system::system_error{code};
         }
         socket.listen();
-        return std::make_unique<unix_acceptor>(std::move(socket), where, bounds);
+        return handle_of(std::make_shared<unix_acceptor>(std::move(socket), where, bounds));
     }
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
-        auto dialler = std::make_shared<stream_dialler<local_protocol>>(
-            executor, bounds,
-            [address = to_string(where)](local_protocol::socket&) {
-                return identity{.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
-            },
+        const auto dialler = std::make_shared<stream_dialler>(
+            executor, bounds, [address = to_string(where)](stream_socket&) { return identify(address); },
             std::move(done));
-        dialler->start({endpoint_of(where)});
+        dialler->start({address_of(where)});
         return [weak = std::weak_ptr{dialler}] {
             if (const auto alive = weak.lock()) {
                 alive->give_up();
@@ -131,8 +121,7 @@ class unix_transport final : public link_transport {
 
   private:
     // The file must never have wider permissions, not even for a moment: fchmod before bind sets those that it gets.
-    static void bind_privately(local_protocol::acceptor& socket, const local_protocol::endpoint& endpoint,
-                               error_code& code) {
+    static void bind_privately(listening_socket& socket, const stream_address& endpoint, error_code& code) {
         ::fchmod(socket.native_handle(), S_IRUSR | S_IWUSR);
         socket.bind(endpoint, code);
     }

@@ -29,7 +29,7 @@ void job_record::open(std::shared_ptr<job_dispatcher> dispatcher) {
     stopped_.store(false, std::memory_order_relaxed);
     progress_unwanted_.store(false, std::memory_order_relaxed);
     has_on_stop_.store(false, std::memory_order_relaxed);
-    result_written_ = started = awaited_ = false;
+    result_written_ = started = false;
 }
 
 void job_record::assign(const cles::request& what, std::shared_ptr<const identity> peer,

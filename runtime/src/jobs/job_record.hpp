@@ -147,7 +147,6 @@ class job_record final : public job_queue::item, public detail::call_control {
 
     // -- the executor ----------------------------------------------------------------------------------------------
     std::optional<responder> requester_;
-    bool awaited_ = false; // neither answered nor stopped
     std::vector<progress_report> sent_reports_;
 };
 

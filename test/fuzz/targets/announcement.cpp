@@ -11,7 +11,6 @@
 #include "node/membership/membership.hpp"
 #include "node/membership/peer_table.hpp"
 #include "node/membership/reachable_endpoints.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/line.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"

@@ -12,8 +12,6 @@
 // Whatever comes: what goes out is a message of its size, nothing is answered that was not asked, no effect comes twice
 // within a minute, a repeat gets the same answer, what the node asks ends once and in time, and when all is quiet
 // nothing is kept.
-#include "protocol/datagram.hpp"
-
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
 
@@ -86,19 +84,21 @@ class asked final : public detail::pending {
 };
 
 /// A source of datagrams as the node sees it.
-class source final : public test::recording_line_sink, public core::subscriber, private core::idle_timer::keeper {
+class source final : public test::recording_line_sink, public core::subscriber, private core::link_monitor::owner {
   public:
     source(test::test_node& node, char name)
         : recording_line_sink(protocol::datagram_bytes),
           node_(node), peer_{.transport = "udp", .address = "udp://192.0.2.1:" + std::to_string(1000 + name)},
           session_(node.host, *this, *this, peer_),
           output_(*node.host, protocol::datagram_bytes, name == 'd' ? peer_.address : std::string{}, 28),
-          life_(*this, node.host->deadlines, node.clock.now()) {}
+          life_(*this, node.host->deadlines, node.host->bounds, node.clock.now()) {
+        life_.expect_datagrams();
+    }
 
     void receive(std::string_view datagram) {
-        life_.on_datagram(node_.clock.now());
+        life_.on_line(node_.clock.now());
         if (datagram.size() > protocol::datagram_bytes) {
-            session_.on_overlong(datagram.substr(0, protocol::datagram_bytes), node_.clock.now());
+            session_.on_overlong(datagram.substr(0, protocol::datagram_bytes));
         } else {
             session_.on_line(datagram, node_.clock.now());
         }
@@ -124,13 +124,15 @@ class source final : public test::recording_line_sink, public core::subscriber, 
 
   private:
     [[nodiscard]] bool is_idle() const override { return session_.is_idle(); }
-    void on_quiet() override { gone_ = true; }
+    void on_silence() override { gone_ = true; }
+    void on_probe() override {}
+    void evict() override {}
 
     test::test_node& node_;
     identity peer_;
     core::session session_;
     core::datagram_output output_;
-    core::idle_timer life_;
+    core::link_monitor life_;
     bool gone_ = false;
 };
 

@@ -14,8 +14,8 @@
 
 #include "fuzz/fuzz.hpp"
 #include "node/flush_scheduler.hpp"
-#include "node/publish/group_session.hpp"
-#include "protocol/datagram.hpp"
+#include "node/publish/multicast_group.hpp"
+#include "protocol/request_line.hpp"
 #include "support/hear.hpp"
 #include "support/manual_clock.hpp"
 
@@ -47,9 +47,30 @@ limits small_limits() {
     return bounds;
 }
 
-class output final : public core::group_output {
+class output final : public core::group_port {
   public:
-    bool send(std::string_view line) override {
+    void start(core::group_listener&) override {}
+    core::lines_done send(std::string_view lines) override {
+        core::lines_done all;
+        while (all.bytes < lines.size()) {
+            const auto size = lines.find('\n', all.bytes) + 1 - all.bytes;
+            require(size <= lines.size() - all.bytes, "it consists of whole lines", lines);
+            check(lines.substr(all.bytes, size));
+            all.bytes += size;
+            ++all.lines;
+        }
+        return all;
+    }
+    [[nodiscard]] std::size_t unsent() const noexcept override { return room ? 0 : 1; }
+    void close() override {}
+    [[nodiscard]] const core::group_source& source() const noexcept override { return self_; }
+
+    std::size_t updates = 0;
+    std::size_t binds = 0;
+    bool room = true;
+
+  private:
+    void check(std::string_view line) {
         require(line.ends_with('\n') && line.size() <= protocol::datagram_bytes, "a line fits its datagram", line);
         protocol::request_line request;
         protocol::malformed_request why;
@@ -62,13 +83,9 @@ class output final : public core::group_output {
             require(request.verb == verb::bind, "all else is a BIND", line);
             ++binds;
         }
-        return true;
     }
-    [[nodiscard]] bool has_room() const override { return room; }
 
-    std::size_t updates = 0;
-    std::size_t binds = 0;
-    bool room = true;
+    core::group_source self_{.address = 0x7f000001, .port = 0};
 };
 
 class listener final : public core::announcement_listener {
@@ -84,7 +101,7 @@ class listener final : public core::announcement_listener {
 class watched_group {
   public:
     watched_group() {
-        dispatcher_.set_listener(&presence_);
+        group_.set_listener(&presence_);
         for (const auto& [target, path] :
              {std::pair{"all", "speed"}, std::pair{"car2", "speed"}, std::pair{"all", "a/b"}}) {
             feeds_.push_back(std::make_unique<core::group_feed>(node_.bounds, node_.completions, target, path));
@@ -93,7 +110,7 @@ class watched_group {
     }
     ~watched_group() {
         for (const auto& feed : feeds_) {
-            dispatcher_.feeds().remove(*feed);
+            group_.feeds().remove(*feed);
         }
         session_.bindings().clear();
         require(node_.deadlines.size() == 0, "nothing is left behind");
@@ -127,7 +144,7 @@ class watched_group {
         const auto updates = out_.updates;
         const auto binds = out_.binds;
         const auto waiting = published_ - drained_;
-        cles::test::hear(session_, {.address = 0x7f000001, .port = source}, datagram, clock_.now());
+        cles::test::hear(session_, {.address = 0x7f000001, .port = source}, datagram);
         require(out_.updates <= updates + 1 + waiting, "a datagram has one update repeated at most", datagram);
         require(out_.binds == binds, "a datagram has nothing bound", datagram);
         require(source != 0 || out_.updates == updates, "a node does not hear itself", datagram);
@@ -162,9 +179,9 @@ class watched_group {
     }
     void toggle(std::size_t which) {
         if (open_[which]) {
-            dispatcher_.feeds().remove(*feeds_[which]);
+            group_.feeds().remove(*feeds_[which]);
         } else {
-            dispatcher_.feeds().add(*feeds_[which], clock_.now());
+            group_.feeds().add(*feeds_[which], clock_.now());
         }
         open_[which] = !open_[which];
     }
@@ -184,8 +201,8 @@ class watched_group {
     core::node_state& node_ = *shared_node_;
     output out_;
     listener presence_;
-    core::group_dispatcher dispatcher_{node_, out_, 1};
-    core::group_session session_{shared_node_, dispatcher_, {.address = 0x7f000001, .port = 0}, out_, 1};
+    core::multicast_group group_{shared_node_, 1};
+    core::group_session session_{shared_node_, group_, {std::shared_ptr<void>{}, &out_}, 1};
     std::vector<std::unique_ptr<core::group_feed>> feeds_;
     std::array<bool, 3> open_{};
     std::size_t published_ = 0;

@@ -5,7 +5,6 @@
 #include <cles/json_reader.hpp>
 
 #include "fuzz/fuzz.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/line.hpp"
 #include "protocol/request_line.hpp"
 

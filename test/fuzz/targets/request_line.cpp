@@ -3,7 +3,6 @@
 #include "protocol/request_line.hpp"
 
 #include "fuzz/fuzz.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/line.hpp"
 #include "protocol/reply_line.hpp"

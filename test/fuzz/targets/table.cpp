@@ -19,32 +19,23 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t most_peers = 4;
 
-class learner final : public core::table_reader {
-  public:
-    learner(core::membership& table, time_point now) : table_(table), now_(now) {}
-
-    void on_report(const core::peer_report& r) override {
-        ++entries;
+// Reads a table and applies it to `table`. Returns false if it is none.
+bool learn(core::membership& table, std::string_view text, std::size_t most, time_point now, core::peer_table& read) {
+    const bool good = core::read_table(text, most, core::usual_interval, read);
+    for (const auto& r : read.reports) {
         require(protocol::is_name(r.announced.node) && !protocol::is_reserved_target(r.announced.node),
                 "a node has a name");
         require(r.announced.endpoints.size() <= core::max_endpoints, "endpoints are bounded");
         require(r.age >= milliseconds{0} && r.age <= std::chrono::hours{24}, "an age is bounded");
         require(r.announced.interval >= core::min_interval && r.announced.interval <= core::max_interval,
                 "an interval is bounded");
-        table_.apply_gossip(r, core::observed_source::at("tcp://10.0.0.7:1"), now_, now_);
+        table.apply_gossip(r, core::observed_source::at("tcp://10.0.0.7:1"), now, now);
     }
-    void on_heartbeat(const core::peer_heartbeat& b) override {
-        ++entries;
-        table_.apply_gossip(b, now_, now_);
+    for (const auto& b : read.beats) {
+        table.apply_gossip(b, now, now);
     }
-    void on_bad_entry() override { ++entries; }
-
-    std::size_t entries = 0;
-
-  private:
-    core::membership& table_;
-    time_point now_;
-};
+    return good;
+}
 
 // Of another node that asks this one until there is no more.
 void check_told(const core::membership& table, time_point now) {
@@ -58,12 +49,11 @@ void check_told(const core::membership& table, time_point now) {
         write_delta(w, {"me", "00000001"}, table, {since, i % 2 == 0 ? "" : "00000002,00000003"}, 1200, now);
         require(text.size() <= 1200, "an answer fits a datagram", text);
         require(is_valid_json(text), "an answer is JSON", text);
-        learner to{other, now};
-        core::table_head head;
-        require(read_table(text, 64, to, head), "an answer can be read", text);
-        require(!head.next.empty(), "an answer says what to ask with next", text);
-        since = head.next;
-        if (!head.more) {
+        core::peer_table read;
+        require(learn(other, text, 64, now, read), "an answer can be read", text);
+        require(!read.next.empty(), "an answer says what to ask with next", text);
+        since = read.next;
+        if (!read.more) {
             break;
         }
     }
@@ -86,14 +76,13 @@ void run(std::string_view input) {
         input.remove_prefix(end == std::string_view::npos ? input.size() : end + 1);
         now += milliseconds{static_cast<int>(line.size()) * 3};
         deadlines.expire(now);
-        learner to{table, now};
-        core::table_head head;
-        read_table(line, 8, to, head);
-        require(to.entries <= 16, "only so many entries count", line);
+        core::peer_table read;
+        learn(table, line, 8, now, read);
+        require(read.reports.size() + read.beats.size() + read.bad_entries <= 16, "only so many entries count", line);
         require(table.size() <= most_peers, "the table is bounded", line);
         check_told(table, now);
         core::peer_report ignored;
-        read_description(line, ignored);
+        core::read_description(line, core::usual_interval, ignored);
     }
     now += std::chrono::hours{48};
     deadlines.expire(now);

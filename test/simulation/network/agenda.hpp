@@ -3,7 +3,7 @@
 
 #include <cles/limits.hpp>
 
-#include "port/clock.hpp"
+#include "port/environment.hpp"
 
 #include <algorithm>
 #include <cstdint>

@@ -3,7 +3,7 @@
 
 #include <cles/error.hpp>
 
-#include "protocol/datagram.hpp"
+#include "protocol/request_line.hpp"
 
 #include <utility>
 

@@ -17,7 +17,7 @@ namespace cles::simulation {
 
 class datagram_link;
 
-/// A socket for datagrams: one link for each source, as transport/udp_port.hpp has them.
+/// A socket for datagrams: one link for each source, as transport/udp.hpp has them.
 class datagram_port final : public std::enable_shared_from_this<datagram_port> {
   public:
     datagram_port(network& net, const std::shared_ptr<place>& home, endpoint local, bool strangers)

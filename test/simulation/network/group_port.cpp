@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/network/group_port.hpp"
 
-#include "protocol/datagram.hpp"
+#include "protocol/request_line.hpp"
 #include "simulation/workload/part.hpp"
 #include "simulation/world/node_run.hpp"
 

@@ -3,8 +3,8 @@
 
 #include <cles/error.hpp>
 
-#include "port/group_source.hpp"
-#include "protocol/datagram.hpp"
+#include "port/group_port.hpp"
+#include "protocol/request_line.hpp"
 #include "simulation/network/datagram_port.hpp"
 #include "simulation/network/group_port.hpp"
 #include "simulation/network/stream_half.hpp"

@@ -19,7 +19,6 @@ class link_follower final : public follower, private core::feed_host {
         : follower(node, std::move(what)), terms_(std::move(terms)),
           machine_(*this, node.node()->deadlines, node.node()->completions, node.bounds(), how().target, how().path,
                    how().thinned, how().label * 7919U) {}
-    ~link_follower() override { leave(); }
 
     void start() override {
         local().feeds().enter(machine_, shared_from_this(), terms_);
@@ -39,21 +38,13 @@ class link_follower final : public follower, private core::feed_host {
             hurry();
         }
     }
-    void close() override {
-        machine_.close(errc::cancelled);
-        leave();
-    }
+    void close() override { machine_.close(errc::cancelled); }
 
   private:
     [[nodiscard]] std::weak_ptr<link_follower> weak_self() {
         return std::static_pointer_cast<link_follower>(shared_from_this());
     }
     core::feed_mailbox& mail() override { return machine_.mail(); }
-    void leave() {
-        if (!std::exchange(left_, true)) {
-            local().feeds().leave(machine_);
-        }
-    }
     // What a planted fault does: no pause lasts longer than this.
     void hurry() {
         at().later(milliseconds{20}, [weak = weak_self()] {
@@ -82,7 +73,6 @@ class link_follower final : public follower, private core::feed_host {
     core::feed_terms terms_;
     core::feed_machine machine_;
     time_point last_bind_{};
-    bool left_ = false;
 };
 
 class group_follower final : public follower {
@@ -92,7 +82,7 @@ class group_follower final : public follower {
     ~group_follower() override { leave(); }
 
     void start() override {
-        local().group()->dispatcher().feeds().add(feed_, local().now());
+        local().group()->feeds().add(feed_, local().now());
         begin();
     }
     void close() override {
@@ -104,7 +94,7 @@ class group_follower final : public follower {
     core::feed_mailbox& mail() override { return feed_.mail(); }
     void leave() {
         if (!std::exchange(left_, true)) {
-            local().group()->dispatcher().feeds().remove(feed_);
+            local().group()->feeds().remove(feed_);
         }
     }
 

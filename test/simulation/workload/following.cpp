@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 #include "simulation/network/group_port.hpp"

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/announcement.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 #include "simulation/world/world.hpp"

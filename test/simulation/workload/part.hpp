@@ -2,7 +2,7 @@
 #pragma once
 
 #include "node/membership/membership.hpp"
-#include "port/group_source.hpp"
+#include "port/group_port.hpp"
 #include "simulation/world/plan.hpp"
 
 #include <memory>

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Has Python tests print why they leave something out: unittest alone prints how often. `scripts/test` puts this folder into
-PYTHONPATH, `.ci/skipped_tests.py` reads the lines."""
+"""Has Python tests print why they leave something out: unittest alone prints how often.
+`cles_add_python_test` puts this folder into PYTHONPATH, `.ci/skipped_tests.py` reads the lines."""
 
 import sys
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "json/characters.hpp"
+#include "json/json_scan.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -53,12 +53,12 @@ struct link final : core::flushable, core::subscriber, std::enable_shared_from_t
 struct host final : core::flush_host {
     void post_flush() override { ++posted; }
     [[nodiscard]] bool stopped() const override { return is_stopped; }
-    [[nodiscard]] core::node_state& node() noexcept override { return *inner.host; }
+    [[nodiscard]] core::node_state& node() noexcept { return *inner.host; }
     void drain_routing(cles::time_point) override { ++routed; }
     void check_shutdown() override { ++shutdown_checks; }
 
     test_node inner;
-    core::flush_scheduler flush_scheduler{*this, inner.clock};
+    core::flush_scheduler flush_scheduler{*this, *inner.host};
     int posted = 0;
     int routed = 0;
     int shutdown_checks = 0;
@@ -223,7 +223,7 @@ BOOST_AUTO_TEST_CASE(output_before_an_exception_is_written_in_the_turn) {
 BOOST_AUTO_TEST_CASE(nothing_is_written_in_the_call_during_a_handler_or_before_a_turn) {
     one->alone = true;
     {
-        const core::flush_scheduler::serving during{node.flush_scheduler};
+        const auto during = node.flush_scheduler.serving();
         node.flush_scheduler.run_user_call([&] { node.flush_scheduler.flush_soon(*one); });
     }
     BOOST_TEST(one->done.empty());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "port/group_source.hpp"
+#include "port/group_port.hpp"
 
 #include <boost/test/unit_test.hpp>
 

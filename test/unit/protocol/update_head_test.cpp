@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "protocol/update_head.hpp"
+#include "protocol/request_line.hpp"
 
 #include <boost/test/unit_test.hpp>
 

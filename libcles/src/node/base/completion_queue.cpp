@@ -36,14 +36,18 @@ void completion_queue::keep(std::exception_ptr thrown) {
     }
 }
 
-void completion_queue::fail(detail::pending_ptr operation, boost::system::error_code code, std::string_view why,
-                            completion::progress_function progress) {
-    completion::failure due{std::move(operation), code, std::string{why}, std::move(progress)};
+template <class Due>
+void completion_queue::complete(Due due) {
     if (due.operation->calls_user()) {
         put(completion{std::move(due)});
     } else {
         caller{}(due);
     }
+}
+
+void completion_queue::fail(detail::pending_ptr operation, boost::system::error_code code, std::string_view why,
+                            completion::progress_function progress) {
+    complete(completion::failure{std::move(operation), code, std::string{why}, std::move(progress)});
 }
 
 void completion_queue::refuse(detail::pending_ptr operation, const protocol::failure& why, std::string_view answer,
@@ -56,21 +60,11 @@ void completion_queue::refuse(detail::pending_ptr operation, const protocol::fai
 }
 
 void completion_queue::succeed(detail::pending_ptr operation, std::string_view json) {
-    completion::result due{std::move(operation), std::string{json}};
-    if (due.operation->calls_user()) {
-        put(completion{std::move(due)});
-    } else {
-        caller{}(due);
-    }
+    complete(completion::result{std::move(operation), std::string{json}});
 }
 
 void completion_queue::fail(pending_event_ptr operation, boost::system::error_code code, std::string_view why) {
-    completion::event_failure due{std::move(operation), code, std::string{why}};
-    if (due.operation->calls_user()) {
-        put(completion{std::move(due)});
-    } else {
-        caller{}(due);
-    }
+    complete(completion::event_failure{std::move(operation), code, std::string{why}});
 }
 
 void completion_queue::deliver(pending_event_ptr operation, const detail::raw_event& event) {

@@ -4,7 +4,6 @@
 #include <cles/feed_event.hpp>
 #include <cles/pending.hpp>
 
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -146,6 +145,8 @@ class completion_queue {
     }
 
   private:
+    template <class Due>
+    void complete(Due due);
     void keep(std::exception_ptr thrown);
 
     runner later_;

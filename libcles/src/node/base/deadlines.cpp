@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/base/deadlines.hpp"
 
+#include "port/environment.hpp"
+
 #include <utility>
 
 namespace cles::core {
@@ -90,6 +92,22 @@ void deadline_queue::expire(time_point now) {
         auto& d = *heap_.front();
         disarm(d);
         d.on_deadline(now);
+    }
+}
+
+void deadline_schedule::follow(time_point earliest) {
+    if (set_for_ <= earliest) {
+        return;
+    }
+    set_for_ = earliest;
+    suspend_detector_.expect(earliest, environment_.now());
+    environment_.set_timer(earliest);
+}
+
+deadline_schedule::expiry::~expiry() {
+    of_.set_for_ = time_point::max();
+    if (const auto next = deadlines_.next()) {
+        of_.follow(*next);
     }
 }
 

@@ -4,7 +4,9 @@
 #include <cles/error.hpp>
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
+#include <system_error>
 
 #include <arpa/inet.h>
 
@@ -27,17 +29,13 @@ bool is_link_local_v6(const ip_address& a) noexcept { return a.bytes[0] == 0xFE 
 
 // The prefix length after the slash; nothing if it is not a number in range.
 std::optional<unsigned> parse_bits(std::string_view text, unsigned most) noexcept {
-    if (text.empty() || text.size() > 3) {
+    if (text.size() > 3) {
         return {};
     }
     unsigned bits = 0;
-    for (const char c : text) {
-        if (c < '0' || c > '9') {
-            return {};
-        }
-        bits = bits * 10 + static_cast<unsigned>(c - '0');
-    }
-    return bits <= most ? std::optional{bits} : std::nullopt;
+    const auto* const end = text.data() + text.size();
+    const auto [rest, code] = std::from_chars(text.data(), end, bits);
+    return code == std::errc{} && rest == end && bits <= most ? std::optional{bits} : std::nullopt;
 }
 
 } // namespace

@@ -76,7 +76,7 @@ class memory_account {
     std::size_t used_ = 0;
 };
 
-/// Bytes that are held for its lifetime. Without an account, they are not counted.
+/// Bytes that are held for its lifetime. Without an account, they count against nothing.
 class memory_reservation {
   public:
     memory_reservation() = default;
@@ -105,12 +105,12 @@ class memory_reservation {
     }
     /// The same whether there is room or not, for memory that is in use already.
     void resize(std::size_t bytes) noexcept {
-        if (!whose_ || bytes == bytes_) {
+        if (bytes == bytes_) {
             return;
         }
-        if (bytes > bytes_) {
+        if (whose_ && bytes > bytes_) {
             whose_->grow(bytes - bytes_);
-        } else {
+        } else if (whose_) {
             whose_->shrink(bytes_ - bytes);
         }
         bytes_ = bytes;

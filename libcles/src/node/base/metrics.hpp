@@ -3,6 +3,8 @@
 
 #include <cles/verb.hpp>
 
+#include <boost/describe/class.hpp>
+
 #include <array>
 #include <bit>
 #include <chrono>
@@ -62,7 +64,7 @@ class latency_histogram {
     std::uint64_t count_ = 0;
 };
 
-/// What a service has counted since its start; shown by `PULL self:cles/metrics`.
+/// What a service has counted since its start; shown by `PULL self:cles/metrics` in the order of its description below.
 struct counters {
     std::array<std::uint64_t, verb_count> requests{}; ///< served, by verb
     std::uint64_t errors = 0;                         ///< answered with an error
@@ -84,10 +86,11 @@ struct counters {
     std::uint64_t announcements_received = 0; ///< from others, and accepted
     std::uint64_t announcements_dropped = 0;  ///< malformed or old
     std::uint64_t announcements_foreign = 0;  ///< from nodes of other pools
+    std::uint64_t peers_known = 0;            ///< filled in when they are shown
     std::uint64_t peers_refused = 0;          ///< announcements of nodes beyond the limit
-    std::uint64_t tables_requested = 0;       ///< requested from others, by gossip
+    std::uint64_t tables_asked = 0;           ///< requested from others, by gossip
     std::uint64_t tables_failed = 0;          ///< of these: refused, late, or malformed
-    std::uint64_t tables_sent = 0;            ///< sent to others
+    std::uint64_t tables_told = 0;            ///< sent to others
     std::uint64_t entries_dropped = 0;        ///< entries of tables that could not be parsed
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to unverified addresses, beyond their share
@@ -107,5 +110,14 @@ struct counters {
     std::uint64_t handlers_running = 0;
     std::uint64_t routed = 0; ///< of these, requests that wait for other nodes
 };
+BOOST_DESCRIBE_STRUCT(counters, (),
+                      (errors, errors_unsent, housekeeping, housekeeping_errors, handlers_running, routed,
+                       requests_repeated, requests_sent, requests_resent, replies_dropped, updates_published,
+                       nouns_retired, updates_delivered, updates_shed, updates_too_large, updates_received,
+                       updates_dropped, announcements_sent, announcements_received, announcements_dropped,
+                       announcements_foreign, peers_known, peers_refused, tables_asked, tables_failed, tables_told,
+                       entries_dropped, leases_expired, datagrams_withheld, group_received, group_dropped,
+                       group_repeated, group_sent, group_unsent, group_leases, links_open, links_accepted,
+                       links_refused, links_evicted, links_lost, bytes_received, bytes_sent))
 
 } // namespace cles::core

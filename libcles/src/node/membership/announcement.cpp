@@ -2,8 +2,8 @@
 #include "node/membership/announcement.hpp"
 
 #include "json/json_members.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/grammar.hpp"
+#include "protocol/request_line.hpp"
 
 #include <algorithm>
 #include <limits>
@@ -48,15 +48,6 @@ bool read_sources(json_reader& r, std::vector<group_source>& out) {
     });
 }
 
-bool read_count(json_reader& r, std::uint32_t& out) {
-    std::uint64_t wide = 0;
-    if (!r.read(wide)) {
-        return false;
-    }
-    out = static_cast<std::uint32_t>(std::min<std::uint64_t>(wide, std::numeric_limits<std::uint32_t>::max()));
-    return true;
-}
-
 bool read_load(json_reader& r, node_load& out) {
     out = {};
     return read_members(r, [&](std::string_view key) {
@@ -68,16 +59,6 @@ bool read_load(json_reader& r, node_load& out) {
     });
 }
 
-bool read_interval(json_reader& r, std::chrono::milliseconds& out) {
-    std::uint64_t ms = 0;
-    if (!r.read(ms)) {
-        return false;
-    }
-    const auto longest = static_cast<std::uint64_t>(max_interval.count());
-    out = std::max(min_interval, std::chrono::milliseconds{std::min(ms, longest)});
-    return true;
-}
-
 bool read_digest(json_reader& r, std::string& out) {
     if (!r.read(out)) {
         return false;
@@ -87,32 +68,50 @@ bool read_digest(json_reader& r, std::string& out) {
 
 } // namespace
 
+std::chrono::milliseconds interval_among(std::size_t others) noexcept {
+    return std::clamp(interval_per_node * static_cast<std::int64_t>(others + 1), usual_interval, max_interval);
+}
+
+bool read_epoch(json_reader& r, std::uint32_t& out) {
+    std::string_view text;
+    if (!r.read(text)) {
+        return false;
+    }
+    const auto epoch = protocol::parse_epoch(text);
+    out = epoch.value_or(0);
+    return epoch || r.fail("an epoch has 8 hex digits");
+}
+
+bool read_milliseconds(json_reader& r, std::chrono::milliseconds& out, std::chrono::milliseconds most) {
+    std::uint64_t ms = 0;
+    const bool good = r.read(ms);
+    out = std::chrono::milliseconds{std::min(ms, static_cast<std::uint64_t>(most.count()))};
+    return good;
+}
+
+bool read_count(json_reader& r, std::uint32_t& out) {
+    std::uint64_t wide = 0;
+    const bool good = r.read(wide);
+    out = static_cast<std::uint32_t>(std::min<std::uint64_t>(wide, std::numeric_limits<std::uint32_t>::max()));
+    return good;
+}
+
+bool read_interval(json_reader& r, std::chrono::milliseconds& out) {
+    const bool good = read_milliseconds(r, out, max_interval);
+    out = std::max(out, min_interval);
+    return good;
+}
+
 bool read_announcement_member(json_reader& r, std::string_view key, announcement& out) {
-    if (key == "node") {
-        return r.read(out.node);
-    }
-    if (key == "endpoints") {
-        return read_endpoints(r, out.endpoints);
-    }
-    if (key == "load") {
-        return read_load(r, out.load);
-    }
-    if (key == "interval_ms") {
-        return read_interval(r, out.interval);
-    }
-    if (key == "tasks") {
-        return read_digest(r, out.tasks);
-    }
-    if (key == "leaving") {
-        return r.read(out.leaving);
-    }
-    if (key == "pool") {
-        return r.read(out.pool);
-    }
-    if (key == "sources") {
-        return read_sources(r, out.sources);
-    }
-    return r.skip();
+    return key == "node"          ? r.read(out.node)
+           : key == "endpoints"   ? read_endpoints(r, out.endpoints)
+           : key == "load"        ? read_load(r, out.load)
+           : key == "interval_ms" ? read_interval(r, out.interval)
+           : key == "tasks"       ? read_digest(r, out.tasks)
+           : key == "leaving"     ? r.read(out.leaving)
+           : key == "pool"        ? r.read(out.pool)
+           : key == "sources"     ? read_sources(r, out.sources)
+                                  : r.skip();
 }
 
 namespace {
@@ -132,18 +131,11 @@ bool read_body(json_reader& r, announcement& out) {
 void append_body(std::string& out, const announcement& said, std::size_t endpoints) {
     json_writer w{out};
     w.begin_object();
-    w.plain_key("node");
-    w.value(std::string_view{said.node});
+    write_member(w, "node", said.node);
     if (!said.pool.empty()) {
-        w.plain_key("pool");
-        w.value(std::string_view{said.pool});
+        write_member(w, "pool", said.pool);
     }
-    w.plain_key("endpoints");
-    w.begin_array();
-    for (std::size_t i = 0; i < endpoints; ++i) {
-        w.value(std::string_view{said.endpoints[i]});
-    }
-    w.end_array();
+    write_endpoints_member(w, said.endpoints, endpoints);
     if (!said.sources.empty()) {
         w.plain_key("sources");
         w.begin_array();
@@ -152,34 +144,36 @@ void append_body(std::string& out, const announcement& said, std::size_t endpoin
         }
         w.end_array();
     }
-    w.plain_key("load");
-    write_load(w, said.load);
-    w.plain_key("interval_ms");
-    w.value(std::int64_t{said.interval.count()});
-    w.plain_key("tasks");
-    w.value(std::string_view{said.tasks});
+    write_load_member(w, said.load);
+    write_member(w, "interval_ms", said.interval.count());
+    write_member(w, "tasks", said.tasks);
     if (said.leaving) {
-        w.plain_key("leaving");
-        w.value(true);
+        write_member(w, "leaving", true);
     }
     w.end_object();
 }
 
 } // namespace
 
-void write_load(json_writer& w, const node_load& load) {
+void write_load_member(json_writer& w, const node_load& load) {
+    w.plain_key("load");
     w.begin_object();
-    w.plain_key("queued");
-    w.value(std::uint64_t{load.queued});
-    w.plain_key("running");
-    w.value(std::uint64_t{load.running});
-    w.plain_key("workers");
-    w.value(std::uint64_t{load.workers});
+    write_member(w, "queued", load.queued);
+    write_member(w, "running", load.running);
+    write_member(w, "workers", load.workers);
     if (load.service_us != 0) {
-        w.plain_key("service_us");
-        w.value(std::uint64_t{load.service_us});
+        write_member(w, "service_us", load.service_us);
     }
     w.end_object();
+}
+
+void write_endpoints_member(json_writer& w, const std::vector<std::string>& endpoints, std::size_t most) {
+    w.plain_key("endpoints");
+    w.begin_array();
+    for (std::size_t i = 0; i < std::min(most, endpoints.size()); ++i) {
+        w.value(std::string_view{endpoints[i]});
+    }
+    w.end_array();
 }
 
 bool read_announcement(const protocol::request_line& update, announcement& out, std::string& why) {

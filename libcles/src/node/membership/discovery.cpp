@@ -2,55 +2,123 @@
 #include "node/membership/discovery.hpp"
 
 #include <cles/error.hpp>
+#include <cles/json_reader.hpp>
 
 #include "node/local_node.hpp"
+#include "node/membership/gossip.hpp"
 #include "node/membership/name_conflict.hpp"
-#include "node/publish/multicast_group.hpp"
-#include "node/routing/peer_channel.hpp"
+#include "node/routing/peer_channels.hpp"
 #include "node/session/reserved_tasks.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace cles::core {
 
+// -- when to announce ----------------------------------------------------------------------------------------------
+
+void announcer::start(time_point now) {
+    started_ = true;
+    last_ = now - pause;
+    announce_by(now);
+}
+
+// All known nodes answer the same solicitation, so the delay grows with their number.
+void announcer::solicited(time_point now) {
+    const auto all = static_cast<std::int64_t>(owner_.others()) + 1;
+    const auto within = std::min<std::chrono::milliseconds>(answer_within, interval_per_node * all);
+    announce_by(now + jitter_.quarter_of(within * 4));
+}
+
+void announcer::stop() noexcept {
+    started_ = false;
+    deadlines_.disarm(*this);
+}
+
+// An announcement is always complete, so an earlier one also replaces a later one.
+void announcer::announce_by(time_point due) {
+    due = std::max(due, last_ + pause);
+    if (started_ && (!armed() || due < this->due())) {
+        deadlines_.arm(*this, due);
+    }
+}
+
+void announcer::on_deadline(time_point now) {
+    const auto interval = interval_among(owner_.others());
+    last_ = now;
+    deadlines_.arm(*this, now + interval - jitter_.quarter_of(interval));
+    owner_.announce(interval);
+}
+
+// -- replies -------------------------------------------------------------------------------------------------------
+
+peer_reply::verdict peer_reply::offer(std::string_view json) {
+    if (checks_json_ && !is_valid_json(json)) {
+        return verdict::malformed;
+    }
+    finish({.json = json});
+    return verdict::completed;
+}
+
+void peer_reply::finish(const peer_answer& found) {
+    const std::unique_ptr<peer_reply> self{this};
+    if (const auto host = host_.lock(); host && !host->stopped()) {
+        then_(*host, found);
+    }
+}
+
+// -- start and end -------------------------------------------------------------------------------------------------
+
 discovery::discovery(local_node& host, std::uint32_t seed)
-    : host_(host), announcer_(*this, host.deadlines(), seed), discovery_grace_(*this, host.deadlines()),
-      seed_(seed * 7 + 3) {
+    : host_(host), announcer_(*this, host.deadlines(), seed),
+      discovery_grace_(host.deadlines(), [&host] { host.on_discovery_grace_over(); }), seed_(seed * 7 + 3) {
     host.node().peers.watch(this);
-    host.node().peers.set_prober(this);
+    host.node().peers.set_prober(
+        [this](std::uint64_t ticket, std::string_view url) { probe(ticket, std::string{url}); });
 }
 
 discovery::~discovery() {
     host_.node().peers.watch(nullptr);
-    host_.node().peers.set_prober(nullptr);
+    host_.node().peers.set_prober({});
+    host_.node().gossip_responder = nullptr;
 }
 
 void discovery::join(multicast_group& through) {
     group_ = &through;
-    group_->dispatcher().set_listener(this);
+    group_->set_listener(this);
 }
 
 void discovery::gossip(const gossip_options& how) {
-    if (gossip_driver_) {
-        gossip_driver_->set_seeds(how.seeds);
-    } else if (how.part != nullptr) {
-        auto made = how.part->make(host_, seed_);
-        made->set_seeds(how.seeds);
-        gossip_driver_ = std::move(made);
-        start();
-    } else if (!how.seeds.empty()) {
-        throw error(errc::invalid_option, "gossip_options has seeds but no part: make it by cles::gossip({seeds})");
+    if (!gossip_ && how.part == nullptr) {
+        if (!how.seeds.empty()) {
+            throw error(errc::invalid_option, "gossip_options has seeds but no part: make it by cles::gossip({seeds})");
+        }
+        return;
     }
+    for (const auto& seed : how.seeds) {
+        const auto where = parse_url(seed);
+        if (!host_.environment().has_transport(where.scheme)) {
+            throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + seed + "'");
+        }
+    }
+    if (gossip_) {
+        gossip_->set_seeds(how.seeds, host_.now());
+        return;
+    }
+    gossip_ = how.part->make(host_, seed_);
+    gossip_->set_seeds(how.seeds, host_.now());
+    host_.node().gossip_responder = gossip_.get(); // from now on it answers the gossip requests of others
+    start();
 }
 
 void discovery::start() {
-    if (group_ == nullptr && !gossip_driver_) {
+    if (group_ == nullptr && !gossip_) {
         return;
     }
     if (!begun_) {
         discovery_grace_.expect();
     }
-    core::post(host_.environment(), [weak = host_.weak_from_this(), this] {
+    post(host_.environment(), [weak = host_.weak_from_this(), this] {
         if (const auto host = weak.lock(); host && !host->stopped()) {
             begin();
         }
@@ -68,9 +136,9 @@ void discovery::begin() {
             announcer_.start(now);
         }
     }
-    if (gossip_driver_) {
+    if (gossip_) {
         announcer_.expedite(now); // gossip sends this node's last announcement
-        gossip_driver_->start();
+        gossip_->start(now);
     }
 }
 
@@ -85,24 +153,25 @@ void discovery::leave() {
         return;
     }
     announcer_.stop();
-    if (gossip_driver_) {
-        gossip_driver_->leave();
+    if (gossip_) {
+        gossip_->leave(host_.now());
     }
     if (group_ != nullptr && seq_ != 0) {
-        announce(core::announcer::shortest, true);
+        announce(usual_interval, true);
     }
 }
 
 void discovery::stop() {
     host_.node().peers.watch(nullptr);
-    host_.node().peers.set_prober(nullptr);
+    host_.node().peers.set_prober({});
     leave();
     discovery_grace_.stop();
-    if (gossip_driver_) {
-        gossip_driver_->stop();
+    if (gossip_) {
+        gossip_->stop(host_.now());
+        host_.node().gossip_responder = nullptr;
     }
     if (group_ != nullptr) {
-        group_->dispatcher().set_listener(nullptr);
+        group_->set_listener(nullptr);
         group_ = nullptr;
     }
 }
@@ -120,14 +189,14 @@ void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
     std::string tasks;
     json_writer w{tasks};
     write_tasks(w, node);
-    core::announcement said{.node = node.name,
-                            .load = node.load_now(),
-                            .interval = interval,
-                            .tasks = core::digest_of_tasks(tasks),
-                            .leaving = leaving,
-                            .pool = node.peers.pool()};
+    announcement said{.node = node.name,
+                      .load = node.load_now(),
+                      .interval = interval,
+                      .tasks = digest_of_tasks(tasks),
+                      .leaving = leaving,
+                      .pool = node.peers.pool()};
     ++seq_;
-    if (gossip_driver_ && !leaving) {
+    if (gossip_ && !leaving) {
         said.endpoints = endpoints_for_gossip();
         node.peers.announce_self(said, seq_, host_.now());
     }
@@ -137,17 +206,19 @@ void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
 }
 
 // By each interface with the endpoints usable there, and with the same `seq`, since it is one announcement.
-void discovery::announce_to_group(core::announcement& said) {
+void discovery::announce_to_group(announcement& said) {
     auto& node = host_.node();
-    if (const auto& own = group_->dispatcher().own(); own.size() > 1) {
-        said.sources = own;
+    if (const auto& ports = group_->ports(); ports.size() > 1) {
+        for (const auto* port : ports) {
+            said.sources.push_back(port->source());
+        }
     }
     bool sent = false;
-    for (auto& place : group_->endpoints()) {
-        said.endpoints = endpoints_for_group(place.source().is_loopback());
+    for (auto* port : group_->ports()) {
+        said.endpoints = endpoints_for_group(port->source().is_loopback());
         std::string line;
         append_announcement(line, said, seq_, node.epoch);
-        sent = place.send(line) || sent;
+        sent = group_->send(*port, line) || sent;
     }
     node.counts.announcements_sent += sent ? 1 : 0;
 }
@@ -197,50 +268,50 @@ void discovery::on_solicitation(bool by_name, time_point now) {
 
 // -- announcements of other nodes ----------------------------------------------------------------------------------
 
-void discovery::on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) {
+void discovery::on_announcement(const group_source& from, const protocol::request_line& update, time_point now) {
     auto& counts = host_.node().counts;
-    core::announcement said;
+    announcement said;
     std::string why;
     if (!read_announcement(update, said, why)) {
         ++counts.announcements_dropped;
         host_.post_log(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
         return;
     }
-    if (!group_->dispatcher().is_of_this_host(from)) { // the loopback of another host
-        std::erase_if(said.sources, [](const core::group_source& each) { return each.is_loopback(); });
+    if (!group_->is_of_this_host(from)) { // the loopback of another host
+        std::erase_if(said.sources, [](const group_source& each) { return each.is_loopback(); });
     }
     switch (host_.node().peers.apply_announcement(said, *update.epoch, *update.seq, from, now)) {
-    case core::membership::verdict::taken: ++counts.announcements_received; break;
-    case core::membership::verdict::duplicate: ++counts.group_repeated; break;
-    case core::membership::verdict::old: ++counts.announcements_dropped; break;
-    case core::membership::verdict::refused: ++counts.peers_refused; break;
-    case core::membership::verdict::foreign:
+    case membership::verdict::taken: ++counts.announcements_received; break;
+    case membership::verdict::duplicate: ++counts.group_repeated; break;
+    case membership::verdict::old: ++counts.announcements_dropped; break;
+    case membership::verdict::refused: ++counts.peers_refused; break;
+    case membership::verdict::foreign:
         ++counts.announcements_foreign;
-        group_->dispatcher().ignore_until(from, now + said.interval * 15);
+        group_->ignore_until(from, now + said.interval * 15);
         break;
-    case core::membership::verdict::own:
-    case core::membership::verdict::unknown: break;
+    case membership::verdict::own:
+    case membership::verdict::unknown: break;
     }
 }
 
 // Called from inside a loop over all nodes, so log entries are posted.
-void discovery::on_peer(std::string_view node, core::membership::change what, std::string_view where) {
+void discovery::on_peer(std::string_view node, membership::change what, std::string_view where) {
     const std::string name{node};
     const auto place =
         where.empty() ? std::string{", at no address that can be used from here"} : ", at " + std::string{where};
     switch (what) {
-    case core::membership::change::appeared: host_.post_log(log_level::info, name + " is there" + place); break;
-    case core::membership::change::moved: host_.post_log(log_level::info, name + " is elsewhere now" + place); break;
-    case core::membership::change::silent: host_.post_log(log_level::debug, name + " is not heard any more"); break;
-    case core::membership::change::returned: host_.post_log(log_level::debug, name + " is heard again"); break;
-    case core::membership::change::left: host_.post_log(log_level::info, name + " has left"); break;
-    case core::membership::change::gone:
+    case membership::change::appeared: host_.post_log(log_level::info, name + " is there" + place); break;
+    case membership::change::moved: host_.post_log(log_level::info, name + " is elsewhere now" + place); break;
+    case membership::change::silent: host_.post_log(log_level::debug, name + " is not heard any more"); break;
+    case membership::change::returned: host_.post_log(log_level::debug, name + " is heard again"); break;
+    case membership::change::left: host_.post_log(log_level::info, name + " has left"); break;
+    case membership::change::gone:
         host_.post_log(log_level::info, name + " is gone");
-        if (gossip_driver_) {
-            gossip_driver_->on_gone(node, where, host_.now());
+        if (gossip_) {
+            gossip_->on_gone(node, where, host_.now());
         }
         break;
-    case core::membership::change::clash:
+    case membership::change::clash:
         host_.post_log(log_level::warning,
                        name == host_.node().name
                            ? "another node calls itself '" + name + "' too, on " + std::string{where}
@@ -249,7 +320,11 @@ void discovery::on_peer(std::string_view node, core::membership::change what, st
             host_.peer_channels().on_address_changed(name);
         }
         return;
-    case core::membership::change::taken: on_name_taken(std::string{where}); return;
+    case membership::change::taken:
+        host_.post_log(log_level::error, "the name '" + name + "' is taken: the node at " + std::string{where} +
+                                             " was there first, and is asked by it");
+        host_.on_name_taken(std::string{where});
+        return;
     }
     follow_incarnation(name);
     host_.peer_channels().on_address_changed(name);
@@ -269,31 +344,28 @@ void discovery::follow_incarnation(const std::string& name) {
     if (is_new || another) {
         host_.feeds().on_new_incarnation(name, another);
         if (group_ != nullptr) {
-            group_->dispatcher().feeds().on_new_incarnation(name, host_.now());
+            group_->feeds().on_new_incarnation(name, host_.now());
         }
     }
 }
 
-void discovery::on_name_taken(const std::string& where) {
-    host_.post_log(log_level::error, "the name '" + host_.node().name + "' is taken: the node at " + where +
-                                         " was there first, and is asked by it");
-    host_.on_name_taken(where);
-}
-
-void discovery::probe(std::uint64_t ticket, std::string_view url) {
-    auto reply = detail::pending_ptr{new probe_reply{host_.weak_from_this(), ticket, std::string{url}}};
+// The reply is used in a task of its own, because the link that delivered it must be done with it before it is released
+// and others are notified.
+void discovery::probe(std::uint64_t ticket, const std::string& url) {
+    const auto use_later = [ticket, url](local_node& host, const peer_answer& answer) {
+        auto found = answer.refused ? probe_outcome{}
+                     : answer.code  ? failed_probe(answer.code)
+                                    : read_probe_answer(answer.json);
+        post(host.environment(), [weak = host.weak_from_this(), ticket, url, found = std::move(found)] {
+            if (const auto alive = weak.lock(); alive && !alive->stopped()) {
+                alive->node().peers.on_probed(ticket, found, alive->now());
+                alive->peer_channels().release(url);
+            }
+        });
+    };
     host_.peer_channels().send("self", url, {.verb = verb::pull, .noun = "self:cles"},
-                               host_.now() + core::name_conflicts::probe_limit, std::move(reply), {});
-}
-
-void discovery::on_discovery_grace_over() { host_.on_discovery_grace_over(); }
-
-std::optional<std::string_view> discovery::address_of(std::string_view node) const noexcept {
-    return host_.node().peers.address_of(node);
-}
-
-std::optional<std::string_view> discovery::conflicting_endpoint_of(std::string_view node) const noexcept {
-    return host_.node().peers.conflicting_endpoint_of(node);
+                               host_.now() + name_conflicts::probe_limit,
+                               detail::pending_ptr{new peer_reply{host_.weak_from_this(), use_later, true}}, {});
 }
 
 bool discovery::expects_more_of(std::string_view node) const noexcept {
@@ -303,7 +375,7 @@ bool discovery::expects_more_of(std::string_view node) const noexcept {
 
 std::string discovery::unknown_reason() const {
     if (group_ == nullptr) {
-        return gossip_driver_ ? "no node that it asks knows of it; " : "";
+        return gossip_ ? "no node that it asks knows of it; " : "";
     }
     const bool others = host_.node().counts.announcements_foreign != 0;
     return "nobody of that name has announced itself on " + group_->interfaces() +

@@ -3,10 +3,12 @@
 
 #include <cles/gossip.hpp>
 #include <cles/limits.hpp>
+#include <cles/pending.hpp>
 
-#include "node/membership/announcer.hpp"
+#include "node/base/backoff.hpp"
+#include "node/base/deadlines.hpp"
 #include "node/membership/membership.hpp"
-#include "node/publish/group_dispatcher.hpp"
+#include "node/publish/multicast_group.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -17,52 +19,124 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
+
+class gossip;
 class local_node;
-} // namespace cles::core
 
-namespace cles::detail {
-
-/// The gossip of a service, as seen by the rest of the service.
-class gossip_service {
+/// The time after its start in which a node solicits announcements from its group: an unknown name may still be
+/// announced.
+class discovery_grace final : private deadline {
   public:
-    gossip_service() = default;
-    gossip_service(const gossip_service&) = delete;
-    gossip_service& operator=(const gossip_service&) = delete;
-    virtual ~gossip_service() = default;
+    static constexpr std::chrono::milliseconds length{300};
 
-    /// \throws cles::error if one of them is not a usable URL
-    virtual void set_seeds(const std::vector<std::string>& seeds) = 0;
-    virtual void start() = 0;
-    /// Announces that this node leaves, and keeps asking.
-    virtual void leave() = 0;
-    /// Leaves, and stops asking.
-    virtual void stop() = 0;
-    /// A node was removed without having left.
-    virtual void on_gone(std::string_view node, std::string_view where, time_point now) = 0;
+    discovery_grace(deadline_queue& deadlines, std::function<void()> on_over)
+        : deadlines_(deadlines), on_over_(std::move(on_over)) {}
+
+    /// The grace period will start; its time is not running yet.
+    void expect() noexcept { over_ = false; }
+    void begin(time_point now) {
+        over_ = false;
+        deadlines_.arm(*this, now + length);
+    }
+    void stop() noexcept {
+        over_ = true;
+        deadlines_.disarm(*this);
+    }
+    [[nodiscard]] bool over() const noexcept { return over_; }
+
+  private:
+    void on_deadline(time_point) override {
+        over_ = true;
+        on_over_();
+    }
+
+    deadline_queue& deadlines_;
+    std::function<void()> on_over_;
+    bool over_ = true;
 };
 
-/// Creates the gossip of a service, which from then on also answers the gossip requests of others.
-struct gossip_part {
-    std::unique_ptr<gossip_service> (*make)(core::local_node& host, std::uint32_t seed);
+/// Decides when a node announces itself to its group (docs/protocol.md, "Membership"): once per interval, a little
+/// sooner each time so that nodes do not announce in step; soon after a solicitation, but with a pause between any two.
+/// Changes wait for the next announcement, which keeps the load on receivers steady.
+class announcer final : private deadline {
+  public:
+    class sender {
+      public:
+        sender() = default;
+        sender(const sender&) = delete;
+        sender& operator=(const sender&) = delete;
+        /// Sends an announcement now; the next one follows within `interval`.
+        virtual void announce(std::chrono::milliseconds interval) = 0;
+        /// The number of other known nodes.
+        [[nodiscard]] virtual std::size_t others() const = 0;
+
+      protected:
+        ~sender() = default;
+    };
+
+    static constexpr std::chrono::milliseconds pause{100};         ///< between two announcements, at least
+    static constexpr std::chrono::milliseconds answer_within{250}; ///< after a solicitation
+
+    announcer(sender& owner, deadline_queue& deadlines, std::uint32_t seed) noexcept
+        : owner_(owner), deadlines_(deadlines), jitter_(seed) {}
+
+    /// Starts announcing; before this, no other call has an effect.
+    void start(time_point now);
+    /// This node alone was solicited: announces without delay.
+    void expedite(time_point now) { announce_by(now); }
+    /// All nodes were solicited: announces after a random delay.
+    void solicited(time_point now);
+    void stop() noexcept;
+
+  private:
+    void announce_by(time_point due);
+    void on_deadline(time_point now) override;
+
+    sender& owner_;
+    deadline_queue& deadlines_;
+    jitter jitter_;
+    time_point last_{};
+    bool started_ = false;
 };
 
-} // namespace cles::detail
+/// The outcome of a request to another node.
+struct peer_answer {
+    std::string_view json{}; ///< empty if it failed
+    boost::system::error_code code{};
+    bool refused = false; ///< by the node that was asked
+};
 
-namespace cles::core {
+/// An operation of the library that passes the outcome of its request on, unless the node has stopped.
+class peer_reply final : public detail::pending {
+  public:
+    using function = std::function<void(local_node& host, const peer_answer& found)>;
 
-class local_node;
+    /// `checks_json`: replies that are not JSON do not count.
+    peer_reply(std::weak_ptr<local_node> host, function then, bool checks_json = false)
+        : host_(std::move(host)), then_(std::move(then)), checks_json_(checks_json) {}
 
-class multicast_group;
+    verdict offer(std::string_view json) override;
+    void fail(boost::system::error_code code, std::string_view) override { finish({.code = code}); }
+    void refuse(boost::system::error_code code, std::string_view, std::string_view) override {
+        finish({.code = code, .refused = true});
+    }
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
+
+  private:
+    void finish(const peer_answer& found);
+
+    std::weak_ptr<local_node> host_;
+    function then_;
+    bool checks_json_;
+};
 
 /// Finds the other nodes and announces this one, in the multicast group and by gossip. Without either, it finds none.
-class discovery final : private core::announcement_listener,
-                        private core::membership::watcher,
-                        private core::membership::prober,
-                        private core::announcer::sender,
-                        private core::discovery_grace::listener {
+class discovery final : private announcement_listener, private membership::watcher, private announcer::sender {
   public:
     discovery(local_node& host, std::uint32_t seed);
     discovery(const discovery&) = delete;
@@ -80,10 +154,6 @@ class discovery final : private core::announcement_listener,
     /// Leaves, and stops.
     void stop();
 
-    /// See `membership::address_of`.
-    [[nodiscard]] std::optional<std::string_view> address_of(std::string_view node) const noexcept;
-    /// See `membership::conflicting_endpoint_of`.
-    [[nodiscard]] std::optional<std::string_view> conflicting_endpoint_of(std::string_view node) const noexcept;
     /// Solicits an announcement of that node.
     void solicit(std::string_view node);
     /// Whether an unknown name may still be announced at any moment.
@@ -91,7 +161,7 @@ class discovery final : private core::announcement_listener,
     /// Whether a node that is known, but at no usable address, may still be received by another of its interfaces.
     [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
     /// Receives the changes of `membership`; a test may intercept them.
-    [[nodiscard]] core::membership::watcher& membership_watcher() noexcept { return *this; }
+    [[nodiscard]] membership::watcher& membership_watcher() noexcept { return *this; }
     /// Why a name is unknown, as the start of a sentence; empty without a group and gossip.
     [[nodiscard]] std::string unknown_reason() const;
 
@@ -100,21 +170,19 @@ class discovery final : private core::announcement_listener,
     void announce(std::chrono::milliseconds interval) override;
     void announce(std::chrono::milliseconds interval, bool leaving);
     [[nodiscard]] std::size_t others() const override;
-    void on_discovery_grace_over() override;
     void on_solicitation(bool by_name, time_point now) override;
-    void on_announcement(const core::group_source& from, const protocol::request_line& update, time_point now) override;
-    void on_peer(std::string_view node, core::membership::change what, std::string_view where) override;
-    void probe(std::uint64_t ticket, std::string_view url) override;
+    void on_announcement(const group_source& from, const protocol::request_line& update, time_point now) override;
+    void on_peer(std::string_view node, membership::change what, std::string_view where) override;
+    void probe(std::uint64_t ticket, const std::string& url);
     void follow_incarnation(const std::string& name);
-    void on_name_taken(const std::string& where);
-    void announce_to_group(core::announcement& said);
+    void announce_to_group(announcement& said);
     [[nodiscard]] std::vector<std::string> endpoints_for_group(bool loopback) const;
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
     local_node& host_;
-    core::announcer announcer_;
-    core::discovery_grace discovery_grace_;
-    std::unique_ptr<detail::gossip_service> gossip_driver_; // null: it takes no part
+    announcer announcer_;
+    discovery_grace discovery_grace_;
+    std::unique_ptr<core::gossip> gossip_; // null: it takes no part
     std::uint32_t seed_;
     multicast_group* group_ = nullptr;
     std::map<std::string, std::uint32_t, std::less<>> incarnations_; // epoch by name

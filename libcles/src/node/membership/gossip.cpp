@@ -1,90 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/gossip.hpp"
 
-#include <cles/limits.hpp>
-
-#include "node/base/metrics.hpp"
-#include "node/membership/announcer.hpp"
-#include "node/membership/membership.hpp"
-#include "node/membership/peer_table.hpp"
-#include "node/membership/reachable_endpoints.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <cstdint>
-#include <string>
 #include <utility>
-#include <vector>
 
 namespace cles::core {
-
-/// Applies a table to `membership`, and collects what it lacks.
-class delta_applier final : public table_reader {
-  public:
-    /// `interval`: this node's own, for entries without one.
-    delta_applier(membership& into, counters& counts, std::chrono::milliseconds interval, observed_source by,
-                  time_point asked, time_point now)
-        : into_(into), counts_(counts), interval_(interval), by_(std::move(by)), asked_(asked), now_(now) {}
-
-    void on_report(const peer_report& report) override {
-        const bool was_known = into_.find_member(report.announced.node).has_value();
-        if (count(take(report)) == membership::verdict::taken && !was_known && !report.announced.leaving) {
-            newcomer_ = report.announced.node;
-        }
-    }
-    void on_heartbeat(const peer_heartbeat& beat) override {
-        const auto verdict = count(into_.apply_gossip(beat, asked_, now_));
-        if (verdict == membership::verdict::unknown && missing_.size() < protocol::max_described) {
-            missing_.push_back(beat.epoch);
-        }
-    }
-    void on_bad_entry() override { ++counts_.entries_dropped; }
-
-    /// The last node that was not known before; empty if all were known.
-    [[nodiscard]] const std::string& newcomer() const noexcept { return newcomer_; }
-    /// Unknown incarnations of which only heartbeats arrived.
-    [[nodiscard]] const std::vector<std::uint32_t>& missing() const noexcept { return missing_; }
-
-  private:
-    membership::verdict take(const peer_report& report) {
-        if (report.has_interval) {
-            return into_.apply_gossip(report, by_, asked_, now_);
-        }
-        auto whole = report;
-        whole.announced.interval = interval_;
-        return into_.apply_gossip(whole, by_, asked_, now_);
-    }
-    membership::verdict count(membership::verdict v) {
-        counts_.peers_refused += v == membership::verdict::refused ? 1 : 0;
-        return v;
-    }
-
-    membership& into_;
-    counters& counts_;
-    std::chrono::milliseconds interval_;
-    observed_source by_;
-    time_point asked_;
-    time_point now_;
-    std::string newcomer_;
-    std::vector<std::uint32_t> missing_;
-};
-
 namespace {
 
 using std::chrono::milliseconds;
 
 constexpr std::size_t max_bootstraps = 4;
-
-std::string list_of(const std::vector<std::uint32_t>& epochs) {
-    std::string text;
-    for (const auto epoch : epochs) {
-        text.append(text.empty() ? "" : ",").append(protocol::epoch_text(epoch));
-    }
-    return text;
-}
 
 bool can_be_asked(const membership::member& k) noexcept { return !k.suspect && !k.where.empty(); }
 
@@ -151,33 +78,34 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
         on_failure(ticket, now);
         return;
     }
-    delta_applier in{others_, counts_, interval(), observed_source::at(c->url), c->sent, now};
-    table_head head;
-    if (!read_table(json, others_.max_peers() * 2 + 2, in, head)) {
+    peer_table table;
+    const bool good = read_table(json, others_.max_peers() * 2 + 2, interval(), table);
+    auto found = apply(table, observed_source::at(c->url), c->sent, now);
+    if (!good) {
         on_failure(ticket, now);
         return;
     }
     c->failures = 0;
     c->ticket = 0;
-    if (head.node == self_.name && head.epoch == self_.epoch) {
+    if (table.node == self_.name && table.epoch == self_.epoch) {
         seeds_.on_self(c->url);
         end(*c, true, now);
-    } else if (head.pool != others_.pool() && !head.node.empty()) {
+    } else if (table.pool != others_.pool() && !table.node.empty()) {
         end(*c, true, now);
-    } else if (head.next.empty()) {
+    } else if (table.next.empty()) {
         c->since = "0";
         c->table_bytes = json.size();
         c->sent = now;
         c->ticket = ++last_ticket_;
         out_.ask_description(c->ticket, c->url);
     } else {
-        c->since = head.next;
-        seeds_.on_answer(c->url, head.node);
-        const bool another = !c->node.empty() && c->node != head.node;
-        c->describe = list_of(in.missing());
-        if (another || (c->as == part::bootstrap && !head.more)) {
+        c->since = table.next;
+        seeds_.on_answer(c->url, table.node);
+        const bool another = !c->node.empty() && c->node != table.node;
+        c->describe = std::move(found.missing);
+        if (another || (c->as == part::bootstrap && !table.more)) {
             end(*c, another, now);
-        } else if (head.more) {
+        } else if (table.more) {
             c->next = now;
         } else {
             postpone(*c, now);
@@ -193,7 +121,7 @@ void gossip::on_description(std::uint64_t ticket, std::string_view json, time_po
         return;
     }
     peer_report report;
-    if (now - c->sent > limit || !read_description(json, report)) {
+    if (now - c->sent > limit || !read_description(json, interval(), report)) {
         on_failure(ticket, now);
         return;
     }
@@ -202,8 +130,7 @@ void gossip::on_description(std::uint64_t ticket, std::string_view json, time_po
         seeds_.on_self(c->url);
         end(*c, true, now);
     } else {
-        delta_applier in{others_, counts_, interval(), observed_source::at(c->url), c->sent, now};
-        in.on_report(report);
+        apply(report, observed_source::at(c->url), c->sent, now);
         seeds_.on_answer(c->url, report.announced.node);
         if (c->as == part::bootstrap || (!c->node.empty() && c->node != report.announced.node)) {
             end(*c, c->as != part::bootstrap, now);
@@ -237,19 +164,46 @@ void gossip::on_failure(std::uint64_t ticket, time_point now) {
 
 void gossip::write_delta(json_writer& w, const table_question& asked, std::size_t longest, time_point now) {
     last_asked_ = now;
-    ++counts_.tables_sent;
+    ++counts_.tables_told;
     core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now);
 }
 
 bool gossip::on_pushed_table(std::string_view json, const observed_source& by, time_point now) {
-    delta_applier in{others_, counts_, interval(), by, now, now};
-    table_head head;
-    const bool good = read_table(json, max_pushed_entries, in, head);
-    if (started_ && !in.newcomer().empty() && !unknown_peer_) {
-        unknown_peer_ = in.newcomer();
+    peer_table table;
+    const bool good = read_table(json, max_pushed_entries, interval(), table);
+    auto found = apply(table, by, now, now);
+    if (started_ && !found.newcomer.empty() && !unknown_peer_) {
+        unknown_peer_ = std::move(found.newcomer);
         deadlines_.arm(*this, now);
     }
     return good;
+}
+
+gossip::learned gossip::apply(const peer_table& table, const observed_source& by, time_point asked, time_point now) {
+    learned found;
+    counts_.entries_dropped += table.bad_entries;
+    for (const auto& report : table.reports) {
+        const bool was_known = others_.find_member(report.announced.node).has_value();
+        const auto verdict = apply(report, by, asked, now);
+        if (verdict == membership::verdict::taken && !was_known && !report.announced.leaving) {
+            found.newcomer = report.announced.node;
+        }
+    }
+    std::size_t missing = 0;
+    for (const auto& beat : table.beats) {
+        if (others_.apply_gossip(beat, asked, now) == membership::verdict::unknown &&
+            missing++ < protocol::max_described) {
+            found.missing.append(found.missing.empty() ? "" : ",").append(protocol::epoch_text(beat.epoch));
+        }
+    }
+    return found;
+}
+
+membership::verdict gossip::apply(const peer_report& report, const observed_source& by, time_point asked,
+                                  time_point now) {
+    const auto verdict = others_.apply_gossip(report, by, asked, now);
+    counts_.peers_refused += verdict == membership::verdict::refused ? 1 : 0;
+    return verdict;
 }
 
 void gossip::on_gone(std::string_view node, std::string_view where, time_point now) { lost_.add(node, where, now); }
@@ -375,7 +329,7 @@ void gossip::call(contact& c, time_point now) {
     if (!c.own_entry_sent) {
         send_own_entry(c, now);
     }
-    ++counts_.tables_requested;
+    ++counts_.tables_asked;
     c.sent = now;
     c.ticket = ++last_ticket_;
     out_.ask(c.ticket, c.url, c.since, c.describe);
@@ -389,7 +343,7 @@ void gossip::send_own_entry(contact& c, time_point now) {
     c.own_entry_sent = true;
     std::string table;
     json_writer w{table};
-    write_own_entry(w, own->announced, self_.epoch, own->seq, std::chrono::ceil<milliseconds>(now - own->last_seen));
+    write_own_entry(w, *own, now);
     out_.push(c.url, table);
 }
 
@@ -444,7 +398,7 @@ void gossip::follow(time_point now) {
     deadlines_.arm(*this, std::max(due, now + milliseconds{1}));
 }
 
-milliseconds gossip::interval() const noexcept { return announcer::interval_among(others_.size()); }
+milliseconds gossip::interval() const noexcept { return interval_among(others_.size()); }
 
 // All nodes together try at most four times a second, however many they are, so as not to flood a node that is down.
 milliseconds gossip::search_pause() const noexcept {

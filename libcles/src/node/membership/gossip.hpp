@@ -6,7 +6,6 @@
 #include "node/base/backoff.hpp"
 #include "node/base/deadlines.hpp"
 #include "node/base/metrics.hpp"
-#include "node/membership/gossip_candidates.hpp"
 #include "node/membership/gossip_contacts.hpp"
 #include "node/membership/membership.hpp"
 #include "node/membership/peer_table.hpp"
@@ -15,6 +14,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -22,10 +22,14 @@
 
 namespace cles::core {
 
+class local_node;
+
 /// Decides which nodes are asked for their tables, and when (docs/protocol.md, "Gossip"): the successor by name, so
 /// that each node is asked by some node; two random nodes, so that changes spread fast; and from time to time a lost
 /// node.
-class gossip final : public peer_table_server, private deadline {
+///
+/// What the rest of the node calls is virtual, so that a program that does not take part in gossip does not link it.
+class gossip : private deadline {
   public:
     /// Sends the requests. The outcome of a ticket is reported to `on_answer`, `on_description` or `on_failure`, never
     /// from inside the call.
@@ -65,21 +69,26 @@ class gossip final : public peer_table_server, private deadline {
     gossip(self who, client& out, membership& others, counters& counts, deadline_queue& deadlines, std::size_t most,
            std::uint32_t seed);
 
-    void start(time_point now);
+    virtual ~gossip() = default;
+
+    virtual void start(time_point now);
     /// Sends its leave to the nodes it asks, if this node has announced itself. It keeps asking.
-    void leave(time_point now);
+    virtual void leave(time_point now);
     /// Leaves, and stops asking.
-    void stop(time_point now);
-    void set_seeds(const std::vector<std::string>& urls, time_point now);
+    virtual void stop(time_point now);
+    virtual void set_seeds(const std::vector<std::string>& urls, time_point now);
 
     void on_answer(std::uint64_t ticket, std::string_view json, time_point now);
     void on_description(std::uint64_t ticket, std::string_view json, time_point now);
     void on_failure(std::uint64_t ticket, time_point now);
 
-    void write_delta(json_writer& w, const table_question& asked, std::size_t longest, time_point now) override;
-    bool on_pushed_table(std::string_view json, const observed_source& by, time_point now) override;
+    /// Answers the gossip request of another node: writes what has changed, in at most `longest` bytes including the
+    /// head of the reply.
+    virtual void write_delta(json_writer& w, const table_question& asked, std::size_t longest, time_point now);
+    /// Reads entries that were sent without a request. Returns false if `json` is not a table.
+    virtual bool on_pushed_table(std::string_view json, const observed_source& by, time_point now);
     /// A node was removed without having left.
-    void on_gone(std::string_view node, std::string_view where, time_point now);
+    virtual void on_gone(std::string_view node, std::string_view where, time_point now);
 
     /// The nodes that are asked regularly, for inspection.
     [[nodiscard]] std::vector<std::string> asked() const;
@@ -87,6 +96,14 @@ class gossip final : public peer_table_server, private deadline {
   private:
     using contact = gossip_contact;
     using part = gossip_contact::part;
+
+    /// What a table has shown.
+    struct learned {
+        std::string newcomer; ///< the last node that was not known before; empty: none
+        std::string missing;  ///< unknown incarnations of which only heartbeats arrived: epochs, separated by commas
+    };
+    learned apply(const peer_table& table, const observed_source& by, time_point asked, time_point now);
+    membership::verdict apply(const peer_report& report, const observed_source& by, time_point asked, time_point now);
 
     void on_deadline(time_point now) override;
     void review(time_point now);
@@ -126,3 +143,12 @@ class gossip final : public peer_table_server, private deadline {
 };
 
 } // namespace cles::core
+
+namespace cles::detail {
+
+/// Creates the gossip of a service.
+struct gossip_part {
+    std::unique_ptr<core::gossip> (*make)(core::local_node& host, std::uint32_t seed);
+};
+
+} // namespace cles::detail

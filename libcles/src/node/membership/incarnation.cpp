@@ -7,6 +7,7 @@
 #include <utility>
 
 namespace cles::core {
+
 incarnation incarnation::first(const sighting& w, std::uint64_t& numbers) {
     incarnation r;
     r.epoch = w.epoch;
@@ -112,16 +113,6 @@ void tombstones::add(std::uint32_t epoch, entry ended, time_point now) {
                                         [](const auto& a, const auto& b) { return a.second.until < b.second.until; }));
     }
     entries_.insert_or_assign(epoch, std::move(ended));
-}
-
-bool tombstones::covers(std::string_view node, std::uint32_t epoch, std::uint64_t seq) const noexcept {
-    const auto found = entries_.find(epoch);
-    return found != entries_.end() && found->second.node == node && seq <= found->second.seq;
-}
-
-bool tombstones::covers(std::uint32_t epoch, std::uint64_t seq) const noexcept {
-    const auto found = entries_.find(epoch);
-    return found != entries_.end() && seq <= found->second.seq;
 }
 
 } // namespace cles::core

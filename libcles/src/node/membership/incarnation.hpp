@@ -5,9 +5,7 @@
 
 #include "node/membership/announcement.hpp"
 #include "node/membership/reachable_endpoints.hpp"
-#include "port/group_source.hpp"
-
-#include <boost/unordered/unordered_flat_map.hpp>
+#include "port/group_port.hpp"
 
 #include <algorithm>
 #include <cstddef>
@@ -39,9 +37,14 @@ class tombstones {
     /// The incarnation is alive after all.
     void forget(std::uint32_t epoch) { entries_.erase(epoch); }
     /// Whether that announcement was made before the end, or for lack of a `seq` may have been.
-    [[nodiscard]] bool covers(std::string_view node, std::uint32_t epoch, std::uint64_t seq) const noexcept;
+    [[nodiscard]] bool covers(std::string_view node, std::uint32_t epoch, std::uint64_t seq) const noexcept {
+        return covers(epoch, seq) && entries_.at(epoch).node == node;
+    }
     /// The same without the name of the node.
-    [[nodiscard]] bool covers(std::uint32_t epoch, std::uint64_t seq) const noexcept;
+    [[nodiscard]] bool covers(std::uint32_t epoch, std::uint64_t seq) const noexcept {
+        const auto found = entries_.find(epoch);
+        return found != entries_.end() && seq <= found->second.seq;
+    }
     [[nodiscard]] const std::unordered_map<std::uint32_t, entry>& all() const noexcept { return entries_; }
 
   private:
@@ -54,43 +57,24 @@ class tombstones {
 template <class T>
 class epoch_index {
   public:
-    void add(std::uint32_t epoch, T* what) {
-        if (!first_.emplace(epoch, what).second) {
-            further_.emplace_back(epoch, what);
-        }
-    }
+    void add(std::uint32_t epoch, T* what) { all_.emplace(epoch, what); }
     void remove(std::uint32_t epoch, T* what) {
-        const auto further = std::find(further_.begin(), further_.end(), std::pair{epoch, what});
-        if (further != further_.end()) {
-            further_.erase(further);
-            return;
-        }
-        const auto found = first_.find(epoch);
-        if (found == first_.end() || found->second != what) {
-            return;
-        }
-        const auto next =
-            std::find_if(further_.begin(), further_.end(), [epoch](const auto& f) { return f.first == epoch; });
-        if (next == further_.end()) {
-            first_.erase(found);
-        } else {
-            found->second = next->second;
-            further_.erase(next);
+        const auto [first, last] = all_.equal_range(epoch);
+        const auto found = std::find_if(first, last, [what](const auto& each) { return each.second == what; });
+        if (found != last) {
+            all_.erase(found);
         }
     }
     /// Null if there is none, or more than one.
     [[nodiscard]] T* find(std::uint32_t epoch) const noexcept {
-        const auto found = first_.find(epoch);
-        return found == first_.end() || is_shared(epoch) ? nullptr : found->second;
+        const auto found = all_.find(epoch);
+        return found == all_.end() || is_shared(epoch) ? nullptr : found->second;
     }
-    [[nodiscard]] bool contains(std::uint32_t epoch) const noexcept { return first_.contains(epoch); }
-    [[nodiscard]] bool is_shared(std::uint32_t epoch) const noexcept {
-        return std::any_of(further_.begin(), further_.end(), [epoch](const auto& f) { return f.first == epoch; });
-    }
+    [[nodiscard]] bool contains(std::uint32_t epoch) const noexcept { return all_.contains(epoch); }
+    [[nodiscard]] bool is_shared(std::uint32_t epoch) const noexcept { return all_.count(epoch) > 1; }
 
   private:
-    boost::unordered_flat_map<std::uint32_t, T*> first_;
-    std::vector<std::pair<std::uint32_t, T*>> further_;
+    std::unordered_multimap<std::uint32_t, T*> all_;
 };
 
 /// An announcement of an incarnation, as received. Borrows what it refers to.
@@ -152,6 +136,29 @@ struct incarnation {
 
   private:
     [[nodiscard]] bool is_better_endpoint_source(const sighting& w) const noexcept;
+};
+
+/// A change of one incarnation to report. Views and pointers are valid until the table changes.
+struct delta_entry {
+    enum class kind : std::uint8_t {
+        heartbeat,   ///< a new announcement; the rest is unchanged
+        description, ///< the full entry
+        leave,       ///< it has left; of another node, `announced` is null
+    };
+    kind what = kind::description;
+    std::string_view node;
+    const announcement* announced = nullptr;
+    const std::vector<std::string>* endpoints = nullptr; ///< as relayed to others
+    std::uint32_t epoch = 0;
+    std::uint64_t seq = 0;
+    time_point last_seen{};
+    peer_state state = peer_state::live;
+    std::uint64_t revision = 0; ///< the order of changes
+
+    static delta_entry of(kind what, std::string_view node, const incarnation& run, peer_state state) noexcept {
+        return {what,          node,  &run.announced, &run.relayed_endpoints, run.epoch, run.seq,
+                run.last_seen, state, run.revision};
+    }
 };
 
 } // namespace cles::core

@@ -3,7 +3,6 @@
 
 #include <cles/peer.hpp>
 
-#include "node/membership/announcer.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
@@ -216,7 +215,7 @@ membership::verdict membership::take_own_name_sighting(const sighting& w, time_p
     }
     const auto result = take_conflicting_sighting(own_name_conflict_, w, now);
     if (own_name_conflict_) {
-        conflicts_.check_own_name(*own_name_conflict_, now);
+        conflicts_.check_own_name(own_name_, *own_name_conflict_, now);
     }
     return result;
 }
@@ -259,34 +258,31 @@ void membership::on_probed(std::uint64_t ticket, const probe_outcome& found, tim
     if (!name) {
         return;
     }
-    if (*name == own_name_) {
-        if (own_name_conflict_ && own_name_conflict_->check.ticket == ticket) {
-            const auto next = conflicts_.on_own_name_probed(*own_name_conflict_, found, now);
-            const std::string where{own_name_conflict_->contender.where()};
-            if (next != action::none) {
-                confirm_conflict(*own_name_conflict_);
-            }
-            if (next == action::own_name_taken) {
-                notify(own_name_, change::taken, where);
-            }
-        }
+    const bool own = *name == own_name_;
+    const auto at = own ? peers_.end() : peers_.find(*name);
+    auto* const conflict = own ? own_name_conflict_.get() : at != peers_.end() ? at->second.second.get() : nullptr;
+    if (conflict == nullptr || conflict->check.ticket != ticket) {
         return;
     }
-    const auto at = peers_.find(*name);
-    if (at == peers_.end() || !at->second.second || at->second.second->check.ticket != ticket) {
-        return;
-    }
-    auto& e = at->second;
-    switch (conflicts_.on_probed(at->first, e.owner, e.since, *e.second, found, resumed_at_, now)) {
+    // For this node's own name, the start times alone decide, and a probe is not repeated.
+    const auto owner = own ? name_conflicts::known_owner{*name, own_epoch_, time_point::max(), time_point::min()}
+                           : name_conflicts::known_owner{*name, at->second.owner.epoch, at->second.since, resumed_at_};
+    switch (conflicts_.on_probed(owner, *conflict, found, now)) {
+    case action::none: break;
     case action::owner_gone:
-        if (suspect_at(e.second->contender) > now) {
+        if (suspect_at(conflict->contender) > now) {
             end(at, change::gone, now);
         }
         break;
-    case action::swap: swap_with_contender(at); break;
-    case action::conflict_confirmed: confirm_conflict(*e.second); break;
-    case action::none:
-    case action::own_name_taken: break;
+    case action::owner_stays: confirm_conflict(*conflict); break;
+    case action::contender_first:
+        if (own) {
+            const std::string where{conflict->contender.where()};
+            confirm_conflict(*conflict);
+            notify(own_name_, change::taken, where);
+        } else {
+            swap_with_contender(at);
+        }
     }
 }
 
@@ -371,10 +367,8 @@ void membership::end(entries::iterator at, change how, time_point now) {
 }
 
 void membership::succeed(entries::iterator at, incarnation next) {
+    drop_second(at);
     by_epoch_.remove(at->second.owner.epoch, &*at);
-    if (at->second.second) {
-        by_epoch_.remove(at->second.second->contender.epoch, &*at);
-    }
     by_epoch_.add(next.epoch, &*at);
     next.described_revision = next.revision = ++revision_;
     const auto since = next.last_seen;
@@ -406,7 +400,7 @@ void membership::remember(const std::string& node, const incarnation& over, bool
 // A node that has just started knows few others. The interval that it announces is then shorter than the time that
 // gossip takes to arrive here.
 std::chrono::milliseconds membership::interval_of(const announcement& said, const group_source& from) const {
-    return from == group_source{} ? std::max(said.interval, announcer::interval_among(peers_.size())) : said.interval;
+    return from == group_source{} ? std::max(said.interval, interval_among(peers_.size())) : said.interval;
 }
 
 bool membership::is_stale(const sighting& w, time_point now) const {
@@ -476,11 +470,6 @@ std::optional<std::string_view> membership::address_of(std::string_view node) co
     return at == peers_.end() ? std::nullopt : std::optional{at->second.owner.where()};
 }
 
-std::optional<group_source> membership::source_of(std::string_view node) const noexcept {
-    const auto* const run = announced(node);
-    return run != nullptr ? std::optional{run->from} : std::nullopt;
-}
-
 const incarnation* membership::announced(std::string_view node) const noexcept {
     const auto found = peers_.find(node);
     return found != peers_.end() && found->second.owner.from != group_source{} ? &found->second.owner : nullptr;
@@ -512,18 +501,13 @@ std::vector<delta_entry> membership::deltas_since(std::uint64_t revision, time_p
     std::vector<delta_entry> items;
     const auto add = [&](const std::string& node, const incarnation& r, peer_state state, bool in_full) {
         if (r.revision > revision) {
-            items.push_back({in_full || r.described_revision > revision ? kind::description : kind::heartbeat, node,
-                             &r.announced, &r.relayed_endpoints, r.epoch, r.seq, r.last_seen, state, r.revision});
+            const bool describes = in_full || r.described_revision > revision;
+            items.push_back(delta_entry::of(describes ? kind::description : kind::heartbeat, node, r, state));
         }
-    };
-    const auto add_leave = [&items](std::string_view node, std::uint32_t epoch, std::uint64_t seq, time_point at,
-                                    std::uint64_t of) {
-        items.push_back(
-            {.what = kind::leave, .node = node, .epoch = epoch, .seq = seq, .last_seen = at, .revision = of});
     };
     if (own_ && own_->announced.leaving) {
         if (own_->revision > revision) {
-            add_leave(own_name_, own_epoch_, own_->seq, own_->last_seen, own_->revision);
+            items.push_back(delta_entry::of(kind::leave, own_name_, *own_, peer_state::live));
         }
     } else if (own_) {
         add(own_name_, *own_, peer_state::live, by_epoch_.contains(own_epoch_));
@@ -533,15 +517,19 @@ std::vector<delta_entry> membership::deltas_since(std::uint64_t revision, time_p
         if (e.owner.revision <= revision && (!e.second || e.second->contender.revision <= revision)) {
             break;
         }
-        add(name, e.owner, e.suspect ? peer_state::suspect : peer_state::live,
-            e.owner.epoch == own_epoch_ || by_epoch_.is_shared(e.owner.epoch));
+        add(name, e.owner, e.state(), e.owner.epoch == own_epoch_ || by_epoch_.is_shared(e.owner.epoch));
         if (e.second) {
             add(name, e.second->contender, peer_state::clash, true);
         }
     }
     for (const auto& [epoch, ended] : ended_.all()) {
         if (ended.graceful && ended.revision > revision && ended.until > now) {
-            add_leave(ended.node, epoch, ended.seq, ended.at, ended.revision);
+            items.push_back({.what = kind::leave,
+                             .node = ended.node,
+                             .epoch = epoch,
+                             .seq = ended.seq,
+                             .last_seen = ended.at,
+                             .revision = ended.revision});
         }
     }
     std::sort(items.begin(), items.end(), [](const auto& a, const auto& b) { return a.revision < b.revision; });
@@ -554,44 +542,29 @@ std::optional<delta_entry> membership::description_of(std::uint32_t epoch) const
         return {};
     }
     const auto& [name, e] = *found;
-    return delta_entry{delta_entry::kind::description,
-                       name,
-                       &e.owner.announced,
-                       &e.owner.relayed_endpoints,
-                       epoch,
-                       e.owner.seq,
-                       e.owner.last_seen,
-                       e.suspect ? peer_state::suspect : peer_state::live,
-                       e.owner.revision};
+    return delta_entry::of(delta_entry::kind::description, name, e.owner, e.state());
 }
 
 std::vector<peer> membership::list(time_point now) const {
+    const auto peer_of = [&](const incarnation& r, peer_state state) -> peer {
+        return {.node = r.announced.node,
+                .endpoints = r.endpoints,
+                .epoch = protocol::epoch_text(r.epoch),
+                .age = std::chrono::duration_cast<std::chrono::milliseconds>(now - r.last_seen),
+                .state = state,
+                .load = r.announced.load,
+                .tasks = r.announced.tasks};
+    };
     std::vector<peer> all;
-    const auto add = [&](const incarnation& r, peer_state state) {
-        all.push_back({.node = r.announced.node,
-                       .endpoints = r.endpoints,
-                       .epoch = protocol::epoch_text(r.epoch),
-                       .age = std::chrono::duration_cast<std::chrono::milliseconds>(now - r.last_seen),
-                       .state = state,
-                       .load = r.announced.load,
-                       .tasks = r.announced.tasks});
-    };
-    const auto add_conflict = [&](const std::unique_ptr<name_conflict>& second) {
-        if (second && second->is_reported) {
-            add(second->contender, peer_state::clash);
-        }
-    };
-    bool own_name_due = true;
     for (const auto& [name, e] : peers_) {
-        if (own_name_due && own_name_ < name) {
-            own_name_due = false;
-            add_conflict(own_name_conflict_);
+        all.push_back(peer_of(e.owner, e.state()));
+        if (e.second && e.second->is_reported) {
+            all.push_back(peer_of(e.second->contender, peer_state::clash));
         }
-        add(e.owner, e.suspect ? peer_state::suspect : peer_state::live);
-        add_conflict(e.second);
     }
-    if (own_name_due) {
-        add_conflict(own_name_conflict_);
+    if (own_name_conflict_ && own_name_conflict_->is_reported) {
+        const auto next = std::find_if(all.begin(), all.end(), [&](const peer& p) { return own_name_ < p.node; });
+        all.insert(next, peer_of(own_name_conflict_->contender, peer_state::clash));
     }
     return all;
 }

@@ -7,8 +7,7 @@
 #include "node/membership/announcement.hpp"
 #include "node/membership/incarnation.hpp"
 #include "node/membership/name_conflict.hpp"
-#include "node/membership/reachable_endpoints.hpp"
-#include "port/group_source.hpp"
+#include "port/group_port.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -81,12 +80,12 @@ class membership final : private deadline {
     };
 
     membership(std::string own_name, std::uint32_t own_epoch, deadline_queue& deadlines, std::size_t most)
-        : own_name_(std::move(own_name)), own_epoch_(own_epoch), deadlines_(deadlines), max_peers_(most),
-          conflicts_(own_name_, own_epoch), ended_(most) {}
+        : own_name_(std::move(own_name)), own_epoch_(own_epoch), deadlines_(deadlines), max_peers_(most), ended_(most) {
+    }
     void watch(watcher* who) noexcept { watcher_ = who; }
     /// Calls `on_seen` after each accepted sighting of a node and after each of its changes, including its removal.
     void observe(std::function<void(std::string_view node)> on_seen) noexcept { on_seen_ = std::move(on_seen); }
-    void set_prober(prober* who) noexcept { conflicts_.set_prober(who); }
+    void set_prober(prober by) noexcept { conflicts_.set_prober(std::move(by)); }
     /// This node has started and belongs to `pool`. Sightings by or of nodes of other pools are ignored.
     void begin(std::string_view pool, time_point now) {
         own_pool_ = pool;
@@ -123,8 +122,6 @@ class membership final : private deadline {
     /// All nodes by name; the contender of a name conflict follows the owner.
     [[nodiscard]] std::vector<peer> list(time_point now) const;
 
-    /// The group source of the node; nothing if it was not received in the group.
-    [[nodiscard]] std::optional<group_source> source_of(std::string_view node) const noexcept;
     /// The owner of the name; null if it was not received in the group. Valid until the next change.
     [[nodiscard]] const incarnation* announced(std::string_view node) const noexcept;
     /// Nothing if the node is unknown.
@@ -158,6 +155,8 @@ class membership final : private deadline {
         std::unique_ptr<name_conflict> second;
         std::list<named_entry*>::iterator in_revision_order{};
         time_point since{}; // when the owner became known
+
+        [[nodiscard]] peer_state state() const noexcept { return suspect ? peer_state::suspect : peer_state::live; }
     };
     using entries = std::map<std::string, entry, std::less<>>;
 

@@ -2,14 +2,15 @@
 #pragma once
 
 #include <cles/limits.hpp>
-#include <cles/pending.hpp>
 
 #include "node/membership/incarnation.hpp"
 
+#include <boost/system/error_code.hpp>
+
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -32,6 +33,8 @@ struct probe_outcome {
 
 /// Reads the reply to `PULL self:cles`; if it cannot be read, the outcome is unclear.
 probe_outcome read_probe_answer(std::string_view json);
+/// The outcome of a probe that failed without a reply.
+probe_outcome failed_probe(boost::system::error_code code);
 
 /// The progress in finding out which of two incarnations of one name is alive.
 struct name_check {
@@ -58,16 +61,8 @@ class name_conflicts {
   public:
     /// Asks an incarnation whether it is alive, by `PULL self:cles` at `url` within `probe_limit`. The outcome is
     /// reported to `membership::on_probed`, never from inside the call.
-    class prober {
-      public:
-        prober() = default;
-        prober(const prober&) = delete;
-        prober& operator=(const prober&) = delete;
-        virtual void probe(std::uint64_t ticket, std::string_view url) = 0;
+    using prober = std::function<void(std::uint64_t ticket, std::string_view url)>;
 
-      protected:
-        ~prober() = default;
-    };
     static constexpr std::chrono::milliseconds probe_limit{500};
     /// Of two nodes that start within it, neither was first.
     static constexpr std::chrono::milliseconds same_start_tolerance{1'000};
@@ -77,68 +72,42 @@ class name_conflicts {
     /// What follows from the outcome of a probe.
     enum class action : std::uint8_t {
         none,
-        owner_gone,         ///< the name passes to the contender
-        swap,               ///< both are live, and the contender was first: it becomes the owner
-        conflict_confirmed, ///< both are live, and the owner keeps the name
-        own_name_taken,     ///< the same for this node's own name, but the contender was first
+        owner_gone,      ///< the name passes to the contender
+        owner_stays,     ///< both are live, and the owner keeps the name
+        contender_first, ///< both are live, and the name belongs to the contender
     };
 
-    name_conflicts(std::string own_name, std::uint32_t own_epoch)
-        : own_name_(std::move(own_name)), own_epoch_(own_epoch) {}
+    /// The owner of a name, as it is known here.
+    struct known_owner {
+        const std::string& name;
+        std::uint32_t epoch;
+        time_point since;      ///< when it became known
+        time_point resumed_at; ///< when this node was last suspended
+    };
 
-    void set_prober(prober* who) noexcept { prober_ = who; }
+    void set_prober(prober by) noexcept { prober_ = std::move(by); }
     /// This node has started.
     void begin(time_point now) noexcept { started_at_ = now; }
 
     /// The contender of `name` was received: probes the owner, once.
     void check_owner(const std::string& name, const incarnation& owner, name_conflict& conflict, time_point now);
-    /// The contender of this node's own name was received: probes it, once.
-    void check_own_name(name_conflict& conflict, time_point now);
+    /// The contender of this node's own name was received: probes it, once. The owner is live.
+    void check_own_name(const std::string& name, name_conflict& conflict, time_point now);
     /// The name for which that probe was sent, once; nothing if the ticket is unknown.
     std::optional<std::string> take_probe(std::uint64_t ticket);
-    /// The outcome of the last probe for `conflict`. `since`: when the owner became known here; `resumed_at`: when this
-    /// node was last suspended.
-    action on_probed(const std::string& name, const incarnation& owner, time_point since, name_conflict& conflict,
-                     const probe_outcome& found, time_point resumed_at, time_point now);
-    /// The same for the conflict about this node's own name.
-    [[nodiscard]] action on_own_name_probed(name_conflict& conflict, const probe_outcome& found, time_point now) const;
+    /// The outcome of the last probe for `conflict`.
+    action on_probed(const known_owner& owner, name_conflict& conflict, const probe_outcome& found, time_point now);
 
   private:
-    [[nodiscard]] bool may_probe(time_point now) noexcept;
-    void probe(name_check& check, name_check::stage stage, const std::string& name, std::string_view where,
+    /// Probes, unless there are too many probes or the incarnation has no usable address.
+    void probe(name_check& check, name_check::stage stage, const std::string& name, const incarnation& asked,
                time_point now);
-    action on_owner_probed(const std::string& name, const incarnation& owner, name_conflict& conflict,
-                           const probe_outcome& found, time_point now);
 
-    const std::string own_name_;
-    const std::uint32_t own_epoch_;
-    prober* prober_ = nullptr;
+    prober prober_;
     std::map<std::uint64_t, std::string> probes_; // in progress: the name by ticket
     std::uint64_t last_probe_ = 0;
     time_point probe_debt_{};
     time_point started_at_{};
-};
-
-class local_node;
-
-/// Receives the reply to a probe, or its failure.
-class probe_reply final : public detail::pending {
-  public:
-    probe_reply(std::weak_ptr<local_node> host, std::uint64_t ticket, std::string url)
-        : host_(std::move(host)), ticket_(ticket), url_(std::move(url)) {}
-
-    verdict offer(std::string_view json) override;
-    void fail(boost::system::error_code code, std::string_view message) override;
-    void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override;
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return false; }
-
-  private:
-    void report(core::probe_outcome found) const;
-
-    std::weak_ptr<local_node> host_;
-    std::uint64_t ticket_;
-    std::string url_;
 };
 
 } // namespace cles::core

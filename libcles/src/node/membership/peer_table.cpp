@@ -2,18 +2,13 @@
 #include "node/membership/peer_table.hpp"
 
 #include "json/json_members.hpp"
-#include "node/membership/announcement.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/grammar.hpp"
-#include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <limits>
+#include <cstdint>
 #include <optional>
-#include <string_view>
-#include <vector>
+#include <utility>
 
 namespace cles::core {
 namespace {
@@ -28,65 +23,32 @@ std::int64_t age_of(time_point last_seen, time_point now) {
     return std::max<std::int64_t>(0, std::chrono::ceil<milliseconds>(now - last_seen).count());
 }
 
-void write_endpoints(json_writer& w, const std::vector<std::string>& endpoints, std::size_t count) {
-    w.plain_key("endpoints");
-    w.begin_array();
-    for (std::size_t i = 0; i < std::min(count, endpoints.size()); ++i) {
-        w.value(std::string_view{endpoints[i]});
-    }
-    w.end_array();
-}
-
-struct entry_text {
-    std::string_view node;
-    std::string_view epoch;
-    std::uint64_t seq;
-    std::int64_t age;
-    std::string_view state;
-    const announcement* announced; // null: another node that has left, of which only the name is reported
-    const std::vector<std::string>* endpoints;
-};
-
-void write_entry(json_writer& w, const entry_text& e, std::size_t endpoints) {
+// Another node that has left is only named.
+void write_entry(json_writer& w, const delta_entry& item, time_point now, std::size_t endpoints) {
+    const auto* const said = item.what == delta_entry::kind::leave ? nullptr : item.announced;
+    const bool left = said == nullptr || said->leaving;
     w.begin_object();
-    w.plain_key("node");
-    w.value(e.node);
-    if (e.announced != nullptr && !e.announced->pool.empty()) {
-        w.plain_key("pool");
-        w.value(std::string_view{e.announced->pool});
+    write_member(w, "node", item.node);
+    if (said != nullptr) {
+        if (!said->pool.empty()) {
+            write_member(w, "pool", said->pool);
+        }
+        write_endpoints_member(w, *item.endpoints, endpoints);
     }
-    if (e.announced != nullptr) {
-        write_endpoints(w, *e.endpoints, endpoints);
+    write_member(w, "epoch", protocol::epoch_text(item.epoch));
+    if (item.seq != 0) {
+        write_member(w, "seq", item.seq);
     }
-    w.plain_key("epoch");
-    w.value(e.epoch);
-    if (e.seq != 0) {
-        w.plain_key("seq");
-        w.value(e.seq);
+    write_member(w, "age_ms", age_of(item.last_seen, now));
+    if (said != nullptr) {
+        write_member(w, "interval_ms", said->interval.count());
     }
-    w.plain_key("age_ms");
-    w.value(e.age);
-    if (e.announced != nullptr) {
-        w.plain_key("interval_ms");
-        w.value(std::int64_t{e.announced->interval.count()});
-    }
-    w.plain_key("state");
-    w.value(e.state);
-    if (e.announced != nullptr) {
-        w.plain_key("load");
-        write_load(w, e.announced->load);
-        w.plain_key("tasks");
-        w.value(std::string_view{e.announced->tasks});
+    write_member(w, "state", left ? "left" : to_string(item.state));
+    if (said != nullptr) {
+        write_load_member(w, said->load);
+        write_member(w, "tasks", said->tasks);
     }
     w.end_object();
-}
-
-void write_entry(json_writer& w, const delta_entry& item, time_point now, std::size_t endpoints) {
-    const bool left = item.what == delta_entry::kind::leave;
-    write_entry(w,
-                {item.node, protocol::epoch_text(item.epoch), item.seq, age_of(item.last_seen, now),
-                 left ? "left" : to_string(item.state), item.announced, item.endpoints},
-                endpoints);
 }
 
 void write_heartbeat(json_writer& w, const delta_entry& item, time_point now) {
@@ -164,69 +126,35 @@ page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::s
     return p;
 }
 
-bool read_age(json_reader& r, milliseconds& out) {
-    std::uint64_t ms = 0;
-    if (!r.read(ms)) {
-        return false;
-    }
-    out = milliseconds{std::min<std::uint64_t>(ms, static_cast<std::uint64_t>(max_age.count()))};
-    return true;
-}
-
-bool read_epoch(json_reader& r, std::uint32_t& out) {
-    std::string_view text;
-    if (!r.read(text)) {
-        return false;
-    }
-    const auto epoch = protocol::parse_epoch(text);
-    if (!epoch) {
-        return r.fail("an epoch has 8 hex digits");
-    }
-    out = *epoch;
-    return true;
-}
-
-bool read_state(json_reader& r, bool& left) {
-    std::string_view state;
-    if (!r.read(state)) {
-        return false;
-    }
-    left = state == "left";
-    return true;
+bool is_of_a_node(const peer_report& report) noexcept {
+    return protocol::is_name(report.announced.node) && !protocol::is_reserved_target(report.announced.node);
 }
 
 bool read_entry(std::string_view json, peer_report& out) {
-    out = {};
     bool has_epoch = false;
     json_reader r{json, table_depth};
     const bool good = read_members(r, [&](std::string_view key) {
         if (key == "epoch") {
             return has_epoch = read_epoch(r, out.epoch);
         }
-        if (key == "seq") {
-            return r.read(out.seq);
-        }
-        if (key == "age_ms") {
-            return read_age(r, out.age);
-        }
         if (key == "state") {
-            return read_state(r, out.announced.leaving);
+            std::string_view state;
+            const bool is_text = r.read(state);
+            out.announced.leaving = state == "left";
+            return is_text;
         }
-        if (key == "leaving") {
-            return r.skip();
-        }
-        out.has_interval |= key == "interval_ms";
-        return read_announcement_member(r, key, out.announced);
+        return key == "seq"       ? r.read(out.seq)
+               : key == "age_ms"  ? read_milliseconds(r, out.age, max_age)
+               : key == "leaving" ? r.skip()
+                                  : read_announcement_member(r, key, out.announced);
     });
-    return good && has_epoch && protocol::is_name(out.announced.node) &&
-           !protocol::is_reserved_target(out.announced.node);
+    return good && has_epoch && is_of_a_node(out);
 }
 
-bool read_entries(json_reader& r, std::size_t most, table_reader& to) {
+bool read_entries(json_reader& r, std::size_t most, std::chrono::milliseconds usual, peer_table& out) {
     if (!r.begin_array()) {
         return false;
     }
-    peer_report report;
     while (r.next_element()) {
         std::string_view text;
         if (!r.read_raw(text)) {
@@ -236,40 +164,30 @@ bool read_entries(json_reader& r, std::size_t most, table_reader& to) {
             continue;
         }
         --most;
+        peer_report report;
+        report.announced.interval = usual;
         if (read_entry(text, report)) {
-            to.on_report(report);
+            out.reports.push_back(std::move(report));
         } else {
-            to.on_bad_entry();
+            ++out.bad_entries;
         }
     }
     return r.ok();
 }
 
-bool read_number(json_reader& r, std::uint64_t& out) { return r.next_element() && r.read(out); }
-
 bool read_heartbeat(json_reader& r, peer_heartbeat& out) {
-    constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
-    std::uint64_t age = 0;
-    std::uint64_t interval = 0;
-    std::uint64_t queued = 0;
-    std::uint64_t running = 0;
-    if (!r.begin_array() || !read_number(r, out.seq) || !read_number(r, age) || !read_number(r, interval) ||
-        !read_number(r, queued) || !read_number(r, running)) {
+    if (!r.begin_array() || !r.next_element() || !r.read(out.seq) || !r.next_element() ||
+        !read_milliseconds(r, out.age, max_age) || !r.next_element() || !read_interval(r, out.interval) ||
+        !r.next_element() || !read_count(r, out.queued) || !r.next_element() || !read_count(r, out.running)) {
         return false;
     }
     while (r.next_element()) { // values of later versions
         r.skip();
     }
-    out.age = milliseconds{std::min<std::uint64_t>(age, static_cast<std::uint64_t>(max_age.count()))};
-    out.interval =
-        std::clamp(milliseconds{std::min<std::uint64_t>(interval, static_cast<std::uint64_t>(max_interval.count()))},
-                   min_interval, max_interval);
-    out.queued = static_cast<std::uint32_t>(std::min(queued, most));
-    out.running = static_cast<std::uint32_t>(std::min(running, most));
     return r.ok();
 }
 
-bool read_heartbeats(json_reader& r, std::size_t most, table_reader& to) {
+bool read_heartbeats(json_reader& r, std::size_t most, peer_table& out) {
     return read_members(r, [&](std::string_view key) {
         peer_heartbeat beat;
         const auto epoch = protocol::parse_epoch(key);
@@ -281,7 +199,7 @@ bool read_heartbeats(json_reader& r, std::size_t most, table_reader& to) {
         if (!read_heartbeat(r, beat)) {
             return false;
         }
-        to.on_heartbeat(beat);
+        out.beats.push_back(beat);
         return true;
     });
 }
@@ -302,62 +220,53 @@ void write_delta(json_writer& w, const table_owner& who, const membership& other
     const auto room = std::min(longest, table_page);
     const auto p = page_of(items, others.latest_revision(), room > room_for_head ? room - room_for_head : 0, now);
     w.begin_object();
-    w.plain_key("node");
-    w.value(who.node);
-    w.plain_key("epoch");
-    w.value(who.epoch);
+    write_member(w, "node", who.node);
+    write_member(w, "epoch", who.epoch);
     if (!others.pool().empty()) {
-        w.plain_key("pool");
-        w.value(std::string_view{others.pool()});
+        write_member(w, "pool", others.pool());
     }
     w.plain_key("peers");
     w.raw(p.peers);
     w.plain_key("beats");
     w.raw(p.beats);
-    w.plain_key("next");
-    w.value(std::string_view{std::string{who.epoch} + "." + std::to_string(p.next)});
+    write_member(w, "next", std::string{who.epoch} + "." + std::to_string(p.next));
     if (p.more) {
-        w.plain_key("more");
-        w.value(true);
+        write_member(w, "more", true);
     }
     w.end_object();
 }
 
-void write_own_entry(json_writer& w, const announcement& said, std::string_view epoch, std::uint64_t seq,
-                     milliseconds age) {
+void write_own_entry(json_writer& w, const incarnation& own, time_point now) {
     w.begin_object();
     w.plain_key("peers");
     w.begin_array();
-    write_entry(w, {said.node, epoch, seq, age.count(), said.leaving ? "left" : "live", &said, &said.endpoints},
+    write_entry(w, delta_entry::of(delta_entry::kind::description, own.announced.node, own, peer_state::live), now,
                 max_endpoints);
     w.end_array();
     w.end_object();
 }
 
-bool read_table(std::string_view json, std::size_t max_entries, table_reader& to, table_head& head) {
-    head = {};
+bool read_table(std::string_view json, std::size_t max_entries, std::chrono::milliseconds usual, peer_table& out) {
+    out = {};
     json_reader r{json, table_depth};
     bool has_peers = false;
     const bool good = read_members(r, [&](std::string_view key) {
-        if (key == "peers") {
-            has_peers = true;
-            return read_entries(r, max_entries, to);
-        }
-        if (key == "beats") {
-            return read_heartbeats(r, max_entries, to);
-        }
-        return key == "node"    ? r.read(head.node)
-               : key == "epoch" ? r.read(head.epoch)
-               : key == "pool"  ? r.read(head.pool)
-               : key == "next"  ? r.read(head.next)
-               : key == "more"  ? r.read(head.more)
+        has_peers = has_peers || key == "peers";
+        return key == "peers"   ? read_entries(r, max_entries, usual, out)
+               : key == "beats" ? read_heartbeats(r, max_entries, out)
+               : key == "node"  ? r.read(out.node)
+               : key == "epoch" ? r.read(out.epoch)
+               : key == "pool"  ? r.read(out.pool)
+               : key == "next"  ? r.read(out.next)
+               : key == "more"  ? r.read(out.more)
                                 : r.skip();
     });
     return good && has_peers;
 }
 
-bool read_description(std::string_view json, peer_report& out) {
+bool read_description(std::string_view json, std::chrono::milliseconds usual, peer_report& out) {
     out = {};
+    out.announced.interval = usual;
     bool has_epoch = false;
     json_reader r{json};
     const bool good = read_members(r, [&](std::string_view key) {
@@ -367,8 +276,7 @@ bool read_description(std::string_view json, peer_report& out) {
         return key == "node" || key == "endpoints" || key == "pool" ? read_announcement_member(r, key, out.announced)
                                                                     : r.skip();
     });
-    return good && has_epoch && protocol::is_name(out.announced.node) &&
-           !protocol::is_reserved_target(out.announced.node);
+    return good && has_epoch && is_of_a_node(out);
 }
 
 void write_peers(json_writer& w, const membership& others, time_point now) {
@@ -377,26 +285,15 @@ void write_peers(json_writer& w, const membership& others, time_point now) {
     w.begin_array();
     for (const auto& p : others.list(now)) {
         w.begin_object();
-        w.plain_key("node");
-        w.value(std::string_view{p.node});
+        write_member(w, "node", p.node);
         if (!others.pool().empty()) {
-            w.plain_key("pool");
-            w.value(std::string_view{others.pool()});
+            write_member(w, "pool", others.pool());
         }
-        w.plain_key("endpoints");
-        w.begin_array();
-        for (const auto& endpoint : p.endpoints) {
-            w.value(std::string_view{endpoint});
-        }
-        w.end_array();
-        w.plain_key("epoch");
-        w.value(std::string_view{p.epoch});
-        w.plain_key("age_ms");
-        w.value(std::int64_t{p.age.count()});
-        w.plain_key("state");
-        w.value(to_string(p.state));
-        w.plain_key("load");
-        write_load(w, p.load);
+        write_endpoints_member(w, p.endpoints, p.endpoints.size());
+        write_member(w, "epoch", p.epoch);
+        write_member(w, "age_ms", p.age.count());
+        write_member(w, "state", to_string(p.state));
+        write_load_member(w, p.load);
         w.end_object();
     }
     w.end_array();

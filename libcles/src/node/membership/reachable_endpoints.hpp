@@ -3,7 +3,7 @@
 
 #include <cles/identity.hpp>
 
-#include "port/group_source.hpp"
+#include "port/group_port.hpp"
 
 #include <string>
 #include <string_view>

@@ -2,7 +2,10 @@
 #include "node/publish/bind_requests.hpp"
 
 #include "node/base/deadlines.hpp"
+#include "node/routing/router.hpp"
+#include "node/routing/subrequest.hpp"
 #include "node/session/handler_failure.hpp"
+#include "node/session/inbound.hpp"
 #include "node/session/request_checks.hpp"
 
 #include <chrono>
@@ -65,7 +68,7 @@ void bind_requests::drop(const std::string& noun) {
     }
 }
 
-void bind_requests::serve_remote(const protocol::request_line& r, time_point due, time_point now, call_factory& from) {
+void bind_requests::serve_remote(const protocol::request_line& r, time_point due, time_point now, inbound& from) {
     std::string scratch;
     auto noun = std::string{r.noun.target}.append(":").append(protocol::canonical_path(r.noun, scratch));
     if (r.unbinds()) {
@@ -97,7 +100,7 @@ void bind_requests::set_lease(std::string_view path, std::chrono::milliseconds l
     }
 }
 
-void bind_requests::serve(const protocol::request_line& r, time_point due, time_point now, call_factory& from) {
+void bind_requests::serve(const protocol::request_line& r, time_point due, time_point now, inbound& from) {
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
     if (r.unbinds()) {
@@ -114,7 +117,7 @@ void bind_requests::serve(const protocol::request_line& r, time_point due, time_
         replies_.fail(r, errc::no_task, node_.name + " has no BIND '" + std::string{r.noun.task} + "'");
         return;
     }
-    if (bind_decision::is_needed(node_, r)) {
+    if (is_bind_decided_later(node_, r)) {
         serve_later(r, path, due, now, from);
         return;
     }
@@ -143,7 +146,7 @@ topic& bind_requests::open(std::string_view path) {
 }
 
 void bind_requests::serve_later(const protocol::request_line& r, std::string_view path, time_point due, time_point now,
-                                call_factory& from) {
+                                inbound& from) {
     const auto c = from.make_call(r, due, now);
     if (!c) {
         return;
@@ -153,14 +156,14 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
         return !waits || waits->ended();
     });
     pending_.push_back({std::string{path}, c});
-    const auto decision = std::make_shared<bind_decision>(
+    const auto handler = std::make_shared<local_request>(
         shared_node_, [this, c, path = std::string{path}, terms = terms_of(r), lease = lease_of(r),
-                       mark = r.wants_mark](const protocol::failure* why_not) {
+                       mark = r.wants_mark](std::string_view, const subrequest_failure* why_not) {
             if (c->ended()) { // `this` may be gone with its link
                 return;
             }
             if (why_not != nullptr) {
-                c->fail(*why_not);
+                c->fail(why_not->told);
                 return;
             }
             try {
@@ -174,8 +177,8 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
                 c->fail(describe(std::current_exception()));
             }
         });
-    c->on_stop([decision] { decision->withdraw(); });
-    decision->ask(r, peer_, due, now);
+    c->on_stop([handler] { handler->withdraw(); });
+    handler->run(r, peer_, due, now);
 }
 
 void bind_requests::withdraw(std::string_view path) {
@@ -208,34 +211,9 @@ void ask_bind_handler(const node_state& host, const identity& peer, const protoc
     h->plain(cles::request{data}, w);
 }
 
-bool bind_decision::is_needed(const node_state& host, const protocol::request_line& r) {
+bool is_bind_decided_later(const node_state& host, const protocol::request_line& r) {
     const auto* h = host.tasks.find(verb::bind, r.noun.task);
     return h != nullptr && h->start;
 }
-
-void bind_decision::ask(const protocol::request_line& r, const identity& peer, time_point due, time_point now) {
-    const auto self = shared_from_this();
-    asked_ = std::make_unique<local_request>(node_, self, 0);
-    asked_->run(r, peer, due, now);
-}
-
-void bind_decision::withdraw() {
-    const auto keep = shared_from_this();
-    outcome_ = nullptr;
-    if (asked_) {
-        asked_->withdraw();
-    }
-}
-
-void bind_decision::report(const protocol::failure* why_not) {
-    const auto keep = shared_from_this();
-    if (const auto done = std::exchange(outcome_, nullptr)) {
-        done(why_not);
-    }
-}
-
-void bind_decision::on_result(std::size_t, std::string_view) { report(nullptr); }
-
-void bind_decision::on_failure(std::size_t, subrequest_failure why) { report(&why.told); }
 
 } // namespace cles::core

@@ -4,20 +4,14 @@
 #include <cles/identity.hpp>
 
 #include "node/node_state.hpp"
-#include "node/publish/lease.hpp"
-#include "node/publish/link_bindings.hpp"
-#include "node/routing/local_request.hpp"
+#include "node/publish/topic.hpp"
 #include "node/routing/relays.hpp"
-#include "node/routing/router.hpp"
-#include "node/routing/subrequest.hpp"
 #include "node/session/line_sink.hpp"
 #include "node/session/reply_writer.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <cstddef>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,37 +20,12 @@
 
 namespace cles::core {
 
-/// Asks a handler for BIND that replies later whether a binding is accepted.
-class bind_decision final : public subrequest_events, public std::enable_shared_from_this<bind_decision> {
-  public:
-    /// Null: it is accepted.
-    using outcome = std::function<void(const protocol::failure* why_not)>;
-
-    /// Whether the handler for this noun replies later.
-    static bool is_needed(const node_state& host, const protocol::request_line& request);
-
-    /// \param result is called once, possibly inside `ask`, unless `withdraw` is called first
-    bind_decision(std::shared_ptr<node_state> host, outcome result)
-        : node_(std::move(host)), outcome_(std::move(result)) {}
-
-    /// `peer` must live until the outcome or `withdraw`.
-    void ask(const protocol::request_line& request, const identity& peer, time_point due, time_point now);
-    /// The outcome is not reported any more, and the handler is told to stop.
-    void withdraw();
-
-  private:
-    void on_result(std::size_t which, std::string_view json) override;
-    void on_failure(std::size_t which, subrequest_failure why) override;
-    void on_progress(std::size_t, double, std::string_view) override {}
-    void report(const protocol::failure* why_not);
-
-    std::shared_ptr<node_state> node_;
-    outcome outcome_;
-    std::unique_ptr<local_request> asked_;
-};
+class inbound;
 
 /// Calls the handler for BIND of this noun, if there is one that decides at once. It refuses a binding by an exception.
 void ask_bind_handler(const node_state& host, const identity& peer, const protocol::request_line& request);
+/// Whether there is one that decides later: a `local_request` asks it.
+bool is_bind_decided_later(const node_state& host, const protocol::request_line& request);
 
 /// Serves BIND for one link, and holds the resulting bindings.
 class bind_requests {
@@ -64,9 +33,9 @@ class bind_requests {
     bind_requests(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer,
                   reply_writer& replies);
 
-    void serve(const protocol::request_line& request, time_point due, time_point now, call_factory& from);
+    void serve(const protocol::request_line& request, time_point due, time_point now, inbound& from);
     /// The same for nouns of other nodes, if this one routes.
-    void serve_remote(const protocol::request_line& request, time_point due, time_point now, call_factory& from);
+    void serve_remote(const protocol::request_line& request, time_point due, time_point now, inbound& from);
     void clear();
     /// Sends pending updates: the link has room again.
     void drain(time_point now);
@@ -83,7 +52,7 @@ class bind_requests {
 
     void drop(const std::string& noun);
     void serve_later(const protocol::request_line& request, std::string_view path, time_point due, time_point now,
-                     call_factory& from);
+                     inbound& from);
     void withdraw(std::string_view path);
     /// \throws cles::error if a limit is reached
     topic& open(std::string_view path);
@@ -98,7 +67,7 @@ class bind_requests {
     link_bindings bound_;
     std::unique_ptr<relayed_bindings> remote_bindings_; // few links need it
     std::vector<asking> pending_;                       // whose handlers have not decided yet
-    std::optional<leases> leases_;                      // over datagrams: nothing shows that the peer has gone
+    std::optional<leases<std::string>> leases_;         // over datagrams: nothing shows that the peer has gone
 };
 
 } // namespace cles::core

@@ -4,8 +4,6 @@
 #include "node/publish/topic.hpp"
 
 #include <algorithm>
-#include <cstddef>
-#include <limits>
 
 namespace cles::core {
 namespace {
@@ -67,84 +65,63 @@ void binding::drain_all() {
 
 bool binding::is_behind() const noexcept { return seen_ != source_.log_.last(); }
 
-void binding::on_deadline(time_point now) { drain(now); }
-
-binding& topic_bindings::bind(subscriber& target, binding::terms wanted) {
-    auto* existing = find(target);
-    if (existing == nullptr) {
-        existing = bindings_.emplace_back(std::make_unique<binding>(of_, target, wanted)).get();
-        existing->seen_ = of_.log_.last();
-    } else if (existing->terms_ != wanted) { // else it is renewed, and nothing changes
-        if (existing->terms_.every.count() != 0) {
-            existing->seen_ = of_.log_.last(); // updates that `every` left out so far are not sent later
-        }
-        existing->set_terms(wanted);
-        of_.shared_.deadlines.disarm(*existing);
-        existing->next_due_ = {};
+void binding::set_terms(terms wanted) noexcept {
+    if (terms_ == wanted) {
+        return;
     }
-    refresh();
-    return *existing;
-}
-
-bool topic_bindings::unbind(subscriber& target) {
-    const auto found =
-        std::find_if(bindings_.begin(), bindings_.end(), [&](const auto& b) { return &b->target() == &target; });
-    if (found == bindings_.end()) {
-        return false;
+    if (terms_.every.count() != 0) {
+        seen_ = source_.log_.last(); // updates that `every` left out so far are not sent later
     }
-    bindings_.erase(found);
-    refresh();
-    return true;
+    terms_ = wanted;
+    source_.shared_.deadlines.disarm(*this);
+    next_due_ = {};
 }
 
-binding* topic_bindings::find(const subscriber& target) noexcept {
-    for (const auto& b : bindings_) {
-        if (&b->target() == &target) {
-            return b.get();
-        }
+// -- of one link -----------------------------------------------------------------------------------------------------
+
+bool link_bindings::has(std::string_view path) noexcept {
+    auto* t = source_.find(path);
+    return t != nullptr && t->find(target_) != nullptr;
+}
+
+void link_bindings::bind(topic& t, binding::terms wanted) {
+    if (t.find(target_) == nullptr) {
+        topics_.push_back(&t);
     }
-    return nullptr;
+    t.bind(target_, wanted);
 }
 
-bool topic_bindings::is_behind() const noexcept {
-    return std::any_of(bindings_.begin(), bindings_.end(), [](const auto& b) { return b->is_behind(); });
+void link_bindings::release(topic& t) {
+    t.unbind(target_);
+    source_.release(t);
 }
 
-void topic_bindings::drain(time_point now) {
-    for (const auto& b : bindings_) {
-        b->drain(now);
+void link_bindings::unbind(std::string_view path) {
+    auto* t = source_.find(path);
+    if (t != nullptr && std::erase(topics_, t) != 0) {
+        release(*t);
     }
-    refresh();
 }
 
-bool topic_bindings::has_room() const noexcept {
-    if (!unthinned_) {
-        return true;
+void link_bindings::clear() {
+    for (auto* t : std::exchange(topics_, {})) {
+        release(*t);
     }
-    const auto newest = of_.log_.last();
-    const auto oldest_wanted = std::max(slowest_ + 1, of_.log_.first());
-    return newest < room_until_ && of_.log_.bytes(oldest_wanted, newest) < of_.shared_.binding_bytes / 2;
 }
 
-std::uint64_t topic_bindings::first_needed() const noexcept {
-    const auto newest = of_.log_.last();
-    return unthinned_ ? std::max(slowest_ + 1, newest >= max_keep_ ? newest - max_keep_ + 1 : 1) : newest;
-}
-
-void topic_bindings::refresh() noexcept {
-    unthinned_ = false;
-    slowest_ = std::numeric_limits<std::uint64_t>::max();
-    room_until_ = slowest_;
-    max_keep_ = 0;
-    for (const auto& b : bindings_) {
-        if (b->terms_.every.count() == 0) {
-            unthinned_ = true;
-            slowest_ = std::min(slowest_, b->seen_);
-            room_until_ = std::min(room_until_, b->seen_ + b->terms_.keep);
-            max_keep_ = std::max(max_keep_, b->terms_.keep);
+void link_bindings::drain(time_point now) {
+    for (auto* t : topics_) {
+        if (auto* b = t->find(target_)) {
+            b->drain(now);
         }
     }
-    of_.forget_retired();
+    const auto drained = topics_; // a publisher that continues may change the list
+    for (auto* t : drained) {
+        if (std::find(topics_.begin(), topics_.end(), t) != topics_.end()) {
+            t->refresh();
+            source_.admit(*t);
+        }
+    }
 }
 
 } // namespace cles::core

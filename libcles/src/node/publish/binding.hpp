@@ -4,9 +4,12 @@
 #include "node/base/deadlines.hpp"
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <functional>
+#include <map>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
@@ -37,61 +40,114 @@ class binding final : public deadline {
         bool operator==(const terms&) const = default;
     };
 
-    binding(topic& source, subscriber& target, terms wanted) : source_(source), target_(target), terms_(wanted) {}
+    /// It gets the updates after the one with the number `seen`.
+    binding(topic& source, subscriber& target, terms wanted, std::uint64_t seen)
+        : source_(source), target_(target), terms_(wanted), seen_(seen) {}
 
     /// Sends the subscriber its pending updates, as far as it takes them.
     void drain(time_point now);
-    void set_terms(terms wanted) noexcept { terms_ = wanted; }
+    /// Does nothing if they are the same: the binding is renewed.
+    void set_terms(terms wanted) noexcept;
     [[nodiscard]] subscriber& target() const noexcept { return target_; }
     /// Whether updates are pending for it.
     [[nodiscard]] bool is_behind() const noexcept;
 
   private:
-    friend class topic_bindings;
-    void on_deadline(time_point now) override;
+    friend topic;
+    void on_deadline(time_point now) override { drain(now); }
     void drain_newest(time_point now);
     void drain_all();
 
     topic& source_;
     subscriber& target_;
     terms terms_;
-    std::uint64_t seen_ = 0; // the last update that it was sent, or that was dropped for it
-    time_point next_due_{};  // with `every`: no update earlier
+    std::uint64_t seen_;    // the last update that it was sent, or that was dropped for it
+    time_point next_due_{}; // with `every`: no update earlier
 };
 
-/// The subscribers of a topic and their positions.
-class topic_bindings {
+/// Where a link's peer finds what it binds: the topics that the node publishes, or those that it relays.
+class topic_source {
   public:
-    explicit topic_bindings(topic& of) noexcept : of_(of) {}
-    topic_bindings(const topic_bindings&) = delete;
-    topic_bindings& operator=(const topic_bindings&) = delete;
+    topic_source() = default;
+    topic_source(const topic_source&) = delete;
+    topic_source& operator=(const topic_source&) = delete;
 
-    binding& bind(subscriber& target, binding::terms wanted);
-    /// Returns false if it was not bound.
-    bool unbind(subscriber& target);
-    [[nodiscard]] binding* find(const subscriber& target) noexcept;
-    [[nodiscard]] bool empty() const noexcept { return bindings_.empty(); }
-    /// Whether updates are pending for one of them.
-    [[nodiscard]] bool is_behind() const noexcept;
+    /// The topic, or null.
+    [[nodiscard]] virtual topic* find(std::string_view path) noexcept = 0;
+    /// A subscriber has gone; the topic may be removed.
+    virtual void release(topic& t) = 0;
+    /// A subscriber has taken its pending updates.
+    virtual void admit(topic& t) = 0;
 
-    /// Sends all subscribers their pending updates, as far as they take them.
+  protected:
+    ~topic_source() = default;
+};
+
+/// The bindings of one link's peer.
+class link_bindings {
+  public:
+    link_bindings(topic_source& source, subscriber& target) noexcept : source_(source), target_(target) {}
+    link_bindings(const link_bindings&) = delete;
+    link_bindings& operator=(const link_bindings&) = delete;
+
+    [[nodiscard]] bool has(std::string_view path) noexcept;
+    /// Binds, or changes the terms of a binding.
+    void bind(topic& t, binding::terms wanted);
+    /// Does nothing if it is not bound.
+    void unbind(std::string_view path);
+    void clear();
+    /// Sends pending updates: the link has room again.
     void drain(time_point now);
-    /// Records the positions after one was drained on its own.
-    void refresh() noexcept;
-    /// Whether one more update fits into the queue of every subscriber.
-    [[nodiscard]] bool has_room() const noexcept;
-    /// Whether one of them takes every update.
-    [[nodiscard]] bool is_unthinned() const noexcept { return unthinned_; }
-    /// The first update that one of them still needs.
-    [[nodiscard]] std::uint64_t first_needed() const noexcept;
+
+    [[nodiscard]] std::size_t size() const noexcept { return topics_.size(); }
 
   private:
-    topic& of_;
-    std::vector<std::unique_ptr<binding>> bindings_;
-    std::uint64_t slowest_ = 0;    // the lowest `seen_` of the bindings that take every update
-    std::uint64_t room_until_ = 0; // the last number that fits into each one's `keep`
-    std::uint32_t max_keep_ = 0;
-    bool unthinned_ = false; // there are such bindings
+    void release(topic& t);
+
+    topic_source& source_;
+    subscriber& target_;
+    std::vector<topic*> topics_;
+};
+
+/// The leases of bindings that were made by datagram: a binding ends when its lease expires, unless it is renewed.
+template <class Key>
+class leases {
+  public:
+    /// `over` is called with the key of a binding whose lease has expired.
+    leases(deadline_queue& deadlines, std::function<void(const Key&)> over)
+        : deadlines_(deadlines), over_(std::move(over)) {}
+
+    /// Starts or renews a lease.
+    void set(const Key& key, time_point until) {
+        deadlines_.arm(open_.try_emplace(key, *this, key).first->second, until);
+    }
+    /// Does nothing if there is none.
+    template <class Same>
+    void drop(const Same& key) {
+        if (const auto found = open_.find(key); found != open_.end()) {
+            open_.erase(found);
+        }
+    }
+    [[nodiscard]] bool contains(const Key& key) const { return open_.contains(key); }
+    void clear() { open_.clear(); }
+
+  private:
+    struct lease final : deadline {
+        lease(leases& all, Key what) : owner(all), key(std::move(what)) {}
+        void on_deadline(time_point) override {
+            const auto ended = key;
+            auto& all = owner;
+            all.drop(ended); // destroys this
+            all.over_(ended);
+        }
+
+        leases& owner;
+        Key key;
+    };
+
+    deadline_queue& deadlines_;
+    std::function<void(const Key&)> over_;
+    std::map<Key, lease, std::less<>> open_;
 };
 
 } // namespace cles::core

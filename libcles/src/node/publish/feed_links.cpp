@@ -5,10 +5,8 @@
 
 #include "node/base/deadlines.hpp"
 #include "node/local_node.hpp"
-#include "node/routing/peer_channel.hpp"
-#include "node/session/command.hpp"
+#include "node/routing/peer_channels.hpp"
 #include "node/session/outbound.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -82,8 +80,8 @@ class feed_links::feed_reply final : public detail::pending {
     reply_function then_;
 };
 
-detail::pending_ptr feed_links::on_reply(const entry& e, reply_function then) {
-    return detail::pending_ptr{new feed_reply(host_.weak_from_this(), e.handle, std::move(then))};
+detail::pending_ptr feed_links::on_reply(const core::feed_machine& feed, reply_function then) {
+    return detail::pending_ptr{new feed_reply(host_.weak_from_this(), feed.entry().handle, std::move(then))};
 }
 
 void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked,
@@ -119,35 +117,32 @@ void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, 
 void feed_links::enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms) {
     feed.set_sharing_key("every=" + std::to_string(terms.every_ms) + " keep=" + std::to_string(terms.keep) + " " +
                          terms.adverbs);
-    feeds_.insert_or_assign(&feed, entry{std::move(handle), std::move(terms), {}, {}, 0, {}, ++last_number_});
+    feed.entry().handle = std::move(handle);
+    feed.entry().terms = std::move(terms);
+    feeds_.push_back(feed);
 }
 
-void feed_links::leave(core::feed_machine& feed) { feeds_.erase(&feed); }
-
 void feed_links::refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why) {
-    core::post(host_.environment(), [host = host_.shared_from_this(), handle = feeds_.at(&feed).handle.lock(), &feed,
-                                     code, why] { feed.on_refused(code, why, host->now()); });
+    core::post(host_.environment(), [host = host_.shared_from_this(), handle = feed.entry().handle.lock(), &feed, code,
+                                     why] { feed.on_refused(code, why, host->now()); });
 }
 
 void feed_links::bind(core::feed_machine& feed) {
-    const auto found = feeds_.find(&feed);
-    if (found == feeds_.end()) {
-        return;
-    }
     if (host_.stopped()) {
         refuse_later(feed, errc::stopped, "the service has been stopped");
         return;
     }
+    auto& e = feed.entry();
     boost::system::error_code code;
     std::string why;
-    auto* r = host_.peer_channels().to(feed.target(), found->second.terms.at, false, code, why);
+    auto* r = host_.peer_channels().to(feed.target(), e.terms.at, false, code, why);
     if (r == nullptr) {
         refuse_later(feed, code, why);
         return;
     }
-    found->second.at = r->address();
+    e.at = r->address();
     r->connect(feed,
-               [host = host_.shared_from_this(), handle = found->second.handle.lock(), &feed](
+               [host = host_.shared_from_this(), handle = e.handle.lock(), &feed](
                    const std::shared_ptr<connection>& c, boost::system::error_code failed, std::string_view message) {
                    if (feed.closed()) {
                        return;
@@ -161,7 +156,7 @@ void feed_links::bind(core::feed_machine& feed) {
 }
 
 void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
-    auto& e = feeds_.at(&feed);
+    auto& e = feed.entry();
     // For an existing binding, the publisher may have queued updates that are older than the value in its reply. (A
     // reply for `all` comes from several publishers, and has the mark of each value in its body.)
     const bool joins = !feed.was_bound() && feed.target() != "all" && c->session().bound().has_bound_for(feed);
@@ -176,7 +171,7 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     e.on = c;
     const auto now = host_.now();
     const auto asked = c->datagram() == 0 ? std::nullopt : std::optional{now};
-    auto request = bind_request(e, *c);
+    auto request = bind_request(feed, *c);
     const auto adverbs = e.terms.adverbs + (e.terms.adverbs.empty() ? "mark=yes" : " mark=yes");
     if (marks != marking::none) {
         request.adverbs = adverbs;
@@ -184,7 +179,7 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
     const auto whole = core::saturating_add(now, time_limit(e.terms.deadline, verb::bind));
     const auto due = std::exchange(e.due, {}).value_or(whole);
     c->bind(feed, request, due > now ? due : whole,
-            on_reply(e, [&feed, asked, marks](local_node* host, const reply& received) {
+            on_reply(feed, [&feed, asked, marks](local_node* host, const reply& received) {
                 if (host != nullptr) {
                     host->feeds().on_bind_reply(feed, received, asked, marks);
                 }
@@ -192,14 +187,14 @@ void feed_links::send_bind(core::feed_machine& feed, const std::shared_ptr<conne
 }
 
 void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c) {
-    auto& e = feeds_.at(&feed);
+    auto& e = feed.entry();
     const auto now = host_.now();
     const auto whole = time_limit(e.terms.deadline, verb::bind);
     const auto limit = std::min(time_limit({}, verb::pull), whole);
     e.due = core::saturating_add(now, whole);
     c->session().asking().send({.verb = verb::pull, .noun = "self:cles", .id = host_.draw_id()},
                                core::saturating_add(now, limit), now,
-                               on_reply(e, [&feed, on = std::weak_ptr{c}](local_node* host, const reply& received) {
+                               on_reply(feed, [&feed, on = std::weak_ptr{c}](local_node* host, const reply& received) {
                                    if (received.code == errc::unavailable || received.code == errc::busy) {
                                        if (host != nullptr) {
                                            feed.on_refused(received.code, std::string{received.text}, host->now());
@@ -215,7 +210,8 @@ void feed_links::ask_for_features(core::feed_machine& feed, const std::shared_pt
                                }));
 }
 
-protocol::outgoing_request feed_links::bind_request(entry& e, const connection& c) {
+protocol::outgoing_request feed_links::bind_request(core::feed_machine& feed, const connection& c) {
+    auto& e = feed.entry();
     protocol::outgoing_request request{.verb = verb::bind,
                                        .noun = e.terms.noun,
                                        .id = host_.draw_id(),
@@ -230,15 +226,11 @@ protocol::outgoing_request feed_links::bind_request(entry& e, const connection& 
 }
 
 void feed_links::renew(core::feed_machine& feed, time_point until) {
-    const auto found = feeds_.find(&feed);
-    if (found == feeds_.end()) {
-        return;
-    }
-    if (const auto c = found->second.on.lock()) { // otherwise its loss has been reported
+    if (const auto c = feed.entry().on.lock()) { // otherwise its loss has been reported
         const auto now = host_.now();
-        const auto request = bind_request(found->second, *c);
+        const auto request = bind_request(feed, *c);
         c->session().asking().send(
-            request, until, now, on_reply(found->second, [&feed, now](local_node* host, const reply& received) {
+            request, until, now, on_reply(feed, [&feed, now](local_node* host, const reply& received) {
                 if (host == nullptr) {
                     return;
                 }
@@ -252,53 +244,46 @@ void feed_links::renew(core::feed_machine& feed, time_point until) {
 }
 
 void feed_links::detach(core::feed_machine& feed) {
-    const auto found = feeds_.find(&feed);
-    if (found != feeds_.end()) {
-        if (const auto c = found->second.on.lock()) {
-            c->unbind(feed);
-            if (const auto asking = std::exchange(found->second.asking, 0)) {
-                c->session().asking().drop(asking); // a retransmission would bind again
-            }
+    auto& e = feed.entry();
+    if (const auto c = std::exchange(e.on, {}).lock()) {
+        c->unbind(feed);
+        if (const auto asking = std::exchange(e.asking, 0)) {
+            c->session().asking().drop(asking); // a retransmission would bind again
         }
-        found->second.on.reset();
     }
 }
 
 void feed_links::unbind(core::feed_machine& feed) {
-    const auto found = feeds_.find(&feed);
-    if (found == feeds_.end()) {
-        return;
-    }
     host_.peer_channels().forget(feed);
-    const auto c = found->second.on.lock();
+    const auto c = feed.entry().on.lock();
     const auto now = host_.now();
     detach(feed);
     // Another feed may share the binding.
     if (c && c->usable() && !host_.stopped() && !c->session().bound().has(feed.target(), feed.path())) {
         c->session().asking().send(
-            {.verb = verb::bind, .noun = found->second.terms.noun, .id = host_.draw_id(), .lease_ms = 0},
+            {.verb = verb::bind, .noun = feed.entry().terms.noun, .id = host_.draw_id(), .lease_ms = 0},
             core::saturating_add(now, time_limit({}, verb::bind)), now, detail::pending_ptr{new core::discarded_reply});
     }
 }
 
 void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
-    const std::string where{host_.discovery().address_of(node).value_or(std::string_view{})};
+    const std::string where{host_.node().peers.address_of(node).value_or(std::string_view{})};
     struct concern {
         core::feed_machine* feed;
         std::weak_ptr<void> handle;
         bool elsewhere;
     };
     std::vector<concern> concerned;
-    for (auto* feed : in_order()) {
-        const auto& e = feeds_.at(feed);
-        if (feed->target() == node && e.terms.at.empty()) {
-            concerned.push_back({feed, e.handle, e.at != where});
+    for (auto& feed : feeds_) {
+        const auto& e = feed.entry();
+        if (feed.target() == node && e.terms.at.empty()) {
+            concerned.push_back({&feed, e.handle, e.at != where});
         }
     }
     const auto now = host_.now();
     for (const auto& [feed, handle, elsewhere] : concerned) {
         const auto alive = handle.lock(); // another feed's handler may have closed this one
-        if (!alive || !feeds_.contains(feed)) {
+        if (!alive || !feed->is_linked()) {
             continue;
         }
         if (replaced && elsewhere && feed->is_bound()) {
@@ -309,21 +294,13 @@ void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
     }
 }
 
-std::vector<core::feed_machine*> feed_links::in_order() const {
-    std::vector<core::feed_machine*> feeds;
-    feeds.reserve(feeds_.size());
-    for (const auto& [feed, e] : feeds_) {
-        feeds.push_back(feed);
-    }
-    std::sort(feeds.begin(), feeds.end(),
-              [this](auto* a, auto* b) { return feeds_.at(a).number < feeds_.at(b).number; });
-    return feeds;
-}
-
 void feed_links::stop() {
-    const auto feeds = feeds_;
-    for (auto* feed : in_order()) {
-        if (const auto handle = feeds.at(feed).handle.lock()) {
+    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> feeds; // a completion may close others
+    for (auto& feed : feeds_) {
+        feeds.emplace_back(&feed, feed.entry().handle);
+    }
+    for (const auto& [feed, handle] : feeds) {
+        if (const auto alive = handle.lock()) {
             // Taken out of the feed, which they may own: otherwise neither would be destroyed if the context never runs
             // again.
             feed->abandon().fail(host_.completions(), errc::stopped);

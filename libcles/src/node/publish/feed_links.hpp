@@ -7,38 +7,26 @@
 #include "node/publish/feed_machine.hpp"
 #include "node/session/connection.hpp"
 
-#include <chrono>
+#include <boost/intrusive/list.hpp>
+
 #include <cstdint>
 #include <functional>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <vector>
 
 namespace cles::core {
 
 class local_node;
-
-/// What a feed is bound to, and how.
-struct feed_terms {
-    std::string noun;
-    std::string at;
-    std::chrono::milliseconds deadline{};
-    std::uint32_t every_ms = 0;
-    std::uint32_t keep = 0;
-    std::string adverbs{}; ///< further ones, in wire format
-    bool marked = false;   ///< requests the mark of the last value, if the publisher supports it
-};
 
 /// The feeds of a service and their links: finds a link for each feed, sends its BIND, and unbinds it.
 class feed_links final : public core::feed_host {
   public:
     explicit feed_links(local_node& host) noexcept : host_(host) {}
 
+    /// Call once, before the feed starts. It is in the list until it is closed.
     void enter(core::feed_machine& feed, std::weak_ptr<void> handle, feed_terms terms);
-    void leave(core::feed_machine& feed);
     void bind(core::feed_machine& feed) override;
     void unbind(core::feed_machine& feed) override;
     void detach(core::feed_machine& feed) override;
@@ -50,16 +38,6 @@ class feed_links final : public core::feed_host {
     void stop();
 
   private:
-    struct entry {
-        std::weak_ptr<void> handle;
-        feed_terms terms;
-        std::weak_ptr<connection> on;
-        std::string at{};                // the URL used last
-        std::uint64_t asking = 0;        // the id of its last BIND by datagram
-        std::optional<time_point> due{}; // the deadline of a BIND that waits for the node's features
-        std::uint64_t number = 0;        // the order of `enter`
-    };
-
     /// To a request for a feed.
     struct reply {
         boost::system::error_code code{}; ///< why it failed
@@ -77,20 +55,16 @@ class feed_links final : public core::feed_host {
         up_to_it,  ///< updates up to it are old: they were queued for a shared binding
     };
 
-    [[nodiscard]] detail::pending_ptr on_reply(const entry& e, reply_function then);
+    [[nodiscard]] detail::pending_ptr on_reply(const core::feed_machine& feed, reply_function then);
     /// `asked`: when the BIND was sent by datagram; empty for a stream.
     void on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked, marking marks);
     void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
     void ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c);
-    [[nodiscard]] protocol::outgoing_request bind_request(entry& e, const connection& c);
+    [[nodiscard]] protocol::outgoing_request bind_request(core::feed_machine& feed, const connection& c);
     void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
 
-    /// In the order of `enter`, so that it does not depend on addresses.
-    [[nodiscard]] std::vector<core::feed_machine*> in_order() const;
-
     local_node& host_;
-    std::map<core::feed_machine*, entry> feeds_;
-    std::uint64_t last_number_ = 0;
+    boost::intrusive::list<core::feed_machine, boost::intrusive::constant_time_size<false>> feeds_;
 };
 
 } // namespace cles::core

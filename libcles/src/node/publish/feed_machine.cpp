@@ -2,10 +2,10 @@
 #include "node/publish/feed_machine.hpp"
 
 #include "node/base/deadlines.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace cles::core {
@@ -13,8 +13,7 @@ namespace cles::core {
 feed_machine::feed_machine(feed_host& host, deadline_queue& deadlines, completion_queue& completions,
                            const limits& bounds, std::string target, std::string path, bool thinned, std::uint32_t seed)
     : subscription(std::move(target), std::move(path), thinned, bounds.publishers), host_(host), deadlines_(deadlines),
-      max_line_(bounds.line), completions_(completions), mail_(bounds, completions), backoff_(seed),
-      renewal_(*this, deadlines, ~seed) {}
+      max_line_(bounds.line), completions_(completions), mail_(bounds, completions), backoff_(seed), jitter_(~seed) {}
 
 void feed_machine::start(detail::pending_ptr bound) {
     first_ = std::move(bound);
@@ -63,13 +62,33 @@ void feed_machine::take_marked(const std::string& body, const update_mark& mark)
 void feed_machine::on_leased(time_point sent_at, std::chrono::milliseconds lease) {
     if (state_ == state::bound) {
         bound_at_ = sent_at;
-        renewal_.begin(sent_at, lease);
+        lease_ = lease;
+        begin_lease(sent_at);
     }
+}
+
+void feed_machine::begin_lease(time_point sent_at) {
+    lease_end_ = saturating_add(sent_at, lease_);
+    // At least 1 ms: otherwise a tiny lease would be renewed all the time. It expires in between instead.
+    const auto third = std::max(lease_ / 3, std::chrono::milliseconds{1});
+    deadlines_.arm(*this, saturating_add(sent_at, third - jitter_.quarter_of(third)));
+}
+
+// The publisher was busy: tries again in the remaining time. False if none is left.
+bool feed_machine::renew_later(time_point now) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(lease_end_ - now);
+    constexpr std::chrono::milliseconds shortest{20};
+    if (left < shortest) {
+        return false;
+    }
+    const auto third = std::max(left / 3, shortest);
+    deadlines_.arm(*this, saturating_add(now, third - jitter_.quarter_of(third)));
+    return true;
 }
 
 void feed_machine::on_renewed(time_point sent_at) {
     if (state_ == state::bound && sent_at >= bound_at_) {
-        renewal_.renewed(sent_at);
+        begin_lease(sent_at);
     }
 }
 
@@ -80,7 +99,7 @@ void feed_machine::on_renewal_refused(time_point sent_at, boost::system::error_c
     }
     if (why == errc::too_large) { // it is renewed: only the last value did not fit into the reply
         on_renewed(sent_at);
-    } else if (why != errc::busy || !renewal_.retry_later(now)) {
+    } else if (why != errc::busy || !renew_later(now)) {
         const std::string text{why == errc::deadline ? "the publisher did not renew the lease in time" : message};
         host_.detach(*this);
         on_lost(text, now);
@@ -111,7 +130,6 @@ void feed_machine::on_lost(std::string_view why, time_point now) {
 
 void feed_machine::pause(time_point now) {
     state_ = state::pausing;
-    renewal_.stop();
     deadlines_.arm(*this, saturating_add(now, backoff_.next()));
 }
 
@@ -126,6 +144,8 @@ void feed_machine::on_deadline(time_point) {
     if (state_ == state::pausing) {
         state_ = state::binding;
         host_.bind(*this);
+    } else if (state_ == state::bound) {
+        host_.renew(*this, lease_end_);
     }
 }
 
@@ -135,8 +155,10 @@ feed_machine::waiting feed_machine::abandon() {
     if (state_ != state::closed) {
         state_ = state::closed;
         deadlines_.disarm(*this);
-        renewal_.stop();
         host_.unbind(*this);
+        if (is_linked()) {
+            unlink();
+        }
     }
     return {.first = std::move(first_), .next = mail_.close()};
 }

@@ -9,8 +9,9 @@
 #include "node/base/backoff.hpp"
 #include "node/base/deadlines.hpp"
 #include "node/publish/feed_mailbox.hpp"
-#include "node/publish/lease.hpp"
 #include "node/publish/subscription.hpp"
+
+#include <boost/intrusive/list.hpp>
 
 #include <chrono>
 #include <cstddef>
@@ -22,7 +23,29 @@
 
 namespace cles::core {
 
+class connection;
 class feed_machine;
+
+/// What a feed is bound to, and how.
+struct feed_terms {
+    std::string noun;
+    std::string at;
+    std::chrono::milliseconds deadline{};
+    std::uint32_t every_ms = 0;
+    std::uint32_t keep = 0;
+    std::string adverbs{}; ///< further ones, in wire format
+    bool marked = false;   ///< requests the mark of the last value, if the publisher supports it
+};
+
+/// What `feed_links` keeps for each feed.
+struct feed_entry {
+    std::weak_ptr<void> handle{}; ///< owns the feed
+    feed_terms terms{};
+    std::weak_ptr<connection> on{};
+    std::string at{};                ///< the URL used last
+    std::uint64_t asking = 0;        ///< the id of its last BIND by datagram
+    std::optional<time_point> due{}; ///< the deadline of a BIND that waits for the node's features
+};
 
 /// What a feed needs of the service.
 class feed_host {
@@ -44,8 +67,12 @@ class feed_host {
     ~feed_host() = default;
 };
 
-/// A feed's state machine: it binds, delivers events, and when the publisher is lost binds again after a pause.
-class feed_machine final : public subscription, private deadline, private renewal::keeper {
+/// A feed's state machine: it binds, renews the lease of a binding by datagram, delivers events, and when the publisher
+/// is lost binds again after a pause. Linked into the list of `feed_links` until it is closed.
+class feed_machine final
+    : public subscription,
+      public boost::intrusive::list_base_hook<boost::intrusive::link_mode<boost::intrusive::auto_unlink>>,
+      private deadline {
   public:
     using event_ptr = feed_mailbox::event_ptr;
 
@@ -58,7 +85,9 @@ class feed_machine final : public subscription, private deadline, private renewa
     /// `mark`: the update that holds the last value, if the publisher says so. If it is new, it is delivered as an
     /// update too.
     void on_bound(std::string_view last, const std::optional<update_mark>& mark = {});
-    /// Bound by datagram: the lease counts from the time the BIND was sent, and is renewed from now on.
+    /// Bound by datagram, with this lease. It counts from the time the BIND was sent, not from the reply, so that it
+    /// never ends at the publisher before it does here. It is renewed after a third of it, or a little earlier at
+    /// random, so that many renewals do not coincide.
     void on_leased(time_point sent_at, std::chrono::milliseconds lease);
     void on_renewed(time_point sent_at);
     void on_renewal_refused(time_point sent_at, boost::system::error_code why, std::string_view message,
@@ -74,6 +103,8 @@ class feed_machine final : public subscription, private deadline, private renewa
     /// The publisher may be reachable again: ends a pause.
     void expedite(time_point now);
 
+    [[nodiscard]] feed_entry& entry() noexcept { return entry_; }
+    [[nodiscard]] const feed_entry& entry() const noexcept { return entry_; }
     /// Its events, until they are fetched.
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
     void close(errc why);
@@ -100,17 +131,21 @@ class feed_machine final : public subscription, private deadline, private renewa
         return mail_.put(event, when);
     }
     void on_deadline(time_point now) override;
-    void renew(time_point until) override { host_.renew(*this, until); }
+    void begin_lease(time_point sent_at);
+    bool renew_later(time_point now);
     void pause(time_point now);
     void take_marked(const std::string& body, const update_mark& mark);
 
     feed_host& host_;
+    feed_entry entry_;
     deadline_queue& deadlines_;
     std::size_t max_line_; // limits::line
     completion_queue& completions_;
     feed_mailbox mail_;
     backoff backoff_;
-    renewal renewal_;
+    jitter jitter_; // of renewals
+    std::chrono::milliseconds lease_{0};
+    time_point lease_end_{};
     time_point bound_at_{}; // when the BIND was sent from which leases count
     state state_ = state::fresh;
     bool was_bound_ = false;

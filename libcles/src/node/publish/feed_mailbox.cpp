@@ -4,6 +4,7 @@
 #include <cles/error.hpp>
 
 #include <algorithm>
+#include <cstddef>
 #include <utility>
 
 namespace cles::core {
@@ -56,12 +57,10 @@ feed_mailbox::event_ptr feed_mailbox::close() {
     return std::move(waiter_);
 }
 
-void feed_queue::forget(const entry& e) noexcept {
+void feed_queue::forget(const kept_event& e) noexcept {
     if (is_value(e)) {
         --values_;
         bytes_ -= e.body.size();
-    } else if (is_status_event(e)) {
-        --status_events_;
     }
 }
 
@@ -83,21 +82,15 @@ void feed_queue::drop_oldest_value() {
     }
 }
 
-void feed_queue::drop_oldest_status_event() {
-    const auto oldest = std::find_if(entries_.begin(), entries_.end(), is_status_event);
-    forget(*oldest);
-    entries_.erase(oldest);
-}
-
 void feed_queue::push(const detail::raw_event& event) {
-    constexpr std::size_t max_status_events = 16;
-    entries_.push_back({event.kind, std::string{event.body}, std::string{event.publisher}, event.seq, event.missed,
-                        std::string{event.text}});
+    constexpr std::ptrdiff_t max_status_events = 16;
+    entries_.emplace_back(event);
     if (is_value(entries_.back())) {
         ++values_;
         bytes_ += event.body.size();
-    } else if (is_status_event(entries_.back()) && ++status_events_ > max_status_events) {
-        drop_oldest_status_event();
+    } else if (is_status_event(entries_.back()) &&
+               std::ranges::count_if(entries_, is_status_event) > max_status_events) {
+        entries_.erase(std::ranges::find_if(entries_, is_status_event));
     }
     while (values_ > max_values_ || (bytes_ > max_bytes_ && values_ > 1)) {
         drop_oldest_value();

@@ -11,7 +11,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
-#include <string>
+#include <utility>
 
 namespace cles::core {
 
@@ -36,39 +36,23 @@ class feed_queue {
         const auto e = std::move(entries_.front());
         entries_.pop_front();
         forget(e);
-        deliver(detail::raw_event{.kind = e.kind,
-                                  .body = e.body,
-                                  .checked = true,
-                                  .publisher = e.publisher,
-                                  .seq = e.seq,
-                                  .missed = e.missed,
-                                  .text = e.text});
+        deliver(e.view());
     }
 
   private:
-    struct entry {
-        feed_event kind;
-        std::string body;
-        std::string publisher;
-        std::uint64_t seq;
-        std::uint64_t missed;
-        std::string text;
-    };
-    static bool is_value(const entry& e) noexcept {
+    static bool is_value(const kept_event& e) noexcept {
         return e.kind == feed_event::update || e.kind == feed_event::current;
     }
-    static bool is_status_event(const entry& e) noexcept {
+    static bool is_status_event(const kept_event& e) noexcept {
         return e.kind == feed_event::lost || e.kind == feed_event::rebound;
     }
-    void forget(const entry& e) noexcept;
+    void forget(const kept_event& e) noexcept;
     void drop_oldest_value();
-    void drop_oldest_status_event();
 
     std::size_t max_values_;
     std::size_t max_bytes_;
-    std::deque<entry> entries_;
+    std::deque<kept_event> entries_;
     std::size_t values_ = 0;
-    std::size_t status_events_ = 0; // lost and rebound
     std::size_t bytes_ = 0;
     std::uint64_t shed_ = 0;
 };

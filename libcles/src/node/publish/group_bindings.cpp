@@ -4,7 +4,8 @@
 #include <cles/error.hpp>
 
 #include "node/base/deadlines.hpp"
-#include "protocol/datagram.hpp"
+#include "node/publish/multicast_group.hpp"
+#include "protocol/request_line.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -17,8 +18,12 @@ constexpr binding::terms group_terms{.every = std::chrono::milliseconds{0}, .kee
 
 } // namespace
 
-group_bindings::group_bindings(node_state& host, group_output& out, std::uint32_t seed)
-    : node_(host), out_(out), jitter_(seed), bound_(host.published, *this) {
+group_bindings::group_bindings(node_state& host, group_port& out, std::uint32_t seed)
+    : node_(host), out_(out), jitter_(seed), bound_(host.published, *this),
+      leases_(host.deadlines, [this](const auto& expired) {
+          ++node_.counts.leases_expired;
+          end(*expired.first, expired.second);
+      }) {
     node_.published.watch(*this);
 }
 
@@ -26,9 +31,10 @@ group_bindings::~group_bindings() { clear(); }
 
 void group_bindings::clear() {
     node_.published.unwatch(*this);
+    leases_.clear();
     nouns_.clear();
-    for (const auto& [source, leases] : of_source_) {
-        node_.counts.group_leases -= leases;
+    for (const auto& [source, count] : of_source_) {
+        node_.counts.group_leases -= count;
     }
     of_source_.clear();
     bound_.clear();
@@ -44,10 +50,11 @@ bool group_bindings::bind(const group_source& from, const protocol::request_line
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
     auto found = nouns_.find(path);
-    const bool known = found != nouns_.end() && found->second->leases.contains(from);
+    const bool known = found != nouns_.end() && leases_.contains({&found->second, from});
     if (r.unbinds()) {
         if (known) {
-            end(*found->second, from);
+            leases_.drop(std::pair{&found->second, from});
+            end(found->second, from);
         }
         return true;
     }
@@ -56,36 +63,31 @@ bool group_bindings::bind(const group_source& from, const protocol::request_line
             return false;
         }
         if (found == nouns_.end()) {
-            found = nouns_.emplace(std::string{path}, std::make_unique<noun>(*this, std::string{path})).first;
+            found = nouns_.try_emplace(std::string{path}, *this, std::string{path}).first;
             if (auto* t = node_.published.find(path)) {
-                attach(*t);
+                bound_.bind(*t, group_terms);
             }
         }
-        found->second->leases.try_emplace(from, *found->second, from);
+        ++found->second.leases;
         ++of_source_[from];
         ++node_.counts.group_leases;
     }
-    auto& n = *found->second;
-    node_.deadlines.arm(n.leases.at(from), saturating_add(now, std::chrono::milliseconds{
-                                                                   r.lease_ms.value_or(protocol::default_lease_ms)}));
+    auto& n = found->second;
+    leases_.set({&n, from},
+                saturating_add(now, std::chrono::milliseconds{r.lease_ms.value_or(protocol::default_lease_ms)}));
     if (!known) {
         repeat_soon(n, r.noun.target == "all", now);
     }
     return true;
 }
 
-void group_bindings::lease::on_deadline(time_point) {
-    ++of.owner.node_.counts.leases_expired;
-    of.owner.end(of, group_source{from}); // destroys this
-}
-
+// The lease is no longer there.
 void group_bindings::end(noun& n, const group_source& from) {
     if (const auto count = of_source_.find(from); --count->second == 0) {
         of_source_.erase(count);
     }
     --node_.counts.group_leases;
-    n.leases.erase(from);
-    if (n.leases.empty()) {
+    if (--n.leases == 0) {
         // Removed from the map first: publishers that waited for this subscriber continue, and may run any user code.
         const auto gone = nouns_.extract(n.path);
         bound_.unbind(gone.key());
@@ -94,11 +96,9 @@ void group_bindings::end(noun& n, const group_source& from) {
 
 void group_bindings::on_opened(topic& made) {
     if (nouns_.contains(made.path())) {
-        attach(made);
+        bound_.bind(made, group_terms);
     }
 }
-
-void group_bindings::attach(topic& t) { bound_.bind(t, group_terms); }
 
 // -- repeating the last update ---------------------------------------------------------------------------------------
 
@@ -138,20 +138,14 @@ void group_bindings::put_updates(std::string_view lines) {
     for (std::size_t at = 0; at < lines.size();) {
         const auto next = lines.find('\n', at) + 1; // updates are whole lines
         if (next - at > protocol::datagram_bytes) {
-            send(lines.substr(begin, at - begin));
+            send_to(out_, node_.counts, lines.substr(begin, at - begin));
             ++node_.counts.updates_too_large;
             note_too_large(lines.substr(at, next - at));
             begin = next;
         }
         at = next;
     }
-    send(lines.substr(begin));
-}
-
-void group_bindings::send(std::string_view lines) {
-    if (!lines.empty()) {
-        out_.send_all(lines);
-    }
+    send_to(out_, node_.counts, lines.substr(begin));
 }
 
 // Nothing else notifies the publisher; an occasional entry is enough.

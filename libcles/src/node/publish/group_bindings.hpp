@@ -4,10 +4,8 @@
 #include "node/base/backoff.hpp"
 #include "node/base/deadlines.hpp"
 #include "node/node_state.hpp"
-#include "node/publish/group_output.hpp"
-#include "node/publish/link_bindings.hpp"
-#include "port/group_source.hpp"
-#include "protocol/datagram.hpp"
+#include "node/publish/binding.hpp"
+#include "port/group_port.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -17,10 +15,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace cles::core {
 
@@ -34,7 +32,7 @@ class group_bindings final : private subscriber, private publications::observer 
     /// The minimum time between two repeats of a noun's last update, and the maximum random delay of one.
     static constexpr std::chrono::milliseconds repeat_apart{250};
 
-    group_bindings(node_state& host, group_output& out, std::uint32_t seed);
+    group_bindings(node_state& host, group_port& out, std::uint32_t seed);
     ~group_bindings();
 
     /// Starts, renews or ends a lease. For a source that is new to the noun, the last update is repeated: after a
@@ -46,44 +44,35 @@ class group_bindings final : private subscriber, private publications::observer 
     void clear();
 
   private:
-    struct noun;
-    struct lease final : deadline {
-        lease(noun& what, const group_source& whose) : of(what), from(whose) {}
-        void on_deadline(time_point now) override;
-
-        noun& of;
-        group_source from;
-    };
     struct noun final : deadline { // armed to repeat its last update
         noun(group_bindings& all, std::string what) : owner(all), path(std::move(what)) {}
         void on_deadline(time_point now) override { owner.repeat(*this, now); }
 
         group_bindings& owner;
         std::string path;
-        std::map<group_source, lease> leases;
+        std::size_t leases = 0;
         std::uint64_t repeat_of = 0; // the update to repeat; a later one replaces it
         std::optional<time_point> repeated_at;
     };
 
     [[nodiscard]] bool has_room_for(const group_source& from) const;
     void end(noun& n, const group_source& from);
-    void attach(topic& t);
     void repeat_soon(noun& n, bool delayed, time_point now);
     void repeat(noun& n, time_point now);
     void note_too_large(std::string_view line);
-    void send(std::string_view lines);
 
     // subscriber
-    [[nodiscard]] bool takes_updates() const override { return out_.has_room(); }
+    [[nodiscard]] bool takes_updates() const override { return out_.unsent() == 0; }
     void put_updates(std::string_view lines) override;
     // publications::observer
     void on_opened(topic& made) override;
 
     node_state& node_;
-    group_output& out_;
+    group_port& out_;
     jitter jitter_;
     link_bindings bound_;
-    std::map<std::string, std::unique_ptr<noun>, std::less<>> nouns_;
+    std::map<std::string, noun, std::less<>> nouns_;
+    leases<std::pair<noun*, group_source>> leases_;
     boost::unordered_flat_map<group_source, std::size_t> of_source_; // number of leases
     std::optional<time_point> noted_at_;
 };

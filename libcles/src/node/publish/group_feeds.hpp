@@ -7,47 +7,38 @@
 #include "node/base/deadlines.hpp"
 #include "node/node_state.hpp"
 #include "node/publish/feed_mailbox.hpp"
-#include "node/publish/group_output.hpp"
-#include "node/publish/sequence_tracker.hpp"
+#include "node/publish/subscription.hpp"
 #include "protocol/request_line.hpp"
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
-#include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
 
-/// A feed that is bound through the multicast group: to one node's noun, or to that of every publisher. New, old and
-/// missing updates are tracked for each publisher separately; beyond the limit, the publisher that has been silent for
-/// longest is forgotten.
-class group_feed {
+class multicast_group;
+
+/// A feed that is bound through the multicast group: to one node's noun, or to that of every publisher.
+class group_feed final : public subscription {
   public:
     /// `target`: a node's name, or "all".
     group_feed(const limits& bounds, completion_queue& completions, std::string target, std::string path)
-        : target_(std::move(target)), path_(std::move(path)), mail_(bounds, completions),
-          publishers_(bounds.publishers) {}
-    group_feed(const group_feed&) = delete;
-    group_feed& operator=(const group_feed&) = delete;
+        : subscription(std::move(target), std::move(path), false, bounds.publishers), mail_(bounds, completions) {}
 
-    [[nodiscard]] const std::string& target() const noexcept { return target_; }
-    [[nodiscard]] const std::string& path() const noexcept { return path_; }
-    [[nodiscard]] bool wants(std::string_view node) const noexcept { return target_ == "all" || target_ == node; }
-    /// The node's next update counts as its first.
-    void forget(std::string_view node) { publishers_.forget(node); }
-    /// Delivers an update that it wants. False if it is old or repeated, or its body is not JSON.
-    bool take(const protocol::request_line& update, feed_mailbox::hand_over when = feed_mailbox::hand_over::now);
+    [[nodiscard]] bool wants(std::string_view node) const noexcept { return target() == "all" || target() == node; }
     [[nodiscard]] feed_mailbox& mail() noexcept { return mail_; }
-    [[nodiscard]] std::size_t publishers() const noexcept { return publishers_.size(); }
 
   private:
-    std::string target_;
-    std::string path_;
+    bool on_event(const detail::raw_event& event, feed_mailbox::hand_over when) override {
+        return mail_.put(event, when);
+    }
+
     feed_mailbox mail_;
-    publisher_sequences publishers_;
 };
 
 /// The feeds of a node that are bound through the multicast group. Sends BIND when the first feed of a noun is added,
@@ -55,7 +46,8 @@ class group_feed {
 /// want it.
 class group_feeds {
   public:
-    group_feeds(node_state& host, group_sender& out, std::uint32_t seed) noexcept;
+    group_feeds(node_state& host, multicast_group& out, std::uint32_t seed) noexcept
+        : node_(host), out_(out), jitter_(seed) {}
 
     /// The feed must live until it is removed.
     void add(group_feed& feed, time_point now);
@@ -75,8 +67,6 @@ class group_feeds {
     [[nodiscard]] bool empty() const noexcept { return by_path_.empty() && bound_.empty(); }
 
   private:
-    class delivery_guard;
-
     struct bound final : deadline { // armed for its renewal
         bound(group_feeds& all, std::string what) : owner(all), noun(std::move(what)) {}
         void on_deadline(time_point now) override { owner.send_bind(*this, now); }
@@ -87,16 +77,14 @@ class group_feeds {
     };
 
     void send_bind(bound& b, time_point now);
-    void send_unbind(const std::string& noun);
-    void release(const group_feed& feed);
+    void unbind(const group_feed& last);
+    [[nodiscard]] bool has(std::string_view path, const group_feed* feed) const;
 
     node_state& node_;
-    group_sender& out_;
+    multicast_group& out_;
     jitter jitter_;
-    std::map<std::string, std::unique_ptr<bound>, std::less<>> bound_;
-    std::map<std::string, std::vector<group_feed*>, std::less<>> by_path_; // null: removed during delivery
-    int depth_ = 0;                                                        // nested deliveries
-    bool holes_ = false;                                                   // there are null entries
+    std::map<std::string, bound, std::less<>> bound_;
+    std::map<std::string, std::vector<group_feed*>, std::less<>> by_path_;
 };
 
 } // namespace cles::core

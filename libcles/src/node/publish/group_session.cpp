@@ -2,13 +2,10 @@
 #include "node/publish/group_session.hpp"
 
 #include "node/base/deadlines.hpp"
-#include "node/publish/bind_requests.hpp"
+#include "node/publish/multicast_group.hpp"
 #include "node/session/request_checks.hpp"
 
-#include <algorithm>
 #include <chrono>
-#include <string>
-#include <utility>
 
 namespace cles::core {
 
@@ -22,22 +19,54 @@ identity identity_of(const group_source& from) {
             .local = from.is_loopback()};
 }
 
+std::pair<group_source, std::string> key_of(const group_source& from, const protocol::request_line& bind) {
+    std::string scratch;
+    return {from, std::string{protocol::canonical_path(bind.noun, scratch)}};
+}
+
 } // namespace
 
-void group_session::on_message(const group_source& from, const protocol::request_line* said, time_point now) {
-    if (dispatcher_.is_own(from)) {
-        return;
+group_session::group_session(std::shared_ptr<node_state> host, multicast_group& group, std::shared_ptr<group_port> port,
+                             std::uint32_t seed)
+    : node_(std::move(host)), group_(group), port_(std::move(port)), bindings_(*node_, *port_, seed) {
+    group_.add(*port_);
+}
+
+group_session::~group_session() {
+    withdraw_all();
+    port_->close();
+}
+
+void group_session::stop() {
+    unbind_all();
+    port_->close();
+}
+
+void group_session::unbind_all() {
+    withdraw_all();
+    bindings_.clear();
+}
+
+void group_session::on_room() {
+    const auto keep = group_.keep_owner();
+    bindings_.drain(node_->time.now());
+}
+
+void group_session::on_datagram(const group_datagram& datagram) {
+    const auto keep = group_.keep_owner();
+    if (!group_.is_own(datagram.from)) {
+        ++node_->counts.group_received;
+        if (datagram.request == nullptr || !serve(datagram.from, *datagram.request, node_->time.now())) {
+            ++node_->counts.group_dropped;
+        }
     }
-    ++node_.counts.group_received;
-    if (said == nullptr || !serve(from, *said, now)) {
-        ++node_.counts.group_dropped;
-    }
+    node_->completions.rethrow();
 }
 
 bool group_session::serve(const group_source& from, const protocol::request_line& request, time_point now) {
     const auto target = request.noun.target;
     if (request.is_update()) {
-        return !protocol::is_reserved_target(target) && dispatcher_.take(from, request, now);
+        return !protocol::is_reserved_target(target) && group_.take(from, request, now);
     }
     return request.verb == verb::bind && (target == "all" || !protocol::is_reserved_target(target)) &&
            on_bind(from, request, now);
@@ -50,32 +79,32 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
         return false;
     }
     const bool by_name = noun.target != "all";
-    if (by_name && noun.target != node_.name) { // for another node
+    if (by_name && noun.target != node_->name) { // for another node
         return true;
     }
     if (!solicits) {
-        return !dispatcher_.is_ignored(from, now) && bind_noun(from, bind, now);
+        return !group_.is_ignored(from, now) && bind_noun(from, bind, now);
     }
-    if (!allows(node_, identity_of(from), bind)) {
+    if (!allows(*node_, identity_of(from), bind)) {
         return false;
     }
-    dispatcher_.solicited(by_name, now);
+    group_.solicited(by_name, now);
     return true;
 }
 
 // Subject to the access rules, and to the handler for BIND if there is one.
 bool group_session::bind_noun(const group_source& from, const protocol::request_line& bind, time_point now) {
     const auto peer = identity_of(from);
-    if (!allows(node_, peer, bind)) {
+    if (!allows(*node_, peer, bind)) {
         return false;
     }
     if (bind.unbinds()) {
-        pending_bindings_.drop(from, bind);
-    } else if (bind_decision::is_needed(node_, bind)) {
-        return pending_bindings_.ask(from, peer, bind, now);
+        withdraw(from, bind);
+    } else if (is_bind_decided_later(*node_, bind)) {
+        return ask(from, peer, bind, now);
     } else {
         try {
-            ask_bind_handler(node_, peer, bind);
+            ask_bind_handler(*node_, peer, bind);
         } catch (...) { // nothing is answered in the group
             return false;
         }
@@ -83,50 +112,41 @@ bool group_session::bind_noun(const group_source& from, const protocol::request_
     return bindings_.bind(from, bind, now);
 }
 
-std::list<pending_group_bindings::waiting>::iterator pending_group_bindings::find(const group_source& from,
-                                                                                  std::string_view path) {
-    return std::find_if(waiting_.begin(), waiting_.end(), [&](const waiting& w) {
-        std::string scratch;
-        return w.from == from && protocol::canonical_path(w.bind->noun, scratch) == path;
-    });
-}
-
-bool pending_group_bindings::ask(const group_source& from, const identity& peer, const protocol::request_line& bind,
-                                 time_point now) {
-    std::string scratch;
-    if (find(from, protocol::canonical_path(bind.noun, scratch)) != waiting_.end()) {
+// Returns false if too many wait. A repeat of one that waits does not count.
+bool group_session::ask(const group_source& from, const identity& peer, const protocol::request_line& bind,
+                        time_point now) {
+    auto key = key_of(from, bind);
+    if (waiting_.contains(key)) {
         return true;
     }
     if (waiting_.size() >= max_pending) {
         return false;
     }
-    const auto place = waiting_.emplace(waiting_.end(), from, peer, bind);
-    const auto decision = std::make_shared<bind_decision>(node_, [this, place](const protocol::failure* why_not) {
-        std::list<waiting> decided; // it may be requested again at once
-        decided.splice(decided.end(), waiting_, place);
-        if (why_not == nullptr) { // otherwise nothing is answered in the group
-            accepted_(place->from, *place->bind);
-        }
-    });
-    place->decision = decision;
-    decision->ask(*place->bind, place->peer, saturating_add(now, std::chrono::milliseconds{bind.deadline_ms}), now);
+    const auto place = waiting_.try_emplace(std::move(key), peer, bind).first;
+    const auto handler =
+        std::make_shared<local_request>(node_, [this, place](std::string_view, const subrequest_failure* why_not) {
+            const auto decided = waiting_.extract(place); // it may be requested again at once
+            // Otherwise nothing is answered in the group.
+            if (why_not == nullptr && !bindings_.bind(decided.key().first, *decided.mapped().bind, node_->time.now())) {
+                ++node_->counts.group_dropped;
+            }
+        });
+    auto& asked = place->second;
+    asked.handler = handler;
+    handler->run(*asked.bind, asked.peer, saturating_add(now, std::chrono::milliseconds{bind.deadline_ms}), now);
     return true;
 }
 
-void pending_group_bindings::drop(const group_source& from, const protocol::request_line& bind) {
-    std::string scratch;
-    const auto found = find(from, protocol::canonical_path(bind.noun, scratch));
-    if (found != waiting_.end()) {
-        std::list<waiting> gone;
-        gone.splice(gone.end(), waiting_, found);
-        gone.front().decision->withdraw();
+// The binding is no longer wanted.
+void group_session::withdraw(const group_source& from, const protocol::request_line& bind) {
+    if (const auto gone = waiting_.extract(key_of(from, bind)); !gone.empty()) {
+        gone.mapped().handler->withdraw();
     }
 }
 
-void pending_group_bindings::clear() {
-    auto gone = std::exchange(waiting_, {});
-    for (const auto& each : gone) {
-        each.decision->withdraw();
+void group_session::withdraw_all() {
+    for (const auto& [key, each] : std::exchange(waiting_, {})) {
+        each.handler->withdraw();
     }
 }
 

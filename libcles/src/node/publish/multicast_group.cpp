@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/publish/multicast_group.hpp"
 
-#include "node/local_node.hpp"
-#include "protocol/datagram.hpp"
+#include <cles/json_reader.hpp>
+
+#include "node/membership/membership.hpp"
+#include "protocol/request_line.hpp"
 
 #include <boost/system/errc.hpp>
 
 #include <algorithm>
 #include <cerrno>
 #include <utility>
-#include <vector>
 
 namespace cles::core {
 namespace {
@@ -25,7 +26,7 @@ error cannot_join(const multicast_options& where, const std::string& interface, 
     return {why, cannot(where, interface) + reason};
 }
 
-std::vector<core::network_interface> interfaces_or_throw(core::environment& by, const multicast_options& where) {
+std::vector<network_interface> interfaces_or_throw(environment& by, const multicast_options& where) {
     try {
         return by.interfaces();
     } catch (const boost::system::system_error& e) {
@@ -35,35 +36,42 @@ std::vector<core::network_interface> interfaces_or_throw(core::environment& by, 
 
 } // namespace
 
-multicast_group::multicast_group(local_node& host, const multicast_options& where, bool insecure)
-    : host_(host), dispatcher_(host.node(), *this, host.environment().random()) {
+multicast_group::multicast_group(std::shared_ptr<node_state> host, std::uint32_t seed, std::weak_ptr<void> owner)
+    : node_(std::move(host)), owner_(std::move(owner)), feeds_(*node_, *this, seed),
+      sources_(node_->peers, node_->bounds.publishers) {}
+
+// -- its interfaces --------------------------------------------------------------------------------------------------
+
+void multicast_group::join(environment& by, const multicast_options& where, bool insecure) {
     check(where);
     if (where.interface == "auto") {
-        join_automatic(where, insecure);
+        join_automatic(by, where, insecure);
     } else {
-        join_all(where, insecure);
+        join_all(by, where, insecure);
     }
 }
 
-void multicast_group::join(const core::network_interface& by, const multicast_options& where, bool insecure) {
-    if (!by.loopback && !insecure) {
-        throw error(errc::insecure_listen, "multicast on '" + by.name +
+void multicast_group::join(environment& by, const network_interface& interface, const multicast_options& where,
+                           bool insecure) {
+    if (!interface.loopback && !insecure) {
+        throw error(errc::insecure_listen, "multicast on '" + interface.name +
                                                "' can be reached from other hosts, and nobody proves who they "
                                                "are; say 'insecure' if that is meant");
     }
-    const auto& place = endpoints_.emplace_back(host_, dispatcher_, by, where);
-    interfaces_ += (interfaces_.empty() ? "" : ", ") + by.name;
-    host_.write_log(log_level::info, host_.node().name + " takes part in " + where.group + ":" +
-                                         std::to_string(where.port) + " on " + by.name + ", sending from " +
-                                         to_text(place.source()));
+    auto port = by.join(interface, where);
+    const auto source = port->source();
+    sessions_.emplace_back(node_, *this, std::move(port), by.random());
+    interfaces_ += (interfaces_.empty() ? "" : ", ") + interface.name;
+    node_->write_log(log_level::info, node_->name + " takes part in " + where.group + ":" + std::to_string(where.port) +
+                                          " on " + interface.name + ", sending from " + to_text(source));
 }
 
 // One interface is enough unless all are required.
-void multicast_group::join_all(const multicast_options& where, bool insecure) {
+void multicast_group::join_all(environment& by, const multicast_options& where, bool insecure) {
     std::vector<error> failures;
     for (const auto& name : interfaces_of(where)) {
         try {
-            join(host_.environment().find_interface(name), where, insecure);
+            join(by, by.find_interface(name), where, insecure);
         } catch (const error& refused) {
             failures.push_back(refused);
         } catch (const boost::system::system_error& e) {
@@ -73,114 +81,176 @@ void multicast_group::join_all(const multicast_options& where, bool insecure) {
             throw error{failures.front()};
         }
     }
-    if (endpoints_.empty()) {
+    if (sessions_.empty()) {
         throw error{failures.front()};
     }
     for (const auto& e : failures) {
-        host_.write_log(log_level::warning, e.message());
+        node_->write_log(log_level::warning, e.message());
     }
 }
 
 // An interface that cannot be joined was not requested by name.
-void multicast_group::join_automatic(const multicast_options& where, bool insecure) {
+void multicast_group::join_automatic(environment& by, const multicast_options& where, bool insecure) {
     std::string left_out;
     auto failure = boost::system::error_code{ENETDOWN, boost::system::system_category()};
-    for (const auto& by : core::automatic(interfaces_or_throw(host_.environment(), where))) {
-        if (endpoints_.size() == multicast_options::most_interfaces) {
-            left_out += (left_out.empty() ? "" : ", ") + by.name;
+    for (const auto& interface : automatic(interfaces_or_throw(by, where))) {
+        if (sessions_.size() == multicast_options::most_interfaces) {
+            left_out += (left_out.empty() ? "" : ", ") + interface.name;
             continue;
         }
         try {
-            join(by, where, insecure);
+            join(by, interface, where, insecure);
         } catch (const error& refused) {
             if (where.required) {
                 throw;
             }
             failure = refused.code();
-            host_.write_log(log_level::warning, refused.message());
+            node_->write_log(log_level::warning, refused.message());
         } catch (const boost::system::system_error& e) {
             failure = e.code();
-            host_.write_log(log_level::warning, cannot_join(where, by.name, failure).message());
+            node_->write_log(log_level::warning, cannot_join(where, interface.name, failure).message());
         }
     }
-    if (endpoints_.empty()) {
+    if (sessions_.empty()) {
         throw error(failure, cannot(where, where.interface) + "no interface of this host can be used");
     }
     if (!left_out.empty()) {
-        host_.write_log(log_level::warning,
-                        "multicast on 'auto' takes " + interfaces_ + ", and leaves out " + left_out);
+        node_->write_log(log_level::warning,
+                         "multicast on 'auto' takes " + interfaces_ + ", and leaves out " + left_out);
     }
 }
 
 void multicast_group::start() {
-    for (auto& each : endpoints_) {
+    for (auto& each : sessions_) {
         each.start();
     }
 }
 
 void multicast_group::stop() {
-    for (auto* feed : dispatcher_.feeds().remove_all()) {
+    for (auto* feed : feeds_.remove_all()) {
         if (auto waiting = feed->mail().close()) {
-            host_.completions().put(core::completion{
-                core::completion::event_failure{std::move(waiting), errc::stopped, "the service has been stopped"}});
+            node_->completions.put(completion{
+                completion::event_failure{std::move(waiting), errc::stopped, "the service has been stopped"}});
         }
     }
-    for (auto& each : endpoints_) {
+    for (auto& each : sessions_) {
         each.stop();
     }
 }
 
-bool multicast_group::send(std::string_view line) {
-    bool sent = false;
-    for (auto& each : endpoints_) {
-        sent = each.send(line) || sent;
+// -- what is sent ----------------------------------------------------------------------------------------------------
+
+bool send_to(group_port& by, counters& counts, std::string_view lines) {
+    if (lines.empty()) {
+        return true;
     }
-    return sent;
-}
-
-group_endpoint::group_endpoint(local_node& host, core::group_dispatcher& dispatcher, const core::network_interface& by,
-                               const multicast_options& where)
-    : host_(host), port_(host.environment().join(by, where)),
-      session_(host.shared_node(), dispatcher, port_->source(), *this, host.environment().random()) {}
-
-group_endpoint::~group_endpoint() { port_->close(); }
-
-void group_endpoint::start() { port_->start(*this); }
-
-void group_endpoint::stop() {
-    session_.unbind_all();
-    port_->close();
-}
-
-bool group_endpoint::send(std::string_view line) {
-    if (line.size() > protocol::datagram_bytes) {
-        ++host_.node().counts.group_unsent;
-        return false;
-    }
-    return put(line);
-}
-
-void group_endpoint::send_all(std::string_view lines) { put(lines); }
-
-// Returns true if everything has been sent or waits for room.
-bool group_endpoint::put(std::string_view lines) {
-    auto& counts = host_.node().counts;
-    const auto taken = port_->send(lines);
+    const auto taken = by.send(lines);
     counts.group_sent += taken.lines;
     const auto left = lines.substr(taken.bytes);
     counts.group_unsent += static_cast<std::uint64_t>(std::ranges::count(left, '\n'));
     return left.empty();
 }
 
-void group_endpoint::on_datagram(const core::group_datagram& datagram) {
-    const auto keep = host_.shared_from_this();
-    session_.on_message(datagram.from, datagram.request, host_.now());
-    keep->completions().rethrow();
+bool multicast_group::send(group_port& by, std::string_view line) {
+    if (line.size() > protocol::datagram_bytes) {
+        ++node_->counts.group_unsent;
+        return false;
+    }
+    return send_to(by, node_->counts, line);
 }
 
-void group_endpoint::on_room() {
-    const auto keep = host_.shared_from_this();
-    session_.bindings().drain(host_.now());
+bool multicast_group::send(std::string_view line) {
+    bool sent = false;
+    for (auto* each : ports_) {
+        sent = send(*each, line) || sent;
+    }
+    return sent;
+}
+
+// -- what arrives ----------------------------------------------------------------------------------------------------
+
+bool multicast_group::is_own(const group_source& from) const noexcept {
+    return std::ranges::any_of(ports_, [&](const auto* port) { return port->source() == from; });
+}
+
+bool multicast_group::is_of_this_host(const group_source& from) const noexcept {
+    return from.is_loopback() ||
+           std::ranges::any_of(ports_, [&](const auto* port) { return port->source().address == from.address; });
+}
+
+void multicast_group::solicited(bool by_name, time_point now) {
+    if (listener_ != nullptr) {
+        listener_->on_solicitation(by_name, now);
+    }
+}
+
+bool multicast_group::take(const group_source& from, const protocol::request_line& update, time_point now) {
+    using verdict = publisher_sources::verdict;
+    const auto& noun = update.noun;
+    if (noun.task == "cles") {
+        return take_announcement(from, update, now);
+    }
+    auto& counts = node_->counts;
+    if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || sources_.is_foreign(from, now)) {
+        ++counts.updates_dropped;
+        return true;
+    }
+    const auto found = sources_.look(noun.target, from, now);
+    if (found == verdict::another) {
+        feeds_.forget(noun.target);
+    }
+    if (found != verdict::refused && feeds_.take(update)) {
+        ++counts.updates_received;
+    } else if (found == verdict::one_of_several) {
+        ++counts.group_repeated;
+    } else {
+        ++counts.updates_dropped;
+    }
+    return true;
+}
+
+bool multicast_group::take_announcement(const group_source& from, const protocol::request_line& update,
+                                        time_point now) {
+    if (!update.noun.parameters.empty() || !is_valid_json(update.body, node_->bounds.depth)) {
+        return false;
+    }
+    if (listener_ != nullptr) {
+        listener_->on_announcement(from, update, now);
+    }
+    return true;
+}
+
+publisher_sources::verdict publisher_sources::look(std::string_view node, const group_source& from, time_point now) {
+    if (const auto* const run = others_.announced(node)) {
+        return !run->sends_from(from)           ? verdict::refused
+               : run->announced.sources.empty() ? verdict::taken
+                                                : verdict::one_of_several;
+    }
+    if (const auto found = source_bindings_.find(node); found != source_bindings_.end()) {
+        const bool same = found->second.to == from;
+        if (!same && now - found->second.heard < silent_after) {
+            return verdict::refused;
+        }
+        found->second = {from, now};
+        return same ? verdict::taken : verdict::another;
+    }
+    if (source_bindings_.size() >= max_entries_ && !source_bindings_.empty()) {
+        source_bindings_.erase(
+            std::min_element(source_bindings_.begin(), source_bindings_.end(),
+                             [](const auto& a, const auto& b) { return a.second.heard < b.second.heard; }));
+    }
+    source_bindings_.emplace(std::string{node}, source_binding{from, now});
+    return verdict::taken;
+}
+
+void publisher_sources::note_foreign(const group_source& from, time_point until) {
+    if (foreign_.size() >= max_entries_ && !foreign_.contains(from)) {
+        foreign_.erase(std::min_element(foreign_.begin(), foreign_.end(),
+                                        [](const auto& a, const auto& b) { return a.second < b.second; }));
+    }
+    if (max_entries_ != 0) {
+        foreign_.insert_or_assign(from, until);
+    }
 }
 
 } // namespace cles::core

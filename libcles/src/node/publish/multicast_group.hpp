@@ -1,80 +1,149 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/limits.hpp>
 #include <cles/multicast.hpp>
 
-#include "node/publish/group_dispatcher.hpp"
-#include "node/publish/group_output.hpp"
+#include "node/node_state.hpp"
+#include "node/publish/group_feeds.hpp"
 #include "node/publish/group_session.hpp"
+#include "port/environment.hpp"
 #include "port/group_port.hpp"
-#include "port/group_source.hpp"
-#include "port/network_interface.hpp"
+#include "protocol/request_line.hpp"
 
+#include <boost/unordered/unordered_flat_map.hpp>
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
 #include <deque>
+#include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::core {
 
-class local_node;
+class membership;
 
-/// A service's endpoint in its multicast group on one interface.
-class group_endpoint final : public core::group_output, private core::group_listener {
+/// Decides from which sources a publisher's updates are accepted in the multicast group: from those of the incarnation
+/// that owns the name (one source for each interface; its announcements list the others). A publisher that does not
+/// announce itself is bound to the source from which it was first received, until that falls silent; no other source
+/// can displace it by sending updates under its name. Sources of other pools are ignored.
+class publisher_sources {
   public:
-    /// Joins the group. \throws boost::system::system_error
-    group_endpoint(local_node& host, core::group_dispatcher& dispatcher, const core::network_interface& by,
-                   const multicast_options& where);
-    ~group_endpoint();
+    static constexpr std::chrono::milliseconds silent_after{3'500};
 
-    /// Starts to receive. Call once.
-    void start();
-    /// Leaves the group. Idempotent.
-    void stop();
-    /// Sends to all nodes of the group that this interface reaches. What is not sent is counted.
-    bool send(std::string_view line) override;
-    void send_all(std::string_view lines) override;
-    [[nodiscard]] bool has_room() const override { return port_->unsent() == 0; }
-    /// The source of what is sent here.
-    [[nodiscard]] const core::group_source& source() const noexcept { return port_->source(); }
+    publisher_sources(const membership& others, std::size_t most) noexcept : others_(others), max_entries_(most) {}
+
+    enum class verdict : std::uint8_t {
+        refused,
+        taken,
+        one_of_several, ///< accepted; the same update may arrive from another of its sources
+        another,        ///< accepted, from another source than before: the known sequence does not apply
+    };
+    /// Decides on an update of that node from this source; accepting it keeps the source binding alive.
+    verdict look(std::string_view node, const group_source& from, time_point now);
+    /// The source belongs to another pool, until then.
+    void note_foreign(const group_source& from, time_point until);
+    [[nodiscard]] bool is_foreign(const group_source& from, time_point now) const noexcept {
+        const auto found = foreign_.find(from);
+        return found != foreign_.end() && found->second > now;
+    }
+    [[nodiscard]] std::size_t size() const noexcept { return source_bindings_.size(); }
 
   private:
-    bool put(std::string_view lines);
-    void on_datagram(const core::group_datagram& datagram) override;
-    void on_room() override;
+    struct source_binding {
+        group_source to;
+        time_point heard{};
+    };
 
-    local_node& host_;
-    std::shared_ptr<core::group_port> port_;
-    core::group_session session_;
+    const membership& others_;
+    std::size_t max_entries_;
+    std::map<std::string, source_binding, std::less<>> source_bindings_; // of those that do not announce themselves
+    boost::unordered_flat_map<group_source, time_point> foreign_;
 };
 
-class local_node;
-
-/// A service's membership in its multicast group: an endpoint on each interface, and one dispatcher for all.
-class multicast_group final : public core::group_sender {
+/// Receives what the group sends about the reserved task.
+class announcement_listener {
   public:
-    /// Joins the group. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's code
-    multicast_group(local_node& host, const multicast_options& where, bool insecure);
+    announcement_listener() = default;
+    announcement_listener(const announcement_listener&) = delete;
+    announcement_listener& operator=(const announcement_listener&) = delete;
+    /// `BIND all:cles`, or `BIND car1:cles` with this node's name: a node looks for others.
+    virtual void on_solicitation(bool by_name, time_point now) = 0;
+    /// `UPDATE car1:cles seq= epoch= {...}` of another node. Its body is valid JSON; views are valid during the call.
+    virtual void on_announcement(const group_source& from, const protocol::request_line& update, time_point now) = 0;
 
+  protected:
+    ~announcement_listener() = default;
+};
+
+/// Sends whole lines, none of them too large, each as one datagram, and counts them. Returns true if everything has
+/// been sent or waits for room.
+bool send_to(group_port& by, counters& counts, std::string_view lines);
+
+/// A node's membership in its multicast group: a session on each interface, and what they have in common. The same
+/// update may arrive on several interfaces, and is accepted once.
+class multicast_group {
+  public:
+    /// `owner` is kept while what arrives is processed.
+    multicast_group(std::shared_ptr<node_state> host, std::uint32_t seed, std::weak_ptr<void> owner = {});
+
+    /// Joins the group. \throws cles::error: `invalid_url`, `insecure_listen`, or the system's code
+    void join(environment& by, const multicast_options& where, bool insecure);
     /// Starts to receive. Call once.
     void start();
     /// Leaves the group and ends the feeds. Idempotent.
     void stop();
-    /// Sends to all nodes of the group, on each interface. False if it was sent on none.
-    bool send(std::string_view line) override;
-    [[nodiscard]] core::group_dispatcher& dispatcher() noexcept { return dispatcher_; }
-    [[nodiscard]] std::deque<group_endpoint>& endpoints() noexcept { return endpoints_; }
     /// The names of the interfaces: "lo, eth0".
     [[nodiscard]] const std::string& interfaces() const noexcept { return interfaces_; }
 
-  private:
-    void join(const core::network_interface& by, const multicast_options& where, bool insecure);
-    void join_all(const multicast_options& where, bool insecure);
-    void join_automatic(const multicast_options& where, bool insecure);
+    /// Adds the port of one interface. It must live until nothing is sent or received any more.
+    void add(group_port& port) { ports_.push_back(&port); }
+    [[nodiscard]] const std::vector<group_port*>& ports() const noexcept { return ports_; }
+    /// Sends a line, its LF included, as one datagram on that interface. False if it was not sent: it is too large, or
+    /// too much is pending. What is not sent is counted.
+    bool send(group_port& by, std::string_view line);
+    /// The same on each interface. False if it was sent on none.
+    bool send(std::string_view line);
+    /// Whether this node sent it itself: the system loops datagrams back for others on this host, and interfaces in the
+    /// same network receive each other's.
+    [[nodiscard]] bool is_own(const group_source& from) const noexcept;
+    /// Whether it comes from this host, as far as that can be determined.
+    [[nodiscard]] bool is_of_this_host(const group_source& from) const noexcept;
 
-    local_node& host_;
-    core::group_dispatcher dispatcher_;
-    std::deque<group_endpoint> endpoints_; // its elements do not move
+    /// `membership` receives what concerns the reserved task from now on; null: nobody. It must outlive this.
+    void set_listener(announcement_listener* membership) noexcept { listener_ = membership; }
+    /// Ignores the source until then: it belongs to another pool.
+    void ignore_until(const group_source& from, time_point until) { sources_.note_foreign(from, until); }
+    [[nodiscard]] bool is_ignored(const group_source& from, time_point now) const noexcept {
+        return sources_.is_foreign(from, now);
+    }
+    /// The feeds that are bound through the group.
+    [[nodiscard]] group_feeds& feeds() noexcept { return feeds_; }
+
+    [[nodiscard]] std::shared_ptr<void> keep_owner() const noexcept { return owner_.lock(); }
+    /// A node looks for others.
+    void solicited(bool by_name, time_point now);
+    /// An update under a node's name. False if it is of the reserved task and malformed.
+    bool take(const group_source& from, const protocol::request_line& update, time_point now);
+
+  private:
+    void join(environment& by, const network_interface& interface, const multicast_options& where, bool insecure);
+    void join_all(environment& by, const multicast_options& where, bool insecure);
+    void join_automatic(environment& by, const multicast_options& where, bool insecure);
+    bool take_announcement(const group_source& from, const protocol::request_line& update, time_point now);
+
+    std::shared_ptr<node_state> node_;
+    std::weak_ptr<void> owner_;
+    std::vector<group_port*> ports_;
+    group_feeds feeds_;
+    publisher_sources sources_;
+    announcement_listener* listener_ = nullptr;
+    std::deque<group_session> sessions_; // its elements do not move
     std::string interfaces_;
 };
 

@@ -6,7 +6,6 @@
 
 #include "node/base/scoped_flag.hpp"
 #include "node/session/reply_writer.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 

@@ -8,37 +8,69 @@
 #include "node/base/memory_budget.hpp"
 #include "node/base/metrics.hpp"
 #include "node/publish/binding.hpp"
-#include "node/publish/update_log.hpp"
 
 #include <boost/intrusive/list.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace cles::core {
 
-class topic;
-
-/// Where a link's peer finds what it binds: the topics that the node publishes, or those that it relays.
-class topic_source {
+/// The last updates of a noun, as the lines sent to its subscribers, in one contiguous buffer.
+///
+/// Each subscriber has a position in it instead of its own queue: publishing costs the same for any number of them, and
+/// what a subscriber has missed is sent as one piece. Lines are numbered from 1, like `seq`.
+class update_log {
   public:
-    topic_source() = default;
-    topic_source(const topic_source&) = delete;
-    topic_source& operator=(const topic_source&) = delete;
+    /// The first line has the number `last` + 1.
+    explicit update_log(std::uint64_t last = 0) noexcept : first_(last + 1) {}
 
-    /// The topic, or null.
-    [[nodiscard]] virtual topic* find(std::string_view path) noexcept = 0;
-    /// A subscriber has gone; the topic may be removed.
-    virtual void release(topic& t) = 0;
-    /// A subscriber has taken its pending updates.
-    virtual void admit(topic& t) = 0;
+    /// Starts a line: append it to the string, without its LF, then call `commit` or `roll_back`.
+    std::string& begin();
+    void commit();
+    void roll_back();
+    /// What has been appended since `begin`.
+    [[nodiscard]] std::string_view pending() const noexcept;
 
-  protected:
-    ~topic_source() = default;
+    /// The number of the newest line; at first, the constructor's `last`.
+    [[nodiscard]] std::uint64_t last() const noexcept { return first_ + sizes() - 1; }
+    /// The number of the oldest line kept.
+    [[nodiscard]] std::uint64_t first() const noexcept { return first_; }
+    /// The lines from `from` to `to`, both included and kept, as one text.
+    [[nodiscard]] std::string_view lines(std::uint64_t from, std::uint64_t to) const noexcept;
+    [[nodiscard]] std::size_t bytes(std::uint64_t from, std::uint64_t to) const noexcept {
+        return lines(from, to).size();
+    }
+    /// Forgets all lines before `from`, but never the newest.
+    void forget_before(std::uint64_t from);
+    /// Forgets all lines. The numbers continue.
+    void clear() noexcept;
+    /// Releases spare memory.
+    void fit();
+    [[nodiscard]] bool empty() const noexcept { return sizes() == 0; }
+    /// Memory in bytes, the line being written and spare capacity included.
+    [[nodiscard]] std::size_t memory() const noexcept {
+        return text_.capacity() + ends_.capacity() * sizeof(std::size_t);
+    }
+
+  private:
+    [[nodiscard]] std::uint64_t sizes() const noexcept { return ends_.size() - head_; }
+    void compact();
+    [[nodiscard]] std::size_t start_of(std::uint64_t number) const noexcept;
+
+    std::string text_;
+    std::size_t text_head_ = 0;     // where the oldest line kept starts
+    std::vector<std::size_t> ends_; // where each line ends in `text_`
+    std::size_t head_ = 0;          // the index of its end in `ends_`
+    std::uint64_t first_ = 1;
+    std::size_t begun_ = 0;
 };
 
 /// What the topics of a node share.
@@ -92,14 +124,18 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     /// Forgets the last update, once every subscriber has it.
     void retire();
 
-    binding& bind(subscriber& target, binding::terms wanted) { return bindings_.bind(target, wanted); }
+    /// Binds a subscriber, or changes the terms of its binding.
+    void bind(subscriber& target, binding::terms wanted);
     /// Returns false if it was not bound.
-    bool unbind(subscriber& target) { return bindings_.unbind(target); }
-    [[nodiscard]] binding* find(const subscriber& target) noexcept { return bindings_.find(target); }
-    [[nodiscard]] topic_bindings& bindings() noexcept { return bindings_; }
+    bool unbind(subscriber& target);
+    [[nodiscard]] binding* find(const subscriber& target) noexcept;
     [[nodiscard]] bool is_bound() const noexcept { return !bindings_.empty(); }
+    /// Sends all subscribers their pending updates, as far as they take them.
+    void drain(time_point now);
+    /// Records the positions after a binding was drained on its own.
+    void refresh() noexcept;
     /// Whether one more update fits into the queue of every subscriber.
-    [[nodiscard]] bool has_room() const noexcept { return bindings_.has_room(); }
+    [[nodiscard]] bool has_room() const noexcept;
 
     struct waiter {
         std::string body;
@@ -111,8 +147,8 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
 
   private:
     friend binding;
-    friend topic_bindings;
     void forget_retired() noexcept;
+    [[nodiscard]] std::uint64_t first_needed() const noexcept;
 
     topic_context shared_;
     std::string path_;
@@ -120,8 +156,13 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     memory_reservation held_;
     bool begun_ = false;
     bool has_value_ = false;
+    bool unthinned_ = false; // some binding takes every update
     std::size_t last_body_at_ = 0;
-    topic_bindings bindings_{*this};
+    std::vector<std::unique_ptr<binding>> bindings_;
+    // Of the bindings that take every update:
+    std::uint64_t slowest_ = 0;    // the last update that each has been sent
+    std::uint64_t room_until_ = 0; // the last number that fits into each one's `keep`
+    std::uint32_t max_keep_ = 0;
     std::deque<waiter> waiters_;
 };
 

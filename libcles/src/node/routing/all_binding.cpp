@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/routing/all_binding.hpp"
 
-#include "node/routing/scatter_gather.hpp"
 #include "node/session/request_checks.hpp"
 
 #include <algorithm>
@@ -12,9 +11,9 @@ namespace cles::core {
 
 all_binding::all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, std::string path,
                          relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due)
-    : routing_(std::move(by)), task_(r.noun.task), path_(std::move(path)), via_(r.via),
+    : deferred_request(std::move(by), std::move(answers), due), task_(r.noun.task), path_(std::move(path)), via_(r.via),
       adverbs_(forwarded_adverbs(r, routing_->host().name)), may_pass_on_(r.hops != 0), wants_mark_(r.wants_mark),
-      place_(place), wanted_(wanted), call_(std::move(answers)), due_(due) {}
+      place_(place), wanted_(wanted) {}
 
 bool all_binding::begin(time_point now) {
     if (begun_) {
@@ -22,7 +21,7 @@ bool all_binding::begin(time_point now) {
     }
     if (routing_->expects_more()) {
         if (!armed()) {
-            routing_->host().deadlines.arm(*this, stop_waiting_at(due_, now));
+            routing_->host().deadlines.arm(*this, stop_waiting_at(reply_due_, now));
         }
         return false;
     }
@@ -36,13 +35,15 @@ void all_binding::bind_known(time_point now) {
         place_.unbind("all", path_);
         return;
     }
-    call_->on_stop([weak = weak_from_this()] {
-        if (const auto self = weak.lock(); self && !self->closed_) {
-            self->place_.unbind("all", self->path_);
-        }
-    });
-    routing_->host().deadlines.arm(*this, answer_by(due_, now));
+    follow_call();
+    routing_->host().deadlines.arm(*this, answer_by(reply_due_, now));
     follow();
+}
+
+void all_binding::withdraw() {
+    if (!closed_) {
+        place_.unbind("all", path_);
+    }
 }
 
 void all_binding::follow() {
@@ -56,7 +57,7 @@ void all_binding::follow() {
         auto& own = parts_[host.name];
         own.asked = false;
         if (const auto* t = place_.take_own_part(path_, wanted_)) {
-            own.last = t->last_body();
+            own.result = t->last_body().empty() ? std::string_view{"{}"} : t->last_body();
             own.mark = t->last_mark();
         }
     }
@@ -86,20 +87,23 @@ void all_binding::follow() {
 void all_binding::join(const std::string& node) {
     parts_[node];
     place_.from()->join(node, path_, adverbs_, weak_from_this(),
-                        [weak = weak_from_this(), node](topic* t, std::string_view last, const protocol::failure& why) {
-                            if (const auto self = weak.lock(); self && !self->closed_) {
-                                self->on_told(node, t, last, why);
+                        [this, weak = weak_from_this(), node](topic* t, std::string_view last,
+                                                              const std::optional<update_mark>& mark,
+                                                              const protocol::failure& why) {
+                            if (const auto self = weak.lock(); self && !closed_) {
+                                on_told(node, t, last, mark, why);
                             }
                         });
 }
 
-void all_binding::on_told(const std::string& node, topic* t, std::string_view last, const protocol::failure& why) {
+void all_binding::on_told(const std::string& node, topic* t, std::string_view last,
+                          const std::optional<update_mark>& mark, const protocol::failure& why) {
     auto& p = parts_[node];
     p.asked = false;
     if (t != nullptr) {
         if (call_ && call_->hold_more(last.size())) {
-            p.last = last.empty() ? std::string{"{}"} : std::string{last};
-            p.mark = place_.from()->mark_of(*t);
+            p.result = last.empty() ? std::string_view{"{}"} : last;
+            p.mark = mark;
         } else if (call_) {
             p.failure = protocol::failure{.code = errc::busy,
                                           .message = node + ": no memory is left for its last value (limits.memory)"};
@@ -135,21 +139,10 @@ void all_binding::answer() {
     }
     const auto self = shared_from_this();
     routing_->host().deadlines.disarm(*this);
-    aggregate_reply text;
-    for (const auto& [node, p] : parts_) {
-        if (p.last) {
-            text.add_result(node, p.last->empty() ? "{}" : std::string_view{*p.last});
-            if (wants_mark_) {
-                text.add_mark(node, p.mark);
-            }
-        } else if (p.failure) {
-            text.add_failure(node, *p.failure);
-        } else {
-            text.add_failure(node, late(node));
-        }
-    }
-    for (auto& [node, p] : parts_) { // not needed for the rest of the binding
-        p.last.reset();
+    aggregate_reply text{wants_mark_};
+    for (auto& [node, p] : parts_) {
+        text.add(node, p);
+        p.result.reset(); // not needed for the rest of the binding
     }
     c->done(text.whole());
 }

@@ -3,11 +3,11 @@
 
 #include "node/base/deadlines.hpp"
 #include "node/publish/topic.hpp"
+#include "node/routing/deferred_request.hpp"
 #include "node/routing/relays.hpp"
 #include "node/routing/request_router.hpp"
 #include "node/session/call.hpp"
 
-#include <cstddef>
 #include <map>
 #include <memory>
 #include <optional>
@@ -18,9 +18,7 @@ namespace cles::core {
 
 /// A noun that one link binds for `all`: at the known publishers, and at each that appears later. The reply contains
 /// the last value of each.
-class all_binding final : public request_router::deferred_request,
-                          private deadline,
-                          public std::enable_shared_from_this<all_binding> {
+class all_binding final : public deferred_request, private deadline {
   public:
     all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, std::string path,
                 relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due);
@@ -34,22 +32,20 @@ class all_binding final : public request_router::deferred_request,
     void close(const all_binding* heir = nullptr);
 
   private:
-    struct part {
-        std::optional<std::string> last{};
-        std::optional<update_mark> mark{};
-        std::optional<protocol::failure> failure{};
+    struct part : node_outcome {
         bool asked = true;  // until it has replied
         bool bound = false; // with a failure too, if there was no memory for its last value
     };
 
     void bind_known(time_point now);
     void join(const std::string& node);
-    void on_told(const std::string& node, topic* t, std::string_view last, const protocol::failure& why);
+    void on_told(const std::string& node, topic* t, std::string_view last, const std::optional<update_mark>& mark,
+                 const protocol::failure& why);
     void on_deadline(time_point now) override;
     void answer_when_whole();
     void answer();
+    void withdraw() override;
 
-    std::shared_ptr<request_router> routing_;
     std::string task_;
     std::string path_;
     std::string via_;
@@ -58,8 +54,6 @@ class all_binding final : public request_router::deferred_request,
     bool wants_mark_;
     relayed_bindings& place_;
     binding::terms wanted_;
-    std::shared_ptr<call> call_;
-    time_point due_;
     std::map<std::string, part, std::less<>> parts_; // by node
     bool begun_ = false;
     bool joining_ = false;

@@ -57,7 +57,7 @@ void load_balancer::gather(const protocol::request_line& r, const std::vector<st
         return;
     }
     for (const auto& o : others_.offers(r.verb, r.noun.task)) {
-        if (o.by->live && o.by->reachable && (r.via.empty() || !is_in_via(r.via, o.by->name)) &&
+        if (o.by->live && o.by->reachable() && (r.via.empty() || !is_in_via(r.via, o.by->name)) &&
             (asked.empty() || !was_asked(o.by->name))) {
             all_.push_back(o.by);
         }

@@ -3,49 +3,21 @@
 
 #include <cles/feed_event.hpp>
 #include <cles/pending.hpp>
+#include <cles/routing.hpp>
 
 #include "node/local_node.hpp"
 #include "node/publish/feed_machine.hpp"
+#include "node/routing/request_router.hpp"
+#include "node/routing/router.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/reply_line.hpp"
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 
 namespace cles::core {
-
-/// A noun of another node, bound for this node's clients.
-class upstream_feed final : private detail::pending_event, public std::enable_shared_from_this<upstream_feed> {
-  public:
-    /// `ended` is called if the noun cannot be bound, and releases this.
-    upstream_feed(std::shared_ptr<local_node> host, std::string node, std::string path, core::feed_events& to,
-                  std::function<void()> ended);
-    ~upstream_feed();
-
-    void begin(std::string_view adverbs);
-    void close();
-
-  private:
-    class first_answer;
-
-    // pending_event: this object always waits for the next event.
-    bool deliver(const detail::raw_event& event) override;
-    void fail(boost::system::error_code code, std::string_view message) override;
-    void discard() noexcept override {}
-    [[nodiscard]] bool calls_user() const noexcept override { return false; }
-
-    void wait();
-    void on_refused(boost::system::error_code code, std::string_view message);
-
-    std::shared_ptr<local_node> host_;
-    core::feed_machine machine_;
-    core::feed_events* to_; // null: closed
-    std::function<void()> ended_;
-};
-
 namespace {
 
 // A request has at most 16 adverbs, and this node writes up to six: id, deadline, progress, urgent, hops, via.
@@ -65,55 +37,6 @@ void append_foreign(std::string& out, const protocol::request_line& r) {
     }
 }
 
-} // namespace
-
-std::string forwarded_adverbs(const protocol::request_line& r, std::string_view own_name) {
-    auto out = "hops=" + std::to_string(r.hops == 0 ? 0 : r.hops - 1) + " via=";
-    if (!r.via.empty()) {
-        out.append(r.via).push_back(',');
-    }
-    out.append(own_name);
-    append_foreign(out, r);
-    return out;
-}
-
-std::uint64_t peer_next_hop::send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
-                                  outbound::progress_function progress) {
-    if (host_.stopped()) {
-        host_.fail_later(std::move(reply), errc::stopped, {});
-        return 0;
-    }
-    return host_.peer_channels().send(r.target(), {}, r, deadline, std::move(reply), std::move(progress));
-}
-
-peer_next_hop::~peer_next_hop() = default;
-
-void peer_next_hop::stop() {
-    for (const auto& [ticket, feed] : std::exchange(feeds_, {})) {
-        feed->close();
-    }
-}
-
-std::uint64_t peer_next_hop::bind(std::string_view node, std::string_view path, std::string_view adverbs,
-                                  core::feed_events& to) {
-    const auto ticket = host_.draw_id();
-    const auto made = std::make_shared<upstream_feed>(host_.shared_from_this(), std::string{node}, std::string{path},
-                                                      to, [this, ticket] { feeds_.erase(ticket); });
-    feeds_.emplace(ticket, made);
-    made->begin(adverbs);
-    return ticket;
-}
-
-void peer_next_hop::unbind(std::uint64_t ticket) {
-    if (const auto held = feeds_.extract(ticket); !held.empty()) {
-        held.mapped()->close();
-    }
-}
-
-void peer_next_hop::cancel(std::uint64_t ticket) { host_.cancel(ticket); }
-
-namespace {
-
 // Updates that the publisher keeps for this node, which stands for many clients and must lose less than any of them.
 constexpr std::uint32_t upstream_keep = 1024;
 
@@ -130,7 +53,34 @@ protocol::failure failure_of(boost::system::error_code code, const std::string& 
     return why;
 }
 
-} // namespace
+/// A noun of another node, bound for this node's clients.
+class upstream_feed final : private detail::pending_event, public std::enable_shared_from_this<upstream_feed> {
+  public:
+    upstream_feed(std::shared_ptr<local_node> host, std::string node, std::string path, feed_events& to)
+        : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
+                                           std::move(node), std::move(path), false, host_->environment().random()),
+          to_(&to) {}
+
+    void begin(std::string_view adverbs);
+    void close();
+
+  private:
+    class first_answer;
+
+    // pending_event: this object always waits for the next event.
+    bool deliver(const detail::raw_event& event) override;
+    void fail(boost::system::error_code, std::string_view) override {}
+    void discard() noexcept override {}
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
+
+    void wait() { static_cast<void>(machine_.mail().next(pending_event_ptr{this})); }
+    void on_refused(boost::system::error_code code, std::string_view message);
+    void release_later();
+
+    std::shared_ptr<local_node> host_;
+    feed_machine machine_;
+    feed_events* to_; // null: closed
+};
 
 class upstream_feed::first_answer final : public detail::pending {
   public:
@@ -156,14 +106,6 @@ class upstream_feed::first_answer final : public detail::pending {
     std::weak_ptr<upstream_feed> to_;
 };
 
-upstream_feed::upstream_feed(std::shared_ptr<local_node> host, std::string node, std::string path,
-                             core::feed_events& to, std::function<void()> ended)
-    : host_(std::move(host)), machine_(host_->feeds(), host_->deadlines(), host_->completions(), host_->bounds(),
-                                       std::move(node), std::move(path), false, host_->environment().random()),
-      to_(&to), ended_(std::move(ended)) {}
-
-upstream_feed::~upstream_feed() { host_->feeds().leave(machine_); }
-
 void upstream_feed::begin(std::string_view adverbs) {
     host_->feeds().enter(machine_, weak_from_this(),
                          {.noun = machine_.target() + ":" + machine_.path(),
@@ -175,29 +117,23 @@ void upstream_feed::begin(std::string_view adverbs) {
     machine_.start(detail::pending_ptr{new first_answer(weak_from_this())});
 }
 
-void upstream_feed::wait() { static_cast<void>(machine_.mail().next(core::pending_event_ptr{this})); }
-
 void upstream_feed::close() {
-    if (std::exchange(to_, nullptr) == nullptr) {
-        return;
+    if (std::exchange(to_, nullptr) != nullptr) {
+        machine_.close(errc::cancelled);
+        release_later();
     }
-    machine_.close(errc::cancelled);
-    host_->feeds().leave(machine_);
-    // It may be closed from inside its own event: callers on the stack still need it.
-    core::post(host_->environment(), [self = shared_from_this()] {});
+}
+
+// It may be closed from inside its own event: callers on the stack still need it.
+void upstream_feed::release_later() {
+    post(host_->environment(), [self = shared_from_this()] {});
 }
 
 void upstream_feed::on_refused(boost::system::error_code code, std::string_view message) {
-    const auto self = shared_from_this();
-    auto* to = std::exchange(to_, nullptr);
-    if (to == nullptr) {
-        return;
+    if (auto* to = std::exchange(to_, nullptr)) {
+        release_later();
+        to->on_refused(failure_of(code, machine_.target(), message));
     }
-    const auto why = failure_of(code, machine_.target(), message);
-    host_->feeds().leave(machine_);
-    core::post(host_->environment(), [self] {});
-    ended_();
-    to->on_refused(why);
 }
 
 bool upstream_feed::deliver(const detail::raw_event& event) {
@@ -214,6 +150,61 @@ bool upstream_feed::deliver(const detail::raw_event& event) {
     return true;
 }
 
-void upstream_feed::fail(boost::system::error_code, std::string_view) {}
+/// Sends the requests of a node's router on the node's channels.
+class peer_next_hop : public next_hop {
+  public:
+    explicit peer_next_hop(local_node& host) noexcept : host_(host) {}
+
+    std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
+                       outbound::progress_function progress) override {
+        if (host_.stopped()) {
+            host_.fail_later(std::move(reply), errc::stopped, {});
+            return 0;
+        }
+        return host_.peer_channels().send(r.target(), {}, r, deadline, std::move(reply), std::move(progress));
+    }
+    void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
+    std::shared_ptr<void> bind(std::string_view node, std::string_view path, std::string_view adverbs,
+                               feed_events& to) override {
+        const auto made =
+            std::make_shared<upstream_feed>(host_.shared_from_this(), std::string{node}, std::string{path}, to);
+        made->begin(adverbs);
+        return {static_cast<void*>(made.get()), [made](void*) { made->close(); }};
+    }
+
+  private:
+    local_node& host_;
+};
+
+/// Routes for a node.
+class node_router final : private peer_next_hop, public request_router {
+  public:
+    explicit node_router(local_node& host)
+        : peer_next_hop(host), request_router(host.shared_node(), *this, host.environment().random(),
+                                              [&host] { host.flush_scheduler().schedule_turn(); }) {}
+};
+
+} // namespace
+
+std::string forwarded_adverbs(const protocol::request_line& r, std::string_view own_name) {
+    auto out = "hops=" + std::to_string(r.hops == 0 ? 0 : r.hops - 1) + " via=";
+    if (!r.via.empty()) {
+        out.append(r.via).push_back(',');
+    }
+    out.append(own_name);
+    append_foreign(out, r);
+    return out;
+}
 
 } // namespace cles::core
+
+namespace cles {
+
+const detail::routing_part* routing() noexcept {
+    static constexpr detail::routing_part part{[](core::local_node& host) -> std::shared_ptr<core::router> {
+        return std::make_shared<core::node_router>(host);
+    }};
+    return &part;
+}
+
+} // namespace cles

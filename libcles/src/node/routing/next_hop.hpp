@@ -9,7 +9,6 @@
 #include "protocol/request_line.hpp"
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -47,12 +46,10 @@ class next_hop {
     /// Cancels a request in progress: its operation completes with `cancelled`, inside the call.
     virtual void cancel(std::uint64_t ticket) = 0;
 
-    /// Binds a noun of another node, and again whenever the binding is lost, until `unbind`. No event is reported
-    /// inside the call. Returns a ticket for `unbind`.
-    virtual std::uint64_t bind(std::string_view node, std::string_view path, std::string_view adverbs,
-                               feed_events& to) = 0;
-    /// No further events are reported.
-    virtual void unbind(std::uint64_t ticket) = 0;
+    /// Binds a noun of another node, and again whenever the binding is lost, until the result is destroyed. No event is
+    /// reported inside the call.
+    [[nodiscard]] virtual std::shared_ptr<void> bind(std::string_view node, std::string_view path,
+                                                     std::string_view adverbs, feed_events& to) = 0;
 
   protected:
     ~next_hop() = default;
@@ -61,29 +58,5 @@ class next_hop {
 /// The adverbs of a forwarded request, except those that are members of `outgoing_request`: `hops` less one, `via` with
 /// this node's name, and those that this version does not know.
 std::string forwarded_adverbs(const protocol::request_line& request, std::string_view own_name);
-
-class local_node;
-
-class upstream_feed;
-
-/// Sends the requests of a service's router on its channels.
-class peer_next_hop final : public core::next_hop {
-  public:
-    explicit peer_next_hop(local_node& host) noexcept : host_(host) {}
-    ~peer_next_hop();
-    /// Closes all feeds.
-    void stop();
-
-    std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
-                       outbound::progress_function progress) override;
-    void cancel(std::uint64_t ticket) override;
-    std::uint64_t bind(std::string_view node, std::string_view path, std::string_view adverbs,
-                       core::feed_events& to) override;
-    void unbind(std::uint64_t ticket) override;
-
-  private:
-    local_node& host_;
-    std::map<std::uint64_t, std::shared_ptr<upstream_feed>> feeds_;
-};
 
 } // namespace cles::core

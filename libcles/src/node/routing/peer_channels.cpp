@@ -2,9 +2,11 @@
 #include "node/routing/peer_channels.hpp"
 
 #include "node/local_node.hpp"
+#include "node/publish/feed_machine.hpp"
 #include "protocol/grammar.hpp"
 
-#include <iterator>
+#include <algorithm>
+#include <optional>
 #include <utility>
 
 namespace cles::core {
@@ -19,18 +21,197 @@ constexpr std::string_view urgent_suffix{"\0urgent", 7};
 
 } // namespace
 
+// -- one channel ---------------------------------------------------------------------------------------------------
+
+std::shared_ptr<connection> peer_channel::usable_link(const feed_machine* feed) const {
+    for (const auto& c : links_) {
+        if (c->usable() && (feed == nullptr || c->session().bound().admits(*feed))) {
+            return c;
+        }
+    }
+    return nullptr;
+}
+
+void peer_channel::send(const protocol::outgoing_request& r, time_point deadline, time_point now,
+                        detail::pending_ptr operation, outbound::progress_function progress) {
+    if (const auto c = usable_link()) {
+        c->session().asking().send(r, deadline, now, std::move(operation), std::move(progress));
+        return;
+    }
+    constexpr std::size_t around = 512; // overhead besides the text, roughly
+    memory_reservation held{host_->node().kept_requests};
+    const auto bytes = r.size() + around;
+    if (r.is_reserved()) {
+        held.resize(bytes);
+    } else if (!held.try_resize(bytes)) {
+        host_->fail_later(std::move(operation), errc::busy,
+                          "too much waits for a link to " + address_ + " or others (limits.memory)",
+                          std::move(progress));
+        return;
+    }
+    auto w = std::make_unique<waiting_request>(*this, r);
+    w->memory = std::move(held);
+    w->operation = std::move(operation);
+    w->progress = std::move(progress);
+    host_->deadlines().arm(*w, deadline);
+    requests_.push_back(std::move(w));
+    dial();
+}
+
+bool peer_channel::cancel(std::uint64_t id) {
+    const auto found =
+        std::find_if(requests_.begin(), requests_.end(), [id](const auto& w) { return w->request.id == id; });
+    if (found == requests_.end()) {
+        return false;
+    }
+    fail(found, errc::cancelled, "the request was withdrawn");
+    return true;
+}
+
+void peer_channel::waiting_request::on_deadline(time_point) {
+    auto& all = owner->requests_;
+    const auto found = std::find_if(all.begin(), all.end(), [this](const auto& w) { return w.get() == this; });
+    owner->fail(found, errc::deadline, "no link to " + owner->address_ + " came about in time"); // destroys this
+}
+
+void peer_channel::fail(waiting_requests::iterator which, errc code, std::string_view message) {
+    auto operation = std::move((*which)->operation);
+    auto report = std::move((*which)->progress);
+    requests_.erase(which);
+    host_->completions().fail(std::move(operation), code, message, std::move(report));
+}
+
+void peer_channel::connect(feed_machine& feed, ready_function ready) {
+    if (const auto c = usable_link(&feed)) {
+        ready(c, {}, {});
+        return;
+    }
+    feeds_.push_back({&feed, std::move(ready)});
+    dial();
+}
+
+void peer_channel::forget(const feed_machine& feed) {
+    feeds_.remove_if([&](const waiting_feed& f) { return f.feed == &feed; });
+}
+
+void peer_channel::drop(const connection& c) {
+    std::erase_if(links_, [&](const auto& held) { return held.get() == &c; });
+}
+
+void peer_channel::release() {
+    for (const auto& c : std::vector{links_}) {
+        if (c->usable() && c->is_idle()) {
+            c->finish();
+        }
+    }
+    std::erase_if(links_, [](const auto& c) { return !c->usable(); });
+}
+
+void peer_channel::dial() {
+    if (give_up_ || !where_) {
+        return;
+    }
+    give_up_ = host_->environment().dial(*where_, host_->bounds(),
+                                         [weak = weak_from_this()](boost::system::error_code code, link_ptr made) {
+                                             if (const auto self = weak.lock()) {
+                                                 self->on_dialled(code, std::move(made));
+                                             } else if (made) {
+                                                 made->close();
+                                             }
+                                         });
+}
+
+void peer_channel::on_dialled(boost::system::error_code code, link_ptr made) {
+    const auto keep = shared_from_this();
+    give_up_ = nullptr;
+    if (code) {
+        fail(code, "cannot connect to " + address_ + ": " + code.message());
+    } else {
+        const auto c = host_->connections().adopt(std::move(made), connection::origin::dialled);
+        links_.push_back(c);
+        serve_waiting(c);
+    }
+}
+
+void peer_channel::serve_waiting(const std::shared_ptr<connection>& c) {
+    const auto now = host_->now();
+    for (auto requests = std::exchange(requests_, {}); !requests.empty(); requests.pop_front()) {
+        auto& w = *requests.front();
+        w.memory.resize(0); // the link accounts for it now
+        c->session().asking().send(w.request, w.due(), now, std::move(w.operation), std::move(w.progress));
+    }
+    for (auto feeds = std::exchange(feeds_, {}); !feeds.empty(); feeds.pop_front()) {
+        auto& next = feeds.front();
+        if (const auto free = usable_link(next.feed)) {
+            next.ready(free, {}, {});
+        } else {
+            feeds_.push_back(std::move(next));
+        }
+    }
+    if (!feeds_.empty()) {
+        dial();
+    }
+}
+
+void peer_channel::hand_over(peer_channel& channel) {
+    if (idle()) {
+        return;
+    }
+    for (const auto& w : requests_) {
+        w->owner = &channel;
+    }
+    channel.requests_.splice(channel.requests_.end(), requests_);
+    channel.feeds_.splice(channel.feeds_.end(), feeds_);
+    if (const auto c = channel.usable_link()) {
+        channel.serve_waiting(c);
+    } else {
+        channel.dial();
+    }
+}
+
+void peer_channel::fail(boost::system::error_code code, std::string_view message) {
+    const auto feeds = std::exchange(feeds_, {});
+    for (const auto& w : std::exchange(requests_, {})) {
+        host_->completions().fail(std::move(w->operation), code, message, std::move(w->progress));
+    }
+    for (const auto& f : feeds) {
+        f.ready(nullptr, code, message);
+    }
+}
+
+void peer_channel::stop() {
+    if (const auto give_up = std::exchange(give_up_, nullptr)) {
+        give_up();
+    }
+    feeds_.clear();
+    links_.clear();
+    for (const auto& w : std::exchange(requests_, {})) {
+        host_->fail_later(std::move(w->operation), errc::stopped, "the service has been stopped",
+                          std::move(w->progress));
+    }
+}
+
+// -- all channels --------------------------------------------------------------------------------------------------
+
 void peer_channels::set_peer(std::string_view name, std::string_view where) {
     if (!protocol::is_name(name) || protocol::is_reserved_target(name)) {
         throw error(errc::invalid_name, protocol::quoted(name) + " is not a node's name");
     }
-    if (!where.empty()) {
-        const auto address = parse_url(where);
-        if (!host_.environment().has_transport(address.scheme)) {
-            throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
-        }
+    if (where.empty()) {
+        directory_.erase(std::string{name});
+    } else {
+        checked_url(where);
+        directory_.insert_or_assign(std::string{name}, std::string{where});
     }
-    directory_.set(name, where);
     on_address_changed(name);
+}
+
+url peer_channels::checked_url(std::string_view where) const {
+    auto address = parse_url(where);
+    if (!host_.environment().has_transport(address.scheme)) {
+        throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
+    }
+    return address;
 }
 
 peer_channel* peer_channels::to(std::string_view target, std::string_view at, bool urgent,
@@ -67,8 +248,8 @@ std::string peer_channels::address_of(std::string_view target) const {
     if (target == "self" || target == own_name || routed) {
         return "inproc://" + listeners.self_endpoint();
     }
-    if (const auto configured = directory_.find(target); !configured.empty()) {
-        return std::string{configured};
+    if (const auto configured = directory_.find(target); configured != directory_.end()) {
+        return configured->second;
     }
     if (const auto endpoint = listeners.shared_endpoint(target); host_.environment().is_open(endpoint)) {
         return "inproc://" + endpoint;
@@ -80,8 +261,9 @@ std::string peer_channels::address_of(std::string_view target) const {
     }
     const auto unknown = own_name + " cannot find '" + std::string{target} + "': ";
     const auto& discovery = host_.discovery();
-    if (const auto heard = discovery.address_of(target); heard && !discovery.expects_more_of(target)) {
-        if (const auto second = discovery.conflicting_endpoint_of(target)) {
+    const auto& peers = host_.node().peers;
+    if (const auto heard = peers.address_of(target); heard && !discovery.expects_more_of(target)) {
+        if (const auto second = peers.conflicting_endpoint_of(target)) {
             throw error(errc::no_target, "there are two nodes that call themselves '" + std::string{target} + "', at " +
                                              std::string{*heard} + " and at " + std::string{*second} +
                                              ": give the URL of one");
@@ -106,16 +288,11 @@ peer_channel* peer_channels::find(std::string_view target, std::string_view at, 
         if (const auto found = channels_.find(key); found != channels_.end()) {
             return found->second.get();
         }
-        std::shared_ptr<peer_channel> made;
+        const auto where = waits ? std::nullopt : std::optional{checked_url(address)};
+        auto made = std::make_shared<peer_channel>(host_.shared_from_this(),
+                                                   where ? to_string(*where) : std::string{target}, where);
         if (waits) {
-            made = std::make_shared<peer_channel>(host_.shared_from_this(), target);
             host_.discovery().solicit(target);
-        } else {
-            const auto where = parse_url(address);
-            if (!host_.environment().has_transport(where.scheme)) {
-                throw error(errc::unknown_scheme, "'" + where.scheme + "' in '" + address + "'");
-            }
-            made = std::make_shared<peer_channel>(host_.shared_from_this(), where);
         }
         if (channels_.size() >= max_channels_before_cleanup) { // many may lead to nodes that no longer exist
             std::erase_if(channels_, [](const auto& entry) { return entry.second->idle(); });
@@ -166,7 +343,7 @@ bool peer_channels::cancel(std::uint64_t id) {
     return false;
 }
 
-void peer_channels::forget(const core::feed_machine& feed) {
+void peer_channels::forget(const feed_machine& feed) {
     for (const auto& [where, r] : channels_) {
         r->forget(feed);
     }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/line_link.hpp>
 #include <cles/pending.hpp>
 
-#include "node/routing/peer_channel.hpp"
+#include "node/base/deadlines.hpp"
+#include "node/base/memory_budget.hpp"
 #include "node/session/connection.hpp"
 #include "node/session/outbound.hpp"
 #include "protocol/request_line.hpp"
@@ -12,40 +14,89 @@
 
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace cles::core {
 
-/// The configured URLs of nodes.
-class directory {
+class feed_machine;
+class local_node;
+
+/// The channel to one URL: its links, opened when needed, and what waits for one.
+class peer_channel : public std::enable_shared_from_this<peer_channel> {
   public:
-    /// An empty URL removes the node.
-    void set(std::string_view name, std::string_view url) {
-        if (url.empty()) {
-            if (const auto found = urls_.find(name); found != urls_.end()) {
-                urls_.erase(found);
-            }
-        } else {
-            urls_.insert_or_assign(std::string{name}, std::string{url});
-        }
-    }
-    /// Empty if the node has no URL.
-    [[nodiscard]] std::string_view find(std::string_view name) const noexcept {
-        const auto found = urls_.find(name);
-        return found == urls_.end() ? std::string_view{} : std::string_view{found->second};
+    /// Without a URL, to a node that is not discovered yet: holds its requests until `hand_over` or `fail`.
+    peer_channel(std::shared_ptr<local_node> host, std::string address, std::optional<url> where)
+        : host_(std::move(host)), address_(std::move(address)), where_(std::move(where)) {}
+
+    /// Receives a link, or null with an error code and a message.
+    using ready_function =
+        std::function<void(const std::shared_ptr<connection>&, boost::system::error_code, std::string_view)>;
+    /// Sends a request on an open link, or as soon as there is one; see `outbound::send`.
+    void send(const protocol::outgoing_request& r, time_point deadline, time_point now, detail::pending_ptr operation,
+              outbound::progress_function progress);
+    /// Cancels a request that waits for its link. Returns false if there is none with that id.
+    bool cancel(std::uint64_t id);
+    /// Calls `ready` with a link on which the feed's noun is not bound yet; no longer after `forget`.
+    void connect(feed_machine& feed, ready_function ready);
+    void forget(const feed_machine& feed);
+    /// Moves what waits here to another channel.
+    void hand_over(peer_channel& channel);
+    /// Fails what waits here, because there is no link.
+    void fail(boost::system::error_code code, std::string_view message);
+    /// `c` was lost or can no longer be used.
+    void drop(const connection& c);
+    /// Closes idle links.
+    void release();
+    /// Stops dialling, and fails the waiting requests, none inside the call.
+    void stop();
+
+    [[nodiscard]] const std::string& address() const noexcept { return address_; }
+    /// Whether it can be removed without loss.
+    [[nodiscard]] bool idle() const noexcept {
+        return links_.empty() && requests_.empty() && feeds_.empty() && !give_up_;
     }
 
   private:
-    std::map<std::string, std::string, std::less<>> urls_;
+    /// A request that waits for a link, at most until its deadline.
+    struct waiting_request final : deadline {
+        waiting_request(peer_channel& channel, const protocol::outgoing_request& r)
+            : owner(&channel), request(copy_text(r, text)) {}
+        void on_deadline(time_point now) override;
+
+        peer_channel* owner;
+        std::string text; // of the request
+        protocol::outgoing_request request;
+        detail::pending_ptr operation;
+        memory_reservation memory;
+        outbound::progress_function progress;
+    };
+    struct waiting_feed {
+        feed_machine* feed;
+        ready_function ready;
+    };
+    using waiting_requests = std::list<std::unique_ptr<waiting_request>>;
+
+    /// An open link, on which `feed` can be bound if it is not null.
+    [[nodiscard]] std::shared_ptr<connection> usable_link(const feed_machine* feed = nullptr) const;
+    void dial();
+    void on_dialled(boost::system::error_code code, link_ptr made);
+    void serve_waiting(const std::shared_ptr<connection>& c);
+    void fail(waiting_requests::iterator which, errc code, std::string_view message);
+
+    std::shared_ptr<local_node> host_;
+    std::string address_;      // its URL, or the node
+    std::optional<url> where_; // nothing: not known yet
+    std::vector<std::shared_ptr<connection>> links_;
+    waiting_requests requests_;
+    std::list<waiting_feed> feeds_; // that wait for a link
+    std::function<void()> give_up_; // set while a link is being opened
 };
-
-class feed_machine;
-
-class local_node;
 
 /// The channels of a service, and which of them leads to a node: first the configured URL, then a service on the same
 /// context, then the address that the node itself announces.
@@ -71,7 +122,7 @@ class peer_channels {
     /// Cancels a request that waits for its link. Returns false if there is none with that id.
     bool cancel(std::uint64_t id);
     /// The feed no longer waits for a link.
-    void forget(const core::feed_machine& feed);
+    void forget(const feed_machine& feed);
     /// `c` was lost or can no longer be used.
     void drop(const connection& c);
     /// No requests follow at that URL for a while: closes its idle links.
@@ -81,11 +132,12 @@ class peer_channels {
 
   private:
     [[nodiscard]] std::string address_of(std::string_view target) const;
+    url checked_url(std::string_view where) const;
     peer_channel* find(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
                        std::string& why);
 
     local_node& host_;
-    core::directory directory_;
+    std::map<std::string, std::string, std::less<>> directory_;                  // the configured URLs, by node
     std::map<std::string, std::shared_ptr<peer_channel>, std::less<>> channels_; // by URL, and whether urgent
     std::string recent_target_; // most requests have the same target as the last
     peer_channel* recent_ = nullptr;

@@ -2,6 +2,7 @@
 #include "node/routing/query_scheduler.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 namespace cles::core {
@@ -53,44 +54,30 @@ query_target* query_scheduler::next(time_point now) {
     if (asked_ >= at_once || now < open_at()) {
         return nullptr;
     }
-    newest_next_ = !newest_next_;
-    if (newest_next_) {
-        auto* found = newest_fresh(now);
-        return found != nullptr ? found : take_waiting(now);
+    newest_ = !newest_;
+    auto* found = newest_ ? take_fresh(now) : take_waiting(now);
+    if (found == nullptr) {
+        found = newest_ ? take_waiting(now) : take_fresh(now);
     }
-    auto* found = take_waiting(now);
-    return found != nullptr ? found : oldest_fresh(now);
+    return found;
 }
 
-query_target* query_scheduler::newest_fresh(time_point now) {
+// The newest, or the oldest if the waiting ones came first. Those whose URL is known to fail wait there with the
+// others.
+query_target* query_scheduler::take_fresh(time_point now) {
     while (!fresh_.empty()) {
-        if (auto* found = take_fresh(*fresh_.rbegin()->second, now)) {
-            return found;
+        ++steps_;
+        const auto which = newest_ ? std::prev(fresh_.end()) : fresh_.begin();
+        auto& who = *which->second;
+        fresh_.erase(which);
+        auto& e = at(who);
+        if (e.failures == 0) {
+            mark_asked(who, e);
+            return &who;
         }
-    }
-    return nullptr;
-}
-
-query_target* query_scheduler::oldest_fresh(time_point now) {
-    while (!fresh_.empty()) {
-        if (auto* found = take_fresh(*fresh_.begin()->second, now)) {
-            return found;
-        }
-    }
-    return nullptr;
-}
-
-// Null if its URL is known to fail: then it waits there with the others.
-query_target* query_scheduler::take_fresh(query_target& who, time_point now) {
-    ++steps_;
-    fresh_.erase(who.order_);
-    auto& e = at(who);
-    if (e.failures != 0) {
         wait(who, now);
-        return nullptr;
     }
-    mark_asked(who, e);
-    return &who;
+    return nullptr;
 }
 
 query_target* query_scheduler::take_waiting(time_point now) {

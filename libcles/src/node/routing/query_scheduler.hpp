@@ -81,9 +81,7 @@ class query_scheduler {
     void release(const query_target& who);
     void forget_idle(time_point now);
     void mark_asked(query_target& who, endpoint& e);
-    query_target* newest_fresh(time_point now);
-    query_target* oldest_fresh(time_point now);
-    query_target* take_fresh(query_target& who, time_point now);
+    query_target* take_fresh(time_point now);
     query_target* take_waiting(time_point now);
 
     std::map<std::uint64_t, query_target*> fresh_; // not asked since it was entered, the newest last
@@ -93,7 +91,7 @@ class query_scheduler {
     time_point debt_ = time_point::min() + burst; // grows with each failure, and shrinks with time
     std::uint64_t last_order_ = 0;
     std::uint64_t steps_ = 0;
-    bool newest_next_ = false;
+    bool newest_ = false; // the last turn was that of the newest
 };
 
 } // namespace cles::core

@@ -8,6 +8,15 @@
 #include <utility>
 
 namespace cles::core {
+namespace {
+
+std::string noun_of(std::string_view node, std::string_view path) { return std::string{node}.append(":").append(path); }
+
+bool has(const std::vector<std::string>& all, std::string_view one) {
+    return std::find(all.begin(), all.end(), one) != all.end();
+}
+
+} // namespace
 
 class relays::relay final : public feed_events {
   public:
@@ -21,11 +30,12 @@ class relays::relay final : public feed_events {
     relay& operator=(const relay&) = delete;
 
     void start(std::string_view node, std::string_view path, std::string_view adverbs) {
-        ticket_ = owner_.out_.bind(node, path, adverbs, *this);
+        upstream_ = owner_.out_.bind(node, path, adverbs, *this);
     }
+    void stop() { upstream_.reset(); }
     void join(const std::weak_ptr<const void>& whose, told tell) {
         if (bound_) {
-            tell(&topic_, last_value(), {});
+            tell(&topic_, last_value(), mark(), {});
             return;
         }
         if (waiting_.size() == waiting_.capacity()) { // instead of growing: removes those that have given up
@@ -34,9 +44,7 @@ class relays::relay final : public feed_events {
         waiting_.push_back({whose, std::move(tell)});
     }
 
-    [[nodiscard]] std::optional<update_mark> mark() const { return fresh_ ? std::nullopt : topic_.last_mark(); }
     [[nodiscard]] topic& subject() noexcept { return topic_; }
-    [[nodiscard]] std::uint64_t ticket() const noexcept { return ticket_; }
     [[nodiscard]] bool is_wanted() const noexcept { return topic_.is_bound() || !waiting_.empty() || telling_; }
 
   private:
@@ -53,7 +61,7 @@ class relays::relay final : public feed_events {
         telling_ = true;
         for (const auto& w : std::exchange(waiting_, {})) {
             if (!w.whose.expired()) {
-                w.tell(&topic_, last_, {});
+                w.tell(&topic_, last_, mark(), {});
             }
         }
         telling_ = false;
@@ -61,7 +69,7 @@ class relays::relay final : public feed_events {
             forget_last();
         }
         if (!is_wanted()) {
-            owner_.close(*this);
+            owner_.all_.erase(topic_.path());
         }
     }
     void on_refused(const protocol::failure& why) override {
@@ -69,7 +77,7 @@ class relays::relay final : public feed_events {
         const auto held = owner_.all_.extract(topic_.path());
         for (const auto& w : waiting) {
             if (!w.whose.expired()) {
-                w.tell(nullptr, {}, why);
+                w.tell(nullptr, {}, {}, why);
             }
         }
     }
@@ -90,11 +98,13 @@ class relays::relay final : public feed_events {
     }
     /// Of the last update, or of the reply to BIND if that is newer.
     [[nodiscard]] std::string_view last_value() const noexcept { return fresh_ ? last_ : topic_.last_body(); }
+    /// Which update that is, if it is known.
+    [[nodiscard]] std::optional<update_mark> mark() const { return fresh_ ? std::nullopt : topic_.last_mark(); }
 
     relays& owner_;
     topic topic_;
-    std::uint64_t ticket_ = 0;
-    bool bound_ = false; // it was bound, and will be again if it is lost
+    std::shared_ptr<void> upstream_; // its binding at the other node
+    bool bound_ = false;             // it was bound, and will be again if it is lost
     bool telling_ = false;
     bool fresh_ = false;
     std::string last_;
@@ -106,30 +116,32 @@ relays::relays(node_state& host, next_hop& out) : node_(host), out_(out) {}
 
 relays::~relays() = default;
 
+void relays::stop() {
+    stopped_ = true;
+    for (const auto& [noun, r] : all_) {
+        r->stop();
+    }
+}
+
 void relays::join(std::string_view node, std::string_view path, std::string_view adverbs,
                   const std::weak_ptr<const void>& whose, told tell) {
-    const auto noun = std::string{node} + ":" + std::string{path};
+    const auto noun = noun_of(node, path);
     auto at = all_.find(noun);
     if (at != all_.end()) {
         at->second->join(whose, std::move(tell));
         return;
     }
     if (all_.size() >= node_.bounds.nouns || stopped_) {
-        tell(nullptr, {}, {.code = errc::busy, .message = "as many nouns are passed on as may be"});
+        tell(nullptr, {}, {}, {.code = errc::busy, .message = "as many nouns are passed on as may be"});
         return;
     }
     if (!node_.kept_values->has_room(1)) {
-        tell(nullptr, {}, no_memory(node_));
+        tell(nullptr, {}, {}, no_memory(node_));
         return;
     }
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
     at->second->join(whose, std::move(tell));
     at->second->start(node, path, adverbs);
-}
-
-std::optional<update_mark> relays::mark_of(const topic& t) const {
-    const auto at = all_.find(t.path());
-    return at == all_.end() ? std::nullopt : at->second->mark();
 }
 
 topic* relays::find(std::string_view noun) noexcept {
@@ -140,26 +152,9 @@ topic* relays::find(std::string_view noun) noexcept {
 void relays::release(topic& t) {
     const auto at = all_.find(t.path());
     if (at != all_.end() && !at->second->is_wanted()) {
-        close(*at->second);
+        all_.erase(at);
     }
 }
-
-void relays::close(relay& r) {
-    const auto held = all_.extract(r.subject().path());
-    if (!stopped_) {
-        out_.unbind(r.ticket());
-    }
-}
-
-namespace {
-
-std::string noun_of(std::string_view node, std::string_view path) { return std::string{node}.append(":").append(path); }
-
-bool has(const std::vector<std::string>& all, std::string_view one) {
-    return std::find(all.begin(), all.end(), one) != all.end();
-}
-
-} // namespace
 
 relayed_bindings::~relayed_bindings() { clear(); }
 
@@ -171,33 +166,32 @@ void relayed_bindings::bind(std::string_view node, std::string_view path, std::s
     });
     auto noun = noun_of(node, path);
     asking_.push_back({noun, c});
-    from_->join(node, path, adverbs, c,
-                [this, weak = std::weak_ptr{c}, wanted, wants_mark, noun](topic* t, std::string_view last,
-                                                                          const protocol::failure& why) {
-                    const auto waits = weak.lock();
-                    if (!waits || waits->ended()) { // `this` may have been destroyed with its link
-                        return;
-                    }
-                    if (t == nullptr) {
-                        waits->fail(why);
-                        return;
-                    }
-                    if (!waits->can_answer(last.size())) {
-                        waits->fail(
-                            {.code = errc::busy, .message = "no memory is left for the answer (limits.memory)"});
-                        return;
-                    }
-                    // Bound before the reply, which may trigger other requests of the peer; updates follow the reply
-                    // later.
-                    bound_.bind(*t, wanted);
-                    if (!has(by_name_, noun)) {
-                        by_name_.push_back(noun);
-                    }
-                    if (wants_mark) {
-                        waits->set_head(protocol::mark_text(from_->mark_of(*t)));
-                    }
-                    waits->done(last);
-                });
+    from_->join(
+        node, path, adverbs, c,
+        [this, weak = std::weak_ptr{c}, wanted, wants_mark,
+         noun](topic* t, std::string_view last, const std::optional<update_mark>& mark, const protocol::failure& why) {
+            const auto waits = weak.lock();
+            if (!waits || waits->ended()) { // `this` may have been destroyed with its link
+                return;
+            }
+            if (t == nullptr) {
+                waits->fail(why);
+                return;
+            }
+            if (!waits->can_answer(last.size())) {
+                waits->fail({.code = errc::busy, .message = "no memory is left for the answer (limits.memory)"});
+                return;
+            }
+            // Bound before the reply, which may trigger other requests of the peer; updates follow the reply later.
+            bound_.bind(*t, wanted);
+            if (!has(by_name_, noun)) {
+                by_name_.push_back(noun);
+            }
+            if (wants_mark) {
+                waits->set_head(protocol::mark_text(mark));
+            }
+            waits->done(last);
+        });
 }
 
 bool relayed_bindings::binds(std::string_view target, std::string_view path) {

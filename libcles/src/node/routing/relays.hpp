@@ -3,7 +3,6 @@
 
 #include "node/base/metrics.hpp"
 #include "node/node_state.hpp"
-#include "node/publish/link_bindings.hpp"
 #include "node/publish/topic.hpp"
 #include "node/routing/next_hop.hpp"
 #include "node/session/call.hpp"
@@ -28,26 +27,22 @@ class relays final : public topic_source {
   public:
     relays(node_state& host, next_hop& out);
     ~relays();
-    void stop() noexcept { stopped_ = true; }
+    void stop();
 
-    /// Receives the topic to bind to and the noun's last value, or null and the reason.
-    using told = std::function<void(topic*, std::string_view last, const protocol::failure& why)>;
+    /// Receives the topic to bind to, the noun's last value, and which update that is, if it is known; or null and the
+    /// reason.
+    using told = std::function<void(topic*, std::string_view last, const std::optional<update_mark>& mark,
+                                    const protocol::failure& why)>;
     /// Binds a noun. Calls `tell` once, at once if the noun is bound already, and not if `whose` has expired.
     void join(std::string_view node, std::string_view path, std::string_view adverbs,
               const std::weak_ptr<const void>& whose, told tell);
 
-    /// Which update the last value of a topic is; nothing if that is not known.
-    [[nodiscard]] std::optional<update_mark> mark_of(const topic& t) const;
-
     [[nodiscard]] topic* find(std::string_view noun) noexcept override;
     void release(topic& t) override;
     void admit(topic&) override {}
-    [[nodiscard]] std::size_t size() const noexcept { return all_.size(); }
 
   private:
     class relay;
-
-    void close(relay& r);
 
     node_state& node_;
     next_hop& out_;

@@ -2,9 +2,8 @@
 #include "node/routing/request_router.hpp"
 
 #include "node/routing/all_binding.hpp"
-#include "node/routing/any_request.hpp"
-#include "node/routing/scatter_gather.hpp"
-#include "node/routing/subrequest.hpp"
+#include "node/routing/deferred_request.hpp"
+#include "node/session/inbound.hpp"
 
 #include <chrono>
 #include <utility>
@@ -32,7 +31,7 @@ void request_router::stop() {
 }
 
 bool request_router::route(const protocol::request_line& r, const identity& peer, time_point due, time_point now,
-                           call_factory& from) {
+                           inbound& from) {
     const auto target = r.noun.target;
     if (target == "any" && !waits_for_discovery_) {
         const auto chosen = load_balancer_.choose(r, {}, now);
@@ -58,14 +57,44 @@ bool request_router::route(const protocol::request_line& r, const identity& peer
         c->fail({.code = errc::no_target,
                  .message = "it may not be passed on to '" + std::string{target} + "': it bears hops=0"});
     } else {
-        std::make_shared<forwarding>(std::move(c), std::string{target})->go(out_, r, node_->name, due);
+        forward(r, std::move(c), due);
     }
     return true;
 }
 
+// Reply, progress and cancellation are forwarded too.
+void request_router::forward(const protocol::request_line& r, std::shared_ptr<call> c, time_point due) {
+    const auto ticket = send(
+        r, r.noun.target, due,
+        [c, node = std::string{r.noun.target}](std::string_view json, subrequest_failure* why) {
+            if (why == nullptr) {
+                c->done(json);
+            } else {
+                c->fail(named(std::move(*why), node));
+            }
+        },
+        progress_to(c));
+    c->on_stop([self = shared_from_this(), ticket] { self->out_.cancel(ticket); });
+}
+
+std::uint64_t request_router::send(const protocol::request_line& r, std::string_view node, time_point due,
+                                   subrequest_outcome then, outbound::progress_function progress) {
+    const auto noun = std::string{node}.append(":").append(r.noun.path);
+    const auto adverbs = forwarded_adverbs(r, node_->name);
+    return out_.send({.verb = r.verb, .noun = noun, .carried = r.carried(), .adverbs = adverbs, .body = r.body}, due,
+                     detail::pending_ptr{new subrequest(std::move(then))}, std::move(progress));
+}
+
+void request_router::cancel(const attempt& part) {
+    if (part.here) {
+        part.here->withdraw();
+    } else if (part.ticket != 0 && !stopped_) {
+        out_.cancel(part.ticket);
+    }
+}
+
 void request_router::continue_after_busy(const protocol::request_line& r, const identity& peer,
-                                         const protocol::failure& why, time_point due, time_point now,
-                                         call_factory& from) {
+                                         const protocol::failure& why, time_point due, time_point now, inbound& from) {
     if (auto c = from.make_call(r, due, now)) {
         std::make_shared<any_request>(shared_from_this(), r, peer, std::move(c), due)
             ->continue_after_local_refusal(why);
@@ -73,7 +102,7 @@ void request_router::continue_after_busy(const protocol::request_line& r, const 
 }
 
 void request_router::bind(const protocol::request_line& r, relayed_bindings& place, time_point due, time_point now,
-                          call_factory& from) {
+                          inbound& from) {
     const auto c = from.make_call(r, due, now);
     if (!c) {
         return;

@@ -7,6 +7,9 @@
 #include "node/routing/relays.hpp"
 #include "node/routing/router.hpp"
 #include "node/routing/service_registry.hpp"
+#include "node/routing/subrequest.hpp"
+#include "node/session/call.hpp"
+#include "node/session/outbound.hpp"
 
 #include <cstdint>
 #include <deque>
@@ -14,59 +17,38 @@
 #include <list>
 #include <memory>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace cles::core {
 
 class all_binding;
+class deferred_request;
+struct attempt;
 
 /// Serves the requests of a node's clients that are not for it alone: forwards those that name another node, selects a
 /// node for `any`, and sends those for `all` to all nodes (docs/protocol.md, "Routing").
-class request_router final : public router, public std::enable_shared_from_this<request_router> {
+class request_router : public router, public std::enable_shared_from_this<request_router> {
   public:
     /// `wake` is called when a turn is needed: requests are ready to start.
     request_router(std::shared_ptr<node_state> host, next_hop& out, std::uint32_t seed, std::function<void()> wake);
-    ~request_router();
-
-    /// `any` and `all` wait, because discovery is still in progress.
-    void hold() noexcept { waits_for_discovery_ = true; }
-    /// Discovery is over.
-    void release();
-    /// Sends no more requests.
-    void stop();
-    [[nodiscard]] bool stopped() const noexcept { return stopped_; }
+    ~request_router() override;
 
     bool route(const protocol::request_line& request, const identity& peer, time_point due, time_point now,
-               call_factory& from) override;
+               inbound& from) override;
     void continue_after_busy(const protocol::request_line& request, const identity& peer, const protocol::failure& why,
-                             time_point due, time_point now, call_factory& from) override;
+                             time_point due, time_point now, inbound& from) override;
     void bind(const protocol::request_line& request, relayed_bindings& place, time_point due, time_point now,
-              call_factory& from) override;
+              inbound& from) override;
     std::shared_ptr<relays> relayed() override { return relays_; }
-    /// Starts the requests that are ready. Runs handlers of this node.
-    void begin_ready(time_point now);
-
-    /// A request that may have to wait until a node is known that offers its task.
-    ///
-    /// Starting it runs handlers of this node, which may do anything. So it is started where its line is read, or in a
-    /// turn: never when a node becomes known, when another node replies, or at a deadline, because the library does
-    /// these in loops.
-    class deferred_request {
-      public:
-        deferred_request() = default;
-        deferred_request(const deferred_request&) = delete;
-        deferred_request& operator=(const deferred_request&) = delete;
-        virtual ~deferred_request() = default;
-        /// Starts or continues it. Returns false if it still has to wait.
-        virtual bool begin(time_point now) = 0;
-        /// Whether its client no longer waits for it.
-        [[nodiscard]] virtual bool over() const = 0;
-    };
+    void hold() noexcept override { waits_for_discovery_ = true; }
+    void release() override;
+    void begin_ready(time_point now) override;
+    void stop() final;
 
     // For deferred requests.
     [[nodiscard]] node_state& host() noexcept { return *node_; }
-    [[nodiscard]] const std::shared_ptr<node_state>& shared_host() const noexcept { return node_; }
-    [[nodiscard]] next_hop& out() noexcept { return out_; }
     [[nodiscard]] load_balancer::chosen choose(const protocol::request_line& r, const std::vector<std::string>& asked,
                                                time_point now) {
         return load_balancer_.choose(r, asked, now);
@@ -76,17 +58,24 @@ class request_router final : public router, public std::enable_shared_from_this<
     [[nodiscard]] const std::vector<service_registry::offer>& offers(verb v, std::string_view task) const {
         return service_registry_.offers(v, task);
     }
+    /// Sends `r` to another node. Returns a ticket.
+    std::uint64_t send(const protocol::request_line& r, std::string_view node, time_point due, subrequest_outcome then,
+                       outbound::progress_function progress = {});
+    /// Cancels it, if it is still in progress.
+    void cancel(const attempt& part);
     /// Has `e` started in the next turn, and owns it until then.
     void schedule(std::shared_ptr<deferred_request> e);
     [[nodiscard]] bool waits_for_discovery() const noexcept { return waits_for_discovery_; }
     [[nodiscard]] bool expects_more() const noexcept {
         return waits_for_discovery_ || service_registry_.expects_more();
     }
+    [[nodiscard]] bool stopped() const noexcept { return stopped_; }
     [[nodiscard]] protocol::failure no_provider(const protocol::request_line& r) const;
 
   private:
     void on_offers();
     void begin(std::shared_ptr<deferred_request> e, time_point now);
+    void forward(const protocol::request_line& r, std::shared_ptr<call> c, time_point due);
     bool runs_in_line(const protocol::request_line& r) const;
 
     std::shared_ptr<node_state> node_;

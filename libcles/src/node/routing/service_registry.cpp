@@ -46,12 +46,6 @@ bool read_entries(json_reader& r, task_list& out) {
 
 } // namespace
 
-const task_list::entry* task_list::find(cles::verb verb, std::string_view task) const noexcept {
-    const auto found =
-        std::find_if(entries.begin(), entries.end(), [&](const entry& e) { return e.verb == verb && e.task == task; });
-    return found == entries.end() ? nullptr : &*found;
-}
-
 std::optional<task_list> read_task_list(std::string_view description, std::string_view node) {
     json_reader r{description};
     task_list list;
@@ -64,29 +58,6 @@ std::optional<task_list> read_task_list(std::string_view description, std::strin
     }
     return list;
 }
-
-class service_registry::task_query final : public subrequest_events {
-  public:
-    task_query(std::weak_ptr<service_registry*> by, const known_node& whom)
-        : by_(std::move(by)), name_(whom.name), ticket_(whom.ticket) {}
-
-    void on_result(std::size_t, std::string_view json) override {
-        if (const auto alive = by_.lock()) {
-            (*alive)->on_tasks(name_, ticket_, json);
-        }
-    }
-    void on_failure(std::size_t, subrequest_failure why) override {
-        if (const auto alive = by_.lock()) {
-            (*alive)->on_no_answer(name_, ticket_, why.unreachable);
-        }
-    }
-    void on_progress(std::size_t, double, std::string_view) override {}
-
-  private:
-    std::weak_ptr<service_registry*> by_;
-    std::string name_;
-    std::uint64_t ticket_;
-};
 
 service_registry::service_registry(node_state& host, next_hop& out, std::function<void()> on_offers)
     : node_(host), out_(out), on_offers_(std::move(on_offers)), alive_(std::make_shared<service_registry*>(this)) {
@@ -125,11 +96,10 @@ void service_registry::on_member_seen(std::string_view name) {
     auto& known = *at->second;
     known.update_load(heard->load);
     const bool can_be_asked = !heard->suspect && !heard->where.empty();
-    const bool could_be_asked = known.live && known.reachable;
+    const bool could_be_asked = known.live && known.reachable();
     const bool another = fresh || known.epoch != heard->epoch;
     const bool moved = known.where != heard->where;
     known.live = !heard->suspect;
-    known.reachable = !heard->where.empty();
     if (known.state == known_node::task_knowledge::known && !another && known.digest == heard->tasks && !moved) {
         return;
     }
@@ -183,7 +153,7 @@ void service_registry::begin_anew(known_node& of, std::string_view digest, std::
             return;
         }
     }
-    if (!of.tasks && of.live && of.reachable) {
+    if (!of.tasks && of.live && of.reachable()) {
         expect(of, now + answer_within);
     }
     wait_for_turn(of);
@@ -223,7 +193,7 @@ void service_registry::expect(known_node& n, std::optional<time_point> until) {
 // -- queries -------------------------------------------------------------------------------------------------------
 
 void service_registry::wait_for_turn(known_node& n) {
-    if (n.state == known_node::task_knowledge::unknown && n.live && n.reachable) {
+    if (n.state == known_node::task_knowledge::unknown && n.live && n.reachable()) {
         queries_.enter(n);
     }
 }
@@ -258,8 +228,14 @@ void service_registry::ask(time_point now) {
         }
         n.state = known_node::task_knowledge::asked;
         n.ticket = ++last_ticket_;
+        auto then = [weak = std::weak_ptr{alive_}, name = n.name, ticket = n.ticket](std::string_view json,
+                                                                                     const subrequest_failure* why) {
+            if (const auto alive = weak.lock()) {
+                (*alive)->on_reply(name, ticket, json, why);
+            }
+        };
         out_.send({.verb = verb::pull, .noun = n.name + ":cles"}, now + answer_within,
-                  detail::pending_ptr{new subrequest(std::make_shared<task_query>(alive_, n), 0)}, {});
+                  detail::pending_ptr{new subrequest(std::move(then))}, {});
     }
     follow();
 }
@@ -273,26 +249,30 @@ void service_registry::wake_next(digest_group& of) {
     }
 }
 
-known_node* service_registry::asked_by(const std::string& name, std::uint64_t ticket) noexcept {
+void service_registry::on_reply(const std::string& name, std::uint64_t ticket, std::string_view said,
+                                const subrequest_failure* why) {
     auto* known = find(name);
-    return known != nullptr && known->state == known_node::task_knowledge::asked && known->ticket == ticket ? known
-                                                                                                            : nullptr;
-}
-
-void service_registry::on_tasks(const std::string& name, std::uint64_t ticket, std::string_view said) {
-    auto* known = asked_by(name, ticket);
-    if (known == nullptr) {
-        return;
-    }
-    auto list = read_task_list(said, name);
-    if (!list) {
-        on_no_answer(name, ticket, false);
+    if (known == nullptr || known->state != known_node::task_knowledge::asked || known->ticket != ticket) {
         return;
     }
     const auto now = node_.time.now();
-    queries_.answered(*known);
-    const auto tasks = std::make_shared<const task_list>(std::move(*list));
-    if (auto* k = digest_group_of(*known)) {
+    const bool expected = expects_more();
+    auto list = why == nullptr ? read_task_list(said, name) : std::nullopt;
+    if (list) {
+        on_tasks(*known, std::move(*list));
+    } else {
+        on_no_answer(*known, why != nullptr && why->unreachable, now);
+    }
+    ask(now);
+    if (list || (expected && !expects_more())) {
+        on_offers_();
+    }
+}
+
+void service_registry::on_tasks(known_node& of, task_list list) {
+    queries_.answered(of);
+    const auto tasks = std::make_shared<const task_list>(std::move(list));
+    if (auto* k = digest_group_of(of)) {
         k->asked = nullptr;
         k->waiting.clear();
         k->tasks = tasks;
@@ -300,31 +280,19 @@ void service_registry::on_tasks(const std::string& name, std::uint64_t ticket, s
             set_tasks(*n, tasks);
         }
     } else {
-        set_tasks(*known, tasks);
+        set_tasks(of, tasks);
     }
-    ask(now);
-    on_offers_();
 }
 
-void service_registry::on_no_answer(const std::string& name, std::uint64_t ticket, bool unreachable) {
-    auto* known = asked_by(name, ticket);
-    if (known == nullptr) {
-        return;
+void service_registry::on_no_answer(known_node& of, bool unreachable, time_point now) {
+    of.state = known_node::task_knowledge::unknown;
+    queries_.failed(of, unreachable, now);
+    if (!of.live || !of.reachable()) { // queried again when it is received again
+        queries_.remove(of);
     }
-    const auto now = node_.time.now();
-    const bool last_expected = known->expected_until && expected_.size() == 1;
-    known->state = known_node::task_knowledge::unknown;
-    queries_.failed(*known, unreachable, now);
-    if (!known->live || !known->reachable) { // queried again when it is received again
-        queries_.remove(*known);
-    }
-    expect(*known, {});
-    if (auto* k = digest_group_of(*known)) {
+    expect(of, {});
+    if (auto* k = digest_group_of(of)) {
         wake_next(*k);
-    }
-    ask(now);
-    if (last_expected) {
-        on_offers_();
     }
 }
 

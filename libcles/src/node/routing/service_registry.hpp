@@ -38,8 +38,6 @@ struct task_list {
         bool idempotent = false;
     };
     std::vector<entry> entries;
-
-    [[nodiscard]] const entry* find(cles::verb verb, std::string_view task) const noexcept;
 };
 
 /// Reads the reply to `PULL self:cles`. Nothing if it is malformed, or of another node.
@@ -76,8 +74,7 @@ struct candidate {
 /// Another node and its tasks.
 struct known_node : candidate, query_target {
     std::string name;
-    bool live = true;      ///< received recently
-    bool reachable = true; ///< at an address usable from here
+    bool live = true; ///< received recently
     std::uint32_t epoch = 0;
     std::string digest; ///< of its tasks, as announced
 
@@ -86,6 +83,9 @@ struct known_node : candidate, query_target {
     std::uint64_t ticket = 0;                 ///< of its last query
     std::optional<time_point> expected_until; ///< its tasks may become known at any moment until then
     std::shared_ptr<const task_list> tasks;
+
+    /// Whether it is at an address usable from here.
+    [[nodiscard]] bool reachable() const noexcept { return !where.empty(); }
 };
 
 /// Which other nodes offer which tasks: follows `membership`, and queries the tasks of a node when its announced digest
@@ -112,12 +112,8 @@ class service_registry final : private deadline {
     [[nodiscard]] bool expects_more() const noexcept { return !expected_.empty(); }
     /// Null if it is not known.
     [[nodiscard]] known_node* find(std::string_view name) noexcept;
-    [[nodiscard]] std::size_t size() const noexcept { return nodes_.size(); }
-    /// The cost of the queries; see `query_scheduler::steps`.
-    [[nodiscard]] std::uint64_t steps() const noexcept { return queries_.steps(); }
 
   private:
-    class task_query; // queries the tasks of one node
     /// The nodes with one digest.
     struct digest_group {
         std::map<std::string_view, known_node*> nodes{}; // by name
@@ -135,15 +131,15 @@ class service_registry final : private deadline {
     void wait_for_turn(known_node& n);
     void give_up(known_node& n);
     void ask(time_point now);
-    void on_tasks(const std::string& name, std::uint64_t ticket, std::string_view said);
-    void on_no_answer(const std::string& name, std::uint64_t ticket, bool unreachable);
+    void on_reply(const std::string& name, std::uint64_t ticket, std::string_view said, const subrequest_failure* why);
+    void on_tasks(known_node& of, task_list list);
+    void on_no_answer(known_node& of, bool unreachable, time_point now);
     void wake_next(digest_group& of);
     void follow();
     void set_tasks(known_node& of, std::shared_ptr<const task_list> tasks);
     void forget_offers(const known_node& of);
     void offer_all(const known_node& of);
     [[nodiscard]] digest_group* digest_group_of(const known_node& n) noexcept;
-    [[nodiscard]] known_node* asked_by(const std::string& name, std::uint64_t ticket) noexcept;
 
     node_state& node_;
     next_hop& out_;

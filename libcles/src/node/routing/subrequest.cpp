@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/routing/subrequest.hpp"
 
+#include "node/session/reply_writer.hpp"
+#include "node/session/request_checks.hpp"
+#include "node/session/reserved_tasks.hpp"
+
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -22,69 +27,53 @@ bool handler_may_have_run(const protocol::failure& why) {
 // A failure to reach the node, or to receive its reply.
 subrequest_failure on_the_way(boost::system::error_code code, std::string_view message) {
     subrequest_failure why{.told = {.code = errc::unavailable, .message = std::string{message}}};
-    if (code == errc::unavailable || code == errc::stopped) {
-        return why;
+    // `busy` is from this node itself, which holds too much already.
+    for (const auto reported : {errc::deadline, errc::cancelled, errc::too_large, errc::busy, errc::no_target}) {
+        if (code == reported) {
+            why.told.code = reported;
+        }
     }
-    if (code == errc::deadline || code == errc::too_large || code == errc::cancelled) {
-        why.told.code = static_cast<errc>(code.value());
-        why.may_have_started = code != errc::too_large;
-        return why;
-    }
-    if (code == errc::busy) { // from this node itself, which holds too much already
-        why.told.code = errc::busy;
-        why.may_have_started = false;
-        return why;
-    }
-    if (code == errc::no_target) {
-        why.told.code = errc::no_target;
-    }
-    why.may_have_started = false;
-    why.unreachable = true;
+    why.may_have_started =
+        code == errc::unavailable || code == errc::stopped || code == errc::deadline || code == errc::cancelled;
+    why.unreachable = !why.may_have_started && code != errc::too_large && code != errc::busy;
     return why;
 }
 
 } // namespace
 
+// -- at another node -----------------------------------------------------------------------------------------------
+
 subrequest::verdict subrequest::offer(std::string_view json) {
     if (!detail::is_valid_answer(json)) {
         return verdict::malformed;
     }
-    const std::unique_ptr<subrequest> self{this};
-    to_->on_result(which_, json);
+    end(json, nullptr);
     return verdict::completed;
 }
 
-void subrequest::fail(boost::system::error_code code, std::string_view message) { end(on_the_way(code, message)); }
+void subrequest::fail(boost::system::error_code code, std::string_view message) {
+    auto why = on_the_way(code, message);
+    end({}, &why);
+}
 
 void subrequest::refuse(boost::system::error_code, std::string_view, std::string_view answer) {
     subrequest_failure why;
     protocol::parse_failure(answer, why.told);
     why.told.answer = answer;
     why.may_have_started = handler_may_have_run(why.told);
-    end(std::move(why));
+    end({}, &why);
 }
 
-void subrequest::end(subrequest_failure why) {
+void subrequest::end(std::string_view json, subrequest_failure* why) {
     const std::unique_ptr<subrequest> self{this};
-    to_->on_failure(which_, std::move(why));
+    then_(json, why);
 }
 
-std::uint64_t send_subrequest(next_hop& out, const protocol::request_line& r, std::string_view node,
-                              std::string_view adverbs, time_point due, std::shared_ptr<subrequest_events> events,
-                              std::size_t which) {
-    outbound::progress_function progress;
-    if (r.wants_progress && r.id != 0) {
-        progress = [weak = std::weak_ptr{events}, which](double fraction, std::string_view json) {
-            if (const auto alive = weak.lock()) {
-                alive->on_progress(which, fraction, json);
-            }
-        };
+outbound::progress_function progress_to(const std::shared_ptr<call>& c) {
+    if (!c->wanted().wants_progress || c->wanted().id == 0) {
+        return {};
     }
-    std::string noun;
-    noun.reserve(node.size() + 1 + r.noun.path.size());
-    noun.append(node).append(":").append(r.noun.path);
-    return out.send({.verb = r.verb, .noun = noun, .carried = r.carried(), .adverbs = adverbs, .body = r.body}, due,
-                    detail::pending_ptr{new subrequest(std::move(events), which)}, std::move(progress));
+    return [c](double fraction, std::string_view json) { c->progress(fraction, json); };
 }
 
 protocol::failure named(subrequest_failure why, std::string_view node) {
@@ -94,15 +83,85 @@ protocol::failure named(subrequest_failure why, std::string_view node) {
     return std::move(why.told);
 }
 
-void forwarding::go(next_hop& out, const protocol::request_line& r, std::string_view own_name, time_point due) {
-    const auto ticket = send_subrequest(out, r, node_, forwarded_adverbs(r, own_name), due, shared_from_this(), 0);
-    call_->on_stop([&out, ticket] { out.cancel(ticket); });
+// -- at this node --------------------------------------------------------------------------------------------------
+
+local_request::~local_request() { withdraw(); }
+
+void local_request::withdraw() {
+    const auto keep = std::exchange(then_, nullptr);
+    if (const auto c = std::exchange(call_, nullptr)) {
+        c->detach();
+        c->stop();
+    }
 }
 
-void forwarding::on_result(std::size_t, std::string_view json) { call_->done(json); }
+void local_request::run(const protocol::request_line& r, const identity& peer, time_point due, time_point now) {
+    if (r.noun.task != "cles") {
+        std::string decoded;
+        task_execution{node_, r, peer, due, now, decoded}.run(*this, memory_);
+        return;
+    }
+    std::string text; // only PULL, for `any` and `all`
+    json_writer w{text};
+    if (r.noun.path == "cles") {
+        write_description(w, *node_);
+    } else if (r.noun.path == "cles/metrics") {
+        write_metrics(w, *node_);
+    } else {
+        fail(no_such_task(*node_, r), false);
+        return;
+    }
+    finish(std::move(text));
+}
 
-void forwarding::on_failure(std::size_t, subrequest_failure why) { call_->fail(named(std::move(why), node_)); }
+void local_request::write_result(task_execution& task) {
+    std::string text;
+    json_writer w{text};
+    task.write(w);
+    finish(std::move(text));
+}
 
-void forwarding::on_progress(std::size_t, double fraction, std::string_view json) { call_->progress(fraction, json); }
+void local_request::refuse(const task_execution& task, const protocol::failure& why) {
+    fail(why, task.started() && may_have_started(why));
+}
+
+void local_request::keep(const task_execution&, const std::shared_ptr<call>& c) { call_ = c; }
+
+void local_request::answer(const call&, std::string_view json) {
+    call_.reset();
+    finish(std::string{json});
+}
+
+void local_request::refuse(const call&, const protocol::failure& why) {
+    call_.reset();
+    fail(why, may_have_started(why));
+}
+
+bool local_request::report(const call&, double fraction, std::string_view json) {
+    if (progress_) {
+        std::string body{json};
+        close_body(body, 0);
+        progress_(fraction, body);
+    }
+    return true;
+}
+
+void local_request::finish(std::string json) {
+    if (auto why = close_result(json, 0)) {
+        fail(std::move(*why), true);
+    } else if (const auto then = std::exchange(then_, nullptr)) {
+        then(json, nullptr);
+    }
+}
+
+void local_request::fail(protocol::failure why, bool begun) {
+    if (const auto then = std::exchange(then_, nullptr)) {
+        if (!why.message.starts_with(node_->name)) {
+            why.message.insert(0, node_->name + ": ");
+        }
+        subrequest_failure failure{.told = std::move(why), .may_have_started = begun};
+        then({}, &failure);
+    }
+}
 
 } // namespace cles::core

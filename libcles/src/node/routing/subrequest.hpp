@@ -1,18 +1,22 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/identity.hpp>
 #include <cles/pending.hpp>
 
-#include "node/routing/next_hop.hpp"
+#include "node/base/memory_budget.hpp"
+#include "node/node_state.hpp"
 #include "node/session/call.hpp"
+#include "node/session/outbound.hpp"
+#include "node/session/task_execution.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
-#include <cstddef>
-#include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace cles::core {
 
@@ -23,25 +27,14 @@ struct subrequest_failure {
     bool unreachable = false;     ///< the request did not get there
 };
 
-/// Receives the outcomes of the subrequests that it has sent to one or several nodes for a client.
-class subrequest_events {
-  public:
-    subrequest_events() = default;
-    subrequest_events(const subrequest_events&) = delete;
-    subrequest_events& operator=(const subrequest_events&) = delete;
-    virtual ~subrequest_events() = default;
+/// Receives the outcome of a subrequest: a result, which is valid JSON, or why there is none. It is kept until it has
+/// returned.
+using subrequest_outcome = std::function<void(std::string_view json, subrequest_failure* why)>;
 
-    /// One of these, once, for each subrequest. The result is valid JSON.
-    virtual void on_result(std::size_t which, std::string_view json) = 0;
-    virtual void on_failure(std::size_t which, subrequest_failure why) = 0;
-    /// Any number of times before the outcome.
-    virtual void on_progress(std::size_t which, double fraction, std::string_view json) = 0;
-};
-
-/// Waits for the reply of another node.
+/// The part of a request for a client that another node serves: waits for its reply.
 class subrequest final : public detail::pending {
   public:
-    subrequest(std::shared_ptr<subrequest_events> to, std::size_t which) noexcept : to_(std::move(to)), which_(which) {}
+    explicit subrequest(subrequest_outcome then) noexcept : then_(std::move(then)) {}
 
     verdict offer(std::string_view json) override;
     void fail(boost::system::error_code code, std::string_view message) override;
@@ -50,33 +43,45 @@ class subrequest final : public detail::pending {
     [[nodiscard]] bool calls_user() const noexcept override { return false; }
 
   private:
-    void end(subrequest_failure why);
+    void end(std::string_view json, subrequest_failure* why);
 
-    std::shared_ptr<subrequest_events> to_;
-    std::size_t which_;
+    subrequest_outcome then_;
 };
 
-/// Forwards a request to the node that it names. Reply, progress and cancellation are forwarded too.
-class forwarding final : public subrequest_events, public std::enable_shared_from_this<forwarding> {
+/// The part of a request for a client that this node itself serves.
+class local_request final : private task_sink {
   public:
-    forwarding(std::shared_ptr<call> answers, std::string node) : call_(std::move(answers)), node_(std::move(node)) {}
+    /// `memory` is the requester's account; null if memory is not counted.
+    local_request(std::shared_ptr<node_state> host, subrequest_outcome then,
+                  std::shared_ptr<memory_account> memory = nullptr, outbound::progress_function progress = {})
+        : node_(std::move(host)), then_(std::move(then)), memory_(std::move(memory)), progress_(std::move(progress)) {}
+    ~local_request();
 
-    void go(next_hop& out, const protocol::request_line& r, std::string_view own_name, time_point due);
+    /// Runs the handler; its outcome may be reported inside the call.
+    void run(const protocol::request_line& r, const identity& peer, time_point due, time_point now);
+    /// Cancels the handler; nothing more is reported.
+    void withdraw();
 
   private:
-    void on_result(std::size_t which, std::string_view json) override;
-    void on_failure(std::size_t which, subrequest_failure why) override;
-    void on_progress(std::size_t which, double fraction, std::string_view json) override;
+    void write_result(task_execution& task) override;
+    void refuse(const task_execution& task, const protocol::failure& why) override;
+    void keep(const task_execution& task, const std::shared_ptr<call>& c) override;
+    void answer(const call& c, std::string_view json) override;
+    void refuse(const call& c, const protocol::failure& why) override;
+    bool report(const call& c, double fraction, std::string_view json) override;
 
+    void finish(std::string json);
+    void fail(protocol::failure why, bool begun);
+
+    std::shared_ptr<node_state> node_;
+    subrequest_outcome then_; // empty: it has ended
+    std::shared_ptr<memory_account> memory_;
+    outbound::progress_function progress_;
     std::shared_ptr<call> call_;
-    std::string node_;
 };
 
-/// Sends `r` to `node`. The outcome is reported to `events`, as that of subrequest `which`. Returns a ticket
-/// for `next_hop::cancel`.
-std::uint64_t send_subrequest(next_hop& out, const protocol::request_line& r, std::string_view node,
-                              std::string_view adverbs, time_point due, std::shared_ptr<subrequest_events> events,
-                              std::size_t which);
+/// Reports progress to the client of `c`; empty if it does not want any.
+outbound::progress_function progress_to(const std::shared_ptr<call>& c);
 
 /// The failure, with a message that names the node.
 protocol::failure named(subrequest_failure why, std::string_view node);

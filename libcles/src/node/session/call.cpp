@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/call.hpp"
 
-#include "node/node_state.hpp"
 #include "node/session/handler_failure.hpp"
 #include "node/session/request_checks.hpp"
 
 #include <algorithm>
 #include <exception>
-#include <utility>
 
 namespace cles::core {
 
-call::call(std::shared_ptr<node_state> host, call_owner& owner, terms wanted, time_point started)
-    : node_(std::move(host)), owner_(&owner), terms_(std::move(wanted)), started_(started) {
+call::call(std::shared_ptr<node_state> host, task_sink& owner, terms wanted, std::shared_ptr<memory_account> memory,
+           time_point started)
+    : node_(std::move(host)), owner_(&owner), terms_(std::move(wanted)), started_(started), held_(std::move(memory)) {
     ++node_->counts.handlers_running;
     node_->counts.routed += terms_.routed ? 1 : 0;
 }
@@ -22,22 +21,12 @@ call::~call() {
     node_->counts.routed -= terms_.routed ? 1 : 0;
 }
 
-call::terms call::terms_of(const protocol::request_line& r) {
-    terms result{r.carried()};
-    result.verb = r.verb;
-    result.id = r.id;
-    result.wants_reply = r.wants_reply;
-    result.wants_progress = r.wants_progress;
-    return result;
-}
-
-std::shared_ptr<call> call::begin(const std::shared_ptr<node_state>& host, call_owner& owner, terms wanted,
+std::shared_ptr<call> call::begin(const std::shared_ptr<node_state>& host, task_sink& owner, terms wanted,
                                   const std::shared_ptr<memory_account>& memory, std::size_t text, time_point due,
                                   time_point now) {
     constexpr std::size_t around = 512; // itself and its handler's part, about
-    auto c = std::make_shared<call>(host, owner, std::move(wanted), now);
-    c->held_ = memory_reservation{memory};
-    if (!c->held_.try_resize(text + c->terms_.publish_body.size() + around)) {
+    auto c = std::make_shared<call>(host, owner, std::move(wanted), memory, now);
+    if (!c->hold_more(text + c->terms_.publish_body.size() + around)) {
         return nullptr;
     }
     host->deadlines.arm(*c, due);
@@ -80,7 +69,7 @@ void call::abort(protocol::failure why) {
 }
 
 // Called once, since the owner is gone afterwards.
-call_owner& call::end() {
+task_sink& call::end() {
     auto& owner = *owner_;
     detach();
     if (!terms_.routed) { // that time is other nodes'
@@ -124,7 +113,5 @@ void call::stop() {
 void call::on_deadline(time_point) {
     abort({.code = errc::deadline, .message = node_->name + " did not finish in time"});
 }
-
-bool may_have_started(const protocol::failure& why) noexcept { return why.code != errc::busy || why.ran; }
 
 } // namespace cles::core

@@ -1,19 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/error.hpp>
-#include <cles/identity.hpp>
-#include <cles/json_writer.hpp>
 #include <cles/log.hpp>
-#include <cles/request.hpp>
-#include <cles/verb.hpp>
 
 #include "node/base/deadlines.hpp"
 #include "node/base/memory_budget.hpp"
 #include "node/node_state.hpp"
-#include "node/session/request_checks.hpp"
-#include "node/session/task_registry.hpp"
-#include "protocol/datagram.hpp"
+#include "node/session/task_execution.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -21,35 +14,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
 namespace cles::core {
-
-class call;
-struct node_state;
-
-/// Receives the outcome of a call; usually serves the link on which the request arrived. The call has ended by then, so
-/// the owner only has to release it.
-class call_owner {
-  public:
-    call_owner() = default;
-    call_owner(const call_owner&) = delete;
-    call_owner& operator=(const call_owner&) = delete;
-    virtual void answer(const call& c, std::string_view json) = 0;
-    virtual void refuse(const call& c, const protocol::failure& why) = 0;
-    /// `fraction` never decreases. Returns false if nobody waits for progress.
-    virtual bool report(const call& c, double fraction, std::string_view json) = 0;
-    /// Whether the node has memory for a reply of this size.
-    [[nodiscard]] virtual bool can_answer(std::size_t /*bytes*/) { return true; }
-    /// The requester's URL; empty if it is this node itself.
-    [[nodiscard]] virtual std::string_view peer_address() const noexcept { return {}; }
-
-  protected:
-    ~call_owner() = default;
-};
 
 /// A request whose handler replies later.
 ///
@@ -59,24 +28,28 @@ class call_owner {
 class call final : public deadline, public std::enable_shared_from_this<call> {
   public:
     struct terms : protocol::carried_adverbs {
-        cles::verb verb = verb::pull;
-        std::uint64_t id = 0;
-        bool wants_reply = true;
-        bool wants_progress = false;
-        bool routed = false;        ///< other nodes serve it
-        std::string publish_path{}; ///< path of a request to publish; else empty
-        std::string publish_body{};
+        /// Those that the request line states.
+        explicit terms(const protocol::request_line& r)
+            : carried_adverbs(r), verb(r.verb), id(r.id), wants_reply(r.wants_reply), wants_progress(r.wants_progress) {
+        }
+
+        cles::verb verb;
+        std::uint64_t id;
+        bool wants_reply;
+        bool wants_progress;
+        bool routed = false;      ///< other nodes serve it
+        std::string publish_path; ///< path of a request to publish; else empty
+        std::string publish_body;
     };
 
-    /// The terms that the request line states.
-    static terms terms_of(const protocol::request_line& r);
-
-    call(std::shared_ptr<node_state> host, call_owner& owner, terms wanted, time_point started);
+    /// For `begin`.
+    call(std::shared_ptr<node_state> host, task_sink& owner, terms wanted, std::shared_ptr<memory_account> memory,
+         time_point started);
     ~call();
 
     /// A call that fails at `due`. Reserves memory in `memory` (null: not counted) for the call and `text` bytes of its
     /// request, until the handler releases the call. Null if there is none.
-    static std::shared_ptr<call> begin(const std::shared_ptr<node_state>& host, call_owner& owner, terms wanted,
+    static std::shared_ptr<call> begin(const std::shared_ptr<node_state>& host, task_sink& owner, terms wanted,
                                        const std::shared_ptr<memory_account>& memory, std::size_t text, time_point due,
                                        time_point now);
 
@@ -104,7 +77,6 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     /// Adverbs that precede the result, in wire format.
     void set_head(std::string adverbs) { head_ = std::move(adverbs); }
     [[nodiscard]] const std::string& head() const noexcept { return head_; }
-    [[nodiscard]] time_point started() const noexcept { return started_; }
 
     [[nodiscard]] const std::shared_ptr<node_state>& host() const noexcept { return node_; }
     /// The account in which memory is reserved; null if it is not counted.
@@ -117,11 +89,11 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     void stop();
 
   private:
-    call_owner& end();
+    task_sink& end();
     void on_deadline(time_point now) override;
 
     std::shared_ptr<node_state> node_; // the handler may outlive the service
-    call_owner* owner_;
+    task_sink* owner_;
     terms terms_;
     time_point started_;
     memory_reservation held_; // declared after the node, which owns the account
@@ -132,6 +104,8 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
 };
 
 /// Whether the handler may have run: `busy` without `ran` promises that it has not.
-[[nodiscard]] bool may_have_started(const protocol::failure& why) noexcept;
+[[nodiscard]] inline bool may_have_started(const protocol::failure& why) noexcept {
+    return why.code != errc::busy || why.ran;
+}
 
 } // namespace cles::core

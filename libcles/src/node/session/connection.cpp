@@ -1,12 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/connection.hpp"
 
-#include "node/base/deadlines.hpp"
 #include "node/local_node.hpp"
 #include "node/publish/feed_machine.hpp"
-
-#include <chrono>
-#include <utility>
+#include "node/session/request_checks.hpp"
 
 namespace cles::core {
 namespace {
@@ -22,22 +19,24 @@ constexpr std::chrono::seconds idle_after{2};
 
 connection::connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number)
     : host_(std::move(host)), link_(std::move(carrier)), from_(from), number_(number),
-      memory_(std::make_shared<core::memory_account>(host_->node().memory)),
-      session_(host_->shared_node(), *this, *this, link_->peer()), stall_(*this), idle_(*this) {
+      memory_(std::make_shared<memory_account>(host_->node().memory)),
+      session_(host_->shared_node(), *this, *this, link_->peer()) {
+    const bool accepted = from_ == origin::accepted;
+    if (accepted || link_->datagram() == 0) {
+        monitor_.emplace(static_cast<link_monitor::owner&>(*this), host_->deadlines(), host_->bounds(), host_->now());
+    }
     if (link_->datagram() == 0) {
-        monitor_.emplace(static_cast<core::link_monitor::owner&>(*this), host_->deadlines(), host_->bounds(),
-                         host_->now());
-        if (from_ == origin::accepted) {
+        if (accepted) {
             monitor_->expect_line();
         }
         return;
     }
-    const bool came_in = from_ == origin::accepted || from_ == origin::refused;
-    const auto unverified_address = came_in ? host_->unverified_address(link_->peer()) : std::string{};
+    const auto unverified_address =
+        accepted || from_ == origin::refused ? host_->unverified_address(link_->peer()) : std::string{};
     const bool is_v6 = unverified_address.find(':') != std::string::npos;
     datagrams_.emplace(host_->node(), link_->datagram(), unverified_address, is_v6 ? udp_over_v6 : udp_over_v4);
-    if (from_ == origin::accepted) {
-        idle_timer_.emplace(static_cast<core::idle_timer::keeper&>(*this), host_->deadlines(), host_->now());
+    if (accepted) {
+        monitor_->expect_datagrams();
     }
 }
 
@@ -54,9 +53,7 @@ bool connection::accept_input(std::string_view text) {
         session_.reject(text);
         return false;
     }
-    if (idle_timer_) {
-        idle_timer_->on_datagram(now());
-    } else if (monitor_ && !text.empty()) {
+    if (monitor_ && (datagrams_ || !text.empty())) {
         monitor_->on_line(now());
     }
     return true;
@@ -86,13 +83,12 @@ void connection::rethrow_handler_exception() {
 }
 
 void connection::on_overlong(std::string_view head) {
-    if (!accept_input(head)) {
-        return;
+    if (accept_input(head)) {
+        session_.on_overlong(head);
     }
-    session_.on_overlong(head, now());
 }
 
-void connection::on_cut(std::string_view rest) { session_.on_cut(rest, now()); }
+void connection::on_cut(std::string_view rest) { session_.on_cut(rest); }
 
 void connection::on_batch() {
     const auto keep = shared_from_this();
@@ -108,7 +104,7 @@ void connection::on_batch() {
 void connection::on_end() {
     usable_ = false;
     lose_feeds("the publisher ended the link");
-    session_.on_end(now());
+    session_.on_end();
     if (monitor_ && !finished_ && !gone_) {
         monitor_->on_end(now());
     }
@@ -234,8 +230,8 @@ void connection::update_backpressure() {
         link_->pause(pause_for_queue_ || pause_for_backlog_);
     }
     if (unsent != 0 && !stall_.armed()) {
-        stall_.sent = link_->sent();
-        host_->deadlines().arm(stall_, core::saturating_add(host_->now(), bounds.stall));
+        stall_.moved = link_->sent();
+        host_->deadlines().arm(stall_, saturating_add(host_->now(), bounds.stall));
     }
     schedule_buffer_release();
 }
@@ -262,9 +258,9 @@ void connection::on_stall(time_point now) {
     if (gone_ || link_->unsent() == 0) {
         return;
     }
-    if (link_->sent() != stall_.sent) {
-        stall_.sent = link_->sent();
-        host_->deadlines().arm(stall_, core::saturating_add(now, host_->bounds().stall));
+    if (link_->sent() != stall_.moved) {
+        stall_.moved = link_->sent();
+        host_->deadlines().arm(stall_, saturating_add(now, host_->bounds().stall));
         return;
     }
     host_->post_log(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address,
@@ -272,11 +268,12 @@ void connection::on_stall(time_point now) {
     abandon("the peer took nothing for too long");
 }
 
-// The idle timer of a source of datagrams has expired.
-void connection::on_quiet() { abandon("nothing came for a while"); }
-
 void connection::on_silence() {
     const auto keep = shared_from_this();
+    if (datagrams_) {
+        abandon("nothing came for a while");
+        return;
+    }
     host_->post_log(log_level::debug, "closed a link that brought no line: " + link_->peer().address,
                     link_->peer().address);
     close_after_flush("no line came in time");
@@ -293,14 +290,14 @@ void connection::on_probe() {
 
 // -- feeds ---------------------------------------------------------------------------------------------------------
 
-void connection::bind(core::feed_machine& feed, protocol::outgoing_request request, time_point deadline,
+void connection::bind(feed_machine& feed, protocol::outgoing_request request, time_point deadline,
                       detail::pending_ptr operation) {
     session_.bound().add(feed);
     feeds_.push_back(&feed);
     session_.asking().send(request, deadline, host_->now(), std::move(operation));
 }
 
-void connection::unbind(core::feed_machine& feed) {
+void connection::unbind(feed_machine& feed) {
     session_.bound().remove(feed);
     std::erase(feeds_, &feed);
 }
@@ -321,7 +318,7 @@ void connection::lose_feeds(std::string_view why) {
 void connection::evict() {
     ++host_->node().counts.links_evicted;
     if (!monitor_->has_received()) {
-        session_.send_busy();
+        append_link_refusal(link_->output(), host_->node());
     }
     close_after_flush("others needed the room");
 }
@@ -352,7 +349,6 @@ void connection::end(std::string_view why) {
     usable_ = false;
     host_->deadlines().disarm(stall_);
     host_->deadlines().disarm(idle_);
-    idle_timer_.reset();
     if (monitor_) {
         monitor_->stop();
     }

@@ -4,10 +4,6 @@
 #include <cles/line_link.hpp>
 
 #include "node/flush_scheduler.hpp"
-#include "node/publish/topic.hpp"
-#include "node/session/datagram_rules.hpp"
-#include "node/session/line_sink.hpp"
-#include "node/session/link_admission.hpp"
 #include "node/session/link_monitor.hpp"
 #include "node/session/session.hpp"
 
@@ -18,21 +14,16 @@
 #include <vector>
 
 namespace cles::core {
+
 class feed_machine;
-} // namespace cles::core
-
-namespace cles::core {
-
 class local_node;
 
 /// A link and its session.
 class connection final : public link_events,
-                         public core::line_sink,
-                         public core::subscriber,
-                         public core::flushable,
-                         public core::link_admission::admitted_link,
-                         private core::link_monitor::owner,
-                         private core::idle_timer::keeper,
+                         public line_sink,
+                         public subscriber,
+                         public flushable,
+                         private link_monitor::owner,
                          public std::enable_shared_from_this<connection> {
   public:
     /// `refused`: a source of datagrams beyond the limit, adopted only to be answered with `busy`.
@@ -47,20 +38,19 @@ class connection final : public link_events,
     [[nodiscard]] origin from() const noexcept { return from_; }
     [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
     /// Whether it is a source of datagrams that was accepted.
-    [[nodiscard]] bool is_source() const noexcept { return idle_timer_.has_value(); }
+    [[nodiscard]] bool is_source() const noexcept { return datagrams_ && monitor_; }
     /// Whether closing it would lose nothing.
     [[nodiscard]] bool is_idle() const override { return session_.is_idle() && link_->unsent() == 0; }
     /// Whether requests can still be sent.
     [[nodiscard]] bool usable() const noexcept { return usable_; }
-    // link_admission::admitted_link; streams only
-    [[nodiscard]] const core::link_monitor& monitor() const override { return *monitor_; }
-    void evict() override;
+    /// \pre it is a stream or a source
+    [[nodiscard]] link_monitor& monitor() noexcept { return *monitor_; }
     /// Closes the link at once; `on_lost` is not called.
     void abandon(std::string_view why);
     /// Sends a BIND for `feed`, which receives the updates from then on.
-    void bind(core::feed_machine& feed, protocol::outgoing_request request, time_point deadline,
+    void bind(feed_machine& feed, protocol::outgoing_request request, time_point deadline,
               detail::pending_ptr operation);
-    void unbind(core::feed_machine& feed);
+    void unbind(feed_machine& feed);
     /// Whether the peer's reply to BIND names the update that it holds; empty until the peer has been asked.
     [[nodiscard]] std::optional<bool> marks() const noexcept { return marks_; }
     void set_marks(bool does) noexcept { marks_ = does; }
@@ -78,12 +68,12 @@ class connection final : public link_events,
     void flush() override;
     [[nodiscard]] bool write() override;
     [[nodiscard]] bool has_single_request() override { return session_.asking().in_flight() <= 1; }
-    [[nodiscard]] std::shared_ptr<core::flushable> share() override { return shared_from_this(); }
+    [[nodiscard]] std::shared_ptr<flushable> share() override { return shared_from_this(); }
 
     // line_sink
     std::string& output() override { return link_->output(); }
     std::string& urgent_output() override { return link_->urgent_output(); }
-    [[nodiscard]] std::shared_ptr<core::memory_account> memory() const override { return memory_; }
+    [[nodiscard]] std::shared_ptr<memory_account> memory() const override { return memory_; }
     [[nodiscard]] bool reserve(std::size_t more) override { return held_output_.try_resize(link_->unsent() + more); }
     [[nodiscard]] std::size_t datagram() const noexcept override { return link_->datagram(); }
     void wake() override;
@@ -98,27 +88,25 @@ class connection final : public link_events,
     void put_updates(std::string_view lines) override;
 
   private:
-    struct stall_watch final : core::deadline {
-        explicit stall_watch(connection& c) : owner(c) {}
-        void on_deadline(time_point now) override { owner.on_stall(now); }
+    /// Watches whether bytes move.
+    struct watch final : deadline {
+        using function = void (connection::*)(time_point now);
+        watch(connection& c, function expired) : owner(c), on_expiry(expired) {}
+        void on_deadline(time_point now) override { (owner.*on_expiry)(now); }
         connection& owner;
-        std::uint64_t sent = 0;
-    };
-
-    struct idle_watch final : core::deadline {
-        explicit idle_watch(connection& c) : owner(c) {}
-        void on_deadline(time_point now) override { owner.on_idle(now); }
-        connection& owner;
-        std::uint64_t moved = 0; // bytes received and sent
+        function on_expiry;
+        std::uint64_t moved = 0; // bytes so far, when it was armed
     };
 
     time_point now();
     /// The peer has sent something. Returns false if that has been rejected, because the connection is refused.
     bool accept_input(std::string_view text);
     void rethrow_handler_exception();
-    void on_quiet() override;
+    // link_monitor::owner
     void on_silence() override;
     void on_probe() override;
+    void evict() override;
+
     void on_stall(time_point now);
     void schedule_buffer_release();
     void on_idle(time_point now);
@@ -134,15 +122,14 @@ class connection final : public link_events,
     link_ptr link_;
     origin from_;
     std::uint64_t number_;
-    std::shared_ptr<core::memory_account> memory_;
-    core::memory_reservation held_output_{memory_};
+    std::shared_ptr<memory_account> memory_;
+    memory_reservation held_output_{memory_};
     core::session session_;
-    stall_watch stall_;
-    idle_watch idle_;
-    std::optional<core::datagram_output> datagrams_;
-    std::optional<core::idle_timer> idle_timer_; // for a source of datagrams
-    std::optional<core::link_monitor> monitor_;  // for a stream
-    std::vector<core::feed_machine*> feeds_;
+    watch stall_{*this, &connection::on_stall}; // of bytes sent
+    watch idle_{*this, &connection::on_idle};   // of bytes sent and received
+    std::optional<datagram_output> datagrams_;
+    std::optional<link_monitor> monitor_; // of a stream, or a source of datagrams
+    std::vector<feed_machine*> feeds_;
     std::optional<bool> marks_;
     std::optional<time_point> now_; // cached while a batch is processed
     unsigned lines_ = 0;            // in this batch

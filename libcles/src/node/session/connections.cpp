@@ -1,17 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/connections.hpp"
 
-#include "node/base/ip_network.hpp"
+#include "node/base/scoped_flag.hpp"
 #include "node/local_node.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/session/request_checks.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <string>
 #include <utility>
 
 namespace cles::core {
@@ -22,8 +17,8 @@ std::string address_of(const identity& peer) {
     if (peer.uid) {
         return "user " + std::to_string(*peer.uid);
     }
-    const auto host = core::host_of(peer);
-    return host.empty() ? peer.transport : core::share_of_address(host);
+    const auto host = host_of(peer);
+    return host.empty() ? peer.transport : share_of_address(host);
 }
 
 // How many links may close gracefully at a time: each holds a descriptor for up to `limits::discard`.
@@ -51,7 +46,7 @@ class connections::refused final : public link_events {
     const link& which_; // owns this object
 };
 
-void connections::start() { admission_.emplace(host_.bounds()); }
+connections::connections(local_node& host) noexcept : host_(host), admission_(host.bounds()) {}
 
 void connections::stop() {
     for (const auto& [key, parting] : std::exchange(closing_links_, {})) {
@@ -89,7 +84,7 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
 bool connections::has_room(const link& arrived) {
     const auto most = host_.bounds().links;
     if (arrived.datagram() == 0) {
-        return admission_->make_room(address_of(arrived.peer()), host_.now());
+        return admission_.make_room(address_of(arrived.peer()), host_.now());
     }
     if (sources_ >= most) {
         drop_idle_sources();
@@ -112,8 +107,7 @@ void connections::reject(link_ptr arrived) {
         adopt(std::move(arrived), connection::origin::refused);
         return;
     }
-    protocol::append_failure(arrived->output(), core::link_limit_reached(host_.node()));
-    arrived->output().push_back('\n');
+    append_link_refusal(arrived->output(), host_.node());
     // The link is read until it closes: closing it with unread input would send a reset, which could discard the line.
     arrived->start(std::make_shared<refused>(host_.weak_from_this(), *arrived));
     close_gracefully(std::move(arrived));
@@ -128,7 +122,7 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
         if (c->datagram() != 0) {
             ++sources_;
         } else {
-            admission_->enter(*c, address);
+            admission_.enter(c->monitor(), address);
         }
     }
     ++host_.node().counts.links_open;
@@ -136,22 +130,18 @@ std::shared_ptr<connection> connections::adopt(link_ptr made, connection::origin
         c->session().expect_refusal();
     }
     if (host_.closing()) {
-        refuse_new_requests(*c);
+        refuse_new_requests();
     }
     c->start();
     return c;
 }
 
+// This process's own handlers may still send requests: they need them to complete.
 void connections::refuse_new_requests() {
     for (const auto& [key, c] : open_) {
-        refuse_new_requests(*c);
-    }
-}
-
-// This process's own handlers may still send requests: they need them to complete.
-void connections::refuse_new_requests(connection& c) {
-    if (c.from() != connection::origin::local) {
-        c.session().serving().refuse_new_requests();
+        if (c->from() != connection::origin::local) {
+            c->session().serving().refuse_new_requests();
+        }
     }
 }
 
@@ -163,7 +153,7 @@ bool connections::forget(connection& c, std::uint64_t received, std::uint64_t se
         if (c.datagram() != 0) {
             --sources_;
         } else {
-            admission_->leave(c);
+            admission_.leave(c.monitor());
         }
     }
     auto& counts = host_.node().counts;
@@ -192,6 +182,72 @@ std::vector<std::shared_ptr<connection>> connections::all() const {
     }
     return result;
 }
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+graceful_shutdown::graceful_shutdown(local_node& host, std::uint64_t ticket, std::chrono::milliseconds limit,
+                                     detail::pending_ptr done)
+    : host_(host), ticket_(ticket), done_(std::move(done)) {
+    const auto longest = std::chrono::milliseconds{std::chrono::hours{24}};
+    host_.deadlines().arm(*this, host_.now() + std::clamp(limit, std::chrono::milliseconds{0}, longest));
+}
+
+void graceful_shutdown::check() {
+    if (looking_ || !done_) {
+        return;
+    }
+    const scoped_flag during{looking_};
+    const auto serves = [](const auto& c) { return c->session().serving().in_flight() != 0; };
+    if (ending_ || std::ranges::none_of(host_.connections().all(), serves)) {
+        end_links();
+    }
+}
+
+// Includes links that have been accepted since the last call. A link ends when its peer has closed it too, and so has
+// read everything.
+void graceful_shutdown::end_links() {
+    if (!std::exchange(ending_, true)) {
+        host_.deadlines().arm(*this, host_.now() + host_.bounds().discard);
+    }
+    bool open = false;
+    for (const auto& c : host_.connections().all()) {
+        if (c->datagram() == 0) {
+            c->session().send_leave_notice();
+            open = true;
+        } else {
+            c->flush();
+        }
+    }
+    if (!open) {
+        end();
+    }
+}
+
+void graceful_shutdown::on_deadline(time_point) {
+    if (ending_) { // some peers do not close
+        end();
+        return;
+    }
+    const scoped_flag during{looking_};
+    for (const auto& c : host_.connections().all()) {
+        c->session().serving().abort_running();
+    }
+    end_links(); // without waiting for peers that do not read
+}
+
+void graceful_shutdown::end() {
+    host_.deadlines().disarm(*this);
+    if (done_) { // else `give_up` has returned it
+        host_.node().completions.succeed(std::move(done_), "{}");
+    }
+}
+
+detail::pending_ptr graceful_shutdown::give_up() {
+    host_.deadlines().disarm(*this);
+    return std::move(done_);
+}
+
+// -- listeners -----------------------------------------------------------------------------------------------------
 
 void listeners::start(acceptor& made, bool counted) {
     made.start([weak = host_.weak_from_this(), counted](link_ptr arrived) {

@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/line_link.hpp>
+#include <cles/pending.hpp>
 
 #include "node/session/connection.hpp"
-#include "node/session/link_admission.hpp"
 
-#include <cstddef>
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -46,16 +44,13 @@ class listeners {
     std::vector<std::unique_ptr<acceptor>> local_acceptors_; // in-process
 };
 
-class local_node;
-
 /// All connections of a service: admits them within the limits, owns them, and closes them.
 ///
 /// Sources of datagrams have their own limit: they can be forged, and must not use up the links'.
 class connections {
   public:
-    explicit connections(local_node& host) noexcept : host_(host) {}
     /// \pre the local node has its state
-    void start();
+    explicit connections(local_node& host) noexcept;
 
     /// A new link. `counted`: it comes from another process and counts against the limit.
     void on_accepted(link_ptr arrived, bool counted);
@@ -78,15 +73,43 @@ class connections {
 
     [[nodiscard]] bool has_room(const link& arrived);
     void reject(link_ptr arrived);
-    static void refuse_new_requests(connection& c);
     void drop_idle_sources();
 
     local_node& host_;
     std::map<std::uint64_t, std::shared_ptr<connection>> open_; // by number, for a deterministic order
     std::uint64_t last_number_ = 0;
     std::map<const link*, link_ptr> closing_links_;
-    std::optional<core::link_admission> admission_;
+    link_admission admission_;
     std::size_t sources_ = 0;
+};
+
+/// Shuts a service down in order, so that no request is lost (docs/protocol.md, "Leaving"): it starts nothing new,
+/// answers what it has started, announces on each link that it leaves, and waits until the links have ended.
+class graceful_shutdown final : private deadline {
+  public:
+    /// Requests that have not been answered after `limit` are aborted. `done` completes when the links have ended, or
+    /// `limits::discard` after their end began, unless `give_up` returns it first.
+    graceful_shutdown(local_node& host, std::uint64_t ticket, std::chrono::milliseconds limit,
+                      detail::pending_ptr done);
+    ~graceful_shutdown() = default;
+
+    /// Call after every event.
+    void check();
+    /// The operation's ticket while it waits, else 0.
+    [[nodiscard]] std::uint64_t ticket() const noexcept { return done_ ? ticket_ : 0; }
+    /// Stops and returns the operation; null if it has completed.
+    [[nodiscard]] detail::pending_ptr give_up();
+
+  private:
+    void on_deadline(time_point now) override;
+    void end_links();
+    void end();
+
+    local_node& host_;
+    std::uint64_t ticket_;
+    detail::pending_ptr done_;
+    bool looking_ = false;
+    bool ending_ = false; // everything that was started has been answered
 };
 
 } // namespace cles::core

@@ -1,17 +1,97 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/datagram_rules.hpp"
 
-#include <string>
+#include "node/session/reply_writer.hpp"
+
+#include <algorithm>
 
 namespace cles::core {
-namespace {
 
-bool needs_id(verb v) noexcept { return v != verb::pull && v != verb::bind; }
+// -- requests ------------------------------------------------------------------------------------------------------
 
-// A cancellation may be repeated, and takes effect even if no memory is left.
-bool runs_once(const protocol::request_line& r) noexcept { return needs_id(r.verb) && r.noun.task != "cles"; }
+dedup::~dedup() {
+    for (const auto& [id, e] : entries_) {
+        shared_.used -= e.cost;
+    }
+}
 
-} // namespace
+const dedup::entry* dedup::find(std::uint64_t id, std::string_view bytes) const {
+    const auto [first, last] = entries_.equal_range(id);
+    const auto found = std::find_if(first, last, [bytes](const auto& each) { return each.second.bytes() == bytes; });
+    return found == last ? nullptr : &found->second;
+}
+
+dedup::verdict dedup::look(std::uint64_t id, std::string_view bytes) const {
+    if (const auto* known = find(id, bytes)) {
+        return known->running ? verdict::running : verdict::answered;
+    }
+    const auto [first, last] = entries_.equal_range(id);
+    const bool runs = std::any_of(first, last, [](const auto& each) { return each.second.running; });
+    return runs ? verdict::clash : verdict::fresh;
+}
+
+std::string_view dedup::reply(std::uint64_t id, std::string_view bytes) const {
+    const auto* known = find(id, bytes);
+    return known == nullptr ? std::string_view{} : std::string_view{known->text}.substr(known->request);
+}
+
+bool dedup::begin(std::uint64_t id, std::string_view bytes, std::size_t max_reply) {
+    const auto cost = cost_of_entry + bytes.size() + max_reply;
+    if (shared_.used + cost > shared_.limit) {
+        return false;
+    }
+    enter(id, bytes, true, cost);
+    return true;
+}
+
+void dedup::add_repeatable(std::uint64_t id, std::string_view bytes) {
+    enter(id, bytes, false, cost_of_entry + bytes.size());
+}
+
+void dedup::enter(std::uint64_t id, std::string_view bytes, bool once, std::size_t cost) {
+    const auto at = entries_.emplace(id, entry{.text = std::string{bytes}, .request = bytes.size(), .once = once});
+    charge(at->second, cost);
+}
+
+void dedup::charge(entry& e, std::size_t cost) noexcept {
+    shared_.used = shared_.used - e.cost + cost;
+    e.cost = cost;
+}
+
+void dedup::forget(entries::iterator which) noexcept {
+    charge(which->second, 0);
+    entries_.erase(which);
+}
+
+void dedup::set_reply(std::uint64_t id, std::string_view reply, time_point now) {
+    const auto [first, last] = entries_.equal_range(id);
+    const auto at = std::find_if(first, last, [](const auto& each) { return each.second.running; });
+    if (at == last) {
+        return;
+    }
+    auto& e = at->second;
+    if (!e.once) {
+        forget(at);
+        return;
+    }
+    e.running = false;
+    e.text.append(reply);
+    charge(e, cost_of_entry + e.text.size());
+    done_.push_back({at, now + memory});
+    if (!armed()) {
+        deadlines_.arm(*this, done_.front().until);
+    }
+}
+
+void dedup::on_deadline(time_point now) {
+    while (!done_.empty() && done_.front().until <= now) {
+        forget(done_.front().which);
+        done_.pop_front();
+    }
+    if (!done_.empty()) {
+        deadlines_.arm(*this, done_.front().until);
+    }
+}
 
 datagram_requests::datagram_requests(node_state& host, line_sink& out, reply_writer& replies)
     : node_(host), out_(out), replies_(replies), seen_(host.deadlines, host.remembered) {
@@ -19,13 +99,13 @@ datagram_requests::datagram_requests(node_state& host, line_sink& out, reply_wri
 }
 
 bool datagram_requests::admit(const protocol::request_line& r) {
+    const bool needs_id = r.verb != verb::pull && r.verb != verb::bind;
     if (r.id == 0) {
-        if (needs_id(r.verb)) {
+        if (needs_id) {
             replies_.fail(r, errc::bad_request,
                           node_.name + ": by datagram, " + std::string{to_string(r.verb)} + " needs an 'id'");
-            return false;
         }
-        return true;
+        return !needs_id;
     }
     switch (seen_.look(r.id, r.text)) {
     case dedup::verdict::fresh: break;
@@ -35,18 +115,68 @@ bool datagram_requests::admit(const protocol::request_line& r) {
         out_.output().append(seen_.reply(r.id, r.text));
         return false;
     case dedup::verdict::clash:
-        replies_.fail_apart(reply_target{r}, {.code = errc::bad_request,
-                                              .message = node_.name + ": the id " + std::to_string(r.id) +
-                                                         " is in flight with another request"});
+        reply_target where{r};
+        where.apart = true;
+        replies_.fail(
+            where, {.code = errc::bad_request,
+                    .message = node_.name + ": the id " + std::to_string(r.id) + " is in flight with another request"});
         return false;
     }
-    if (runs_once(r) && !seen_.begin(r.id, r.text, out_.datagram())) {
+    // A cancellation may be repeated, and takes effect even if no memory is left.
+    if (needs_id && r.noun.task != "cles" && !seen_.begin(r.id, r.text, out_.datagram())) {
         replies_.fail(r, {.code = errc::busy,
                           .message = node_.name + " remembers as many requests by datagram as it may",
                           .retry_ms = 1000});
         return false;
     }
     return true;
+}
+
+// -- output --------------------------------------------------------------------------------------------------------
+
+bool reflection_limit::admit(std::string_view address, std::size_t bytes, time_point now) {
+    auto* b = find_or_make(address, now);
+    if (b == nullptr) {
+        return false;
+    }
+    b->fill(now);
+    if (b->room < static_cast<double>(bytes)) {
+        return false;
+    }
+    b->room -= static_cast<double>(bytes);
+    return true;
+}
+
+void reflection_limit::bucket::fill(time_point now) noexcept {
+    const auto passed = std::chrono::duration<double>{now - at}.count();
+    room = std::min(room + passed * static_cast<double>(bytes_per_second), static_cast<double>(at_once));
+    at = now;
+}
+
+reflection_limit::bucket* reflection_limit::find_or_make(std::string_view address, time_point now) {
+    if (const auto found = buckets_.find(address); found != buckets_.end()) {
+        return &found->second;
+    }
+    if (buckets_.size() >= max_addresses) {
+        forget_full(now);
+        if (buckets_.size() >= max_addresses) {
+            return nullptr; // too many addresses to track: the newest get nothing
+        }
+    }
+    return &buckets_.emplace(std::string{address}, bucket{.at = now}).first->second;
+}
+
+// An address whose bucket is full needs no entry. Searched at most every 100 ms, so that a flood of forged addresses
+// does not cost a search each.
+void reflection_limit::forget_full(time_point now) {
+    if (now - tidied_ < std::chrono::milliseconds{100}) {
+        return;
+    }
+    tidied_ = now;
+    boost::unordered::erase_if(buckets_, [now](auto& each) {
+        each.second.fill(now);
+        return each.second.room >= static_cast<double>(at_once);
+    });
 }
 
 void datagram_output::append_updates(std::string& out, std::string_view lines) {

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
 
 #include <exception>
 

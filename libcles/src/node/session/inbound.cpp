@@ -1,16 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/inbound.hpp"
 
-#include "node/base/deadlines.hpp"
-#include "node/session/call.hpp"
-#include "node/session/reply_writer.hpp"
+#include "node/routing/router.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/session/reserved_tasks.hpp"
-#include "node/session/task_execution.hpp"
 
-#include <algorithm>
-#include <chrono>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -36,24 +30,22 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
     ++(is_housekeeping(r) ? node_->counts.housekeeping : node_->counts.requests[static_cast<std::size_t>(r.verb)]);
     if (r.id != 0 && calls_.contains(r.id)) {
         replies_.fail(r, errc::bad_request, node_->name + ": the id " + std::to_string(r.id) + " is in flight already");
-        lose();
-        ending_ = closing_ = true;
-        finish_if_done();
+        break_off();
         return;
     }
     if (const auto id = r.verb == verb::push ? cancelled_id(r.noun) : std::nullopt) {
-        serve_cancel(r, *id, now);
+        serve_cancel(r, *id);
         return;
     }
     if (refuses_new_requests_) {
-        refuse_in_turn(r, shutting_down(*node_), now);
+        refuse_in_turn(reply_target{r}, shutting_down(*node_));
         return;
     }
     if (r.id == 0 && ordered_.must_wait()) {
         const bool too_many = in_flight() >= node_->bounds.in_flight;
         if (too_many || !ordered_.push(line, now, r.noun.task == "cles")) {
-            refuse_in_turn(
-                r, too_many ? busy(node_->name + ": too many requests wait on this link") : no_memory(*node_), now);
+            refuse_in_turn(reply_target{r},
+                           too_many ? busy(node_->name + ": too many requests wait on this link") : no_memory(*node_));
         }
         return;
     }
@@ -66,54 +58,43 @@ void inbound::on_request(std::string_view line, const protocol::request_line& r,
     serve(r, now, now);
 }
 
-void inbound::on_malformed(std::string_view, const protocol::malformed_request& what, time_point now) {
+void inbound::on_malformed(const protocol::malformed_request& what) {
     if (ending_) {
         return;
     }
-    const protocol::failure why{.code = errc::bad_request, .message = node_->name + ": " + what.why};
+    refuse_in_turn(reply_target{what}, {.code = errc::bad_request, .message = node_->name + ": " + what.why});
     if (!datagrams_ && what.id != 0 && calls_.contains(what.id)) {
-        replies_.fail({what.id, what.wants_reply}, why);
-        lose();
-        ending_ = closing_ = true;
-        finish_if_done();
-    } else if (must_wait(what.id, what.wants_reply)) {
-        ordered_.push_reply(failure_text(why), now);
-    } else {
-        replies_.fail_apart({what.id, what.wants_reply}, why);
+        break_off();
     }
 }
 
-void inbound::on_overlong(std::string_view head, time_point now) {
+void inbound::on_overlong(std::string_view head) {
     if (ending_) {
         return;
     }
-    const auto meant = protocol::salvage(head);
-    const auto why = overlong(*node_, out_.datagram());
-    if (must_wait(meant.id, meant.wants_reply)) {
-        ordered_.push_reply(failure_text(why), now);
-    } else {
-        replies_.fail_apart({meant.id, meant.wants_reply}, why);
+    refuse_in_turn(reply_target{protocol::salvage(head)}, overlong(*node_, out_.datagram()));
+    if (!datagrams_) { // datagrams are independent of each other
+        closing_ = true;
+        end();
     }
-    if (datagrams_) { // datagrams are independent of each other
-        return;
-    }
-    closing_ = true;
-    end(now);
 }
 
-void inbound::end(time_point) {
+void inbound::end() {
     ending_ = true;
-    withdraw_all();
-    finish_if_done();
-}
-
-void inbound::withdraw_all() {
     while (!calls_.empty()) {
         withdraw(calls_.begin()->first);
     }
+    finish_if_done();
 }
 
-void inbound::drop_all() {
+void inbound::break_off() {
+    lose();
+    ending_ = closing_ = true;
+    finish_if_done();
+}
+
+void inbound::lose() {
+    lost_ = true;
     auto calls = std::exchange(calls_, {});
     const auto anonymous = ordered_.clear();
     for (auto& [id, c] : calls) {
@@ -147,7 +128,7 @@ void inbound::abort_running() {
         }
     }
     while (has_more() && !ordered_.is_serving()) {
-        serve_waiting(node_->time.now());
+        serve_more(node_->time.now());
     }
 }
 
@@ -160,15 +141,15 @@ void inbound::finish_if_done() {
 
 // -- requests without an id run one after another ------------------------------------------------------------------
 
-void inbound::refuse_in_turn(const protocol::request_line& r, const protocol::failure& why, time_point now) {
-    if (must_wait(r.id, r.wants_reply)) {
-        ordered_.push_reply(failure_text(why), now);
+void inbound::refuse_in_turn(reply_target where, const protocol::failure& why) {
+    if (must_wait(where)) {
+        ordered_.push_reply(failure_text(why));
     } else {
-        replies_.fail(r, why);
+        replies_.fail(where, why);
     }
 }
 
-void inbound::serve_waiting(time_point now) {
+void inbound::serve_more(time_point now) {
     if (!ordered_.is_serving()) {
         ordered_.serve([&](const protocol::request_line& r, time_point arrived) { serve(r, arrived, now); });
         finish_if_done();
@@ -178,7 +159,8 @@ void inbound::serve_waiting(time_point now) {
 // -- serving -------------------------------------------------------------------------------------------------------
 
 void inbound::serve(const protocol::request_line& r, time_point arrived, time_point now) {
-    if (now - arrived >= std::chrono::milliseconds{r.deadline_ms}) {
+    const auto due = saturating_add(arrived, std::chrono::milliseconds{r.deadline_ms});
+    if (now >= due) {
         replies_.fail(r, errc::deadline, node_->name + ": its time ran out while it waited for its turn");
         return;
     }
@@ -192,45 +174,47 @@ void inbound::serve(const protocol::request_line& r, time_point arrived, time_po
         return;
     }
     if (is_local_target(*node_, r)) {
-        serve_locally(r, arrived, now);
-        return;
-    }
-    const auto due = saturating_add(arrived, std::chrono::milliseconds{r.deadline_ms});
-    if (r.verb == verb::bind) {
+        serve_locally(r, due, now);
+    } else if (r.verb == verb::bind) {
         bound_.serve_remote(r, due, now, *this);
         finish_if_done();
     } else if (!node_->active_router->route(r, peer_, due, now, *this)) {
         if (lost_) { // by user code that reports the load
             replies_.fail(r, protocol::failure{.code = errc::unavailable, .message = {}});
         } else {
-            serve_locally(r, arrived, now);
+            serve_locally(r, due, now);
         }
     }
 }
 
-void inbound::serve_locally(const protocol::request_line& r, time_point arrived, time_point now) {
+void inbound::serve_locally(const protocol::request_line& r, time_point due, time_point now) {
     if (r.noun.task == "cles") {
         serve_reserved(*node_, replies_, r, peer_);
     } else if (r.verb == verb::bind) {
-        bound_.serve(r, saturating_add(arrived, std::chrono::milliseconds{r.deadline_ms}), now, *this);
+        bound_.serve(r, due, now, *this);
         finish_if_done();
     } else {
-        serve_task(r, arrived, now);
+        auto storage = std::exchange(decoded_, {}); // the handler may cause other requests to be served meanwhile
+        task_execution{node_, r, peer_, due, now, storage}.run(*this, memory_);
+        constexpr std::size_t kept = 4096;
+        if (storage.capacity() <= kept) {
+            decoded_ = std::move(storage);
+        }
     }
 }
 
 // Takes effect at once, however much is in flight. Without an id, the reply still waits its turn.
-void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id, time_point now) {
-    const auto why = refusal_reason(*node_, peer_, r);
-    if (!why) {
-        withdraw(id);
+void inbound::serve_cancel(const protocol::request_line& r, std::uint64_t id) {
+    const reply_target where{r};
+    if (const auto why = refusal_reason(*node_, peer_, r)) {
+        refuse_in_turn(where, *why);
+        return;
     }
-    if (must_wait(r.id, r.wants_reply)) {
-        ordered_.push_reply(why ? failure_text(*why) : "{}", now);
-    } else if (why) {
-        replies_.fail(r, *why);
+    withdraw(id);
+    if (must_wait(where)) {
+        ordered_.push_reply("{}");
     } else {
-        replies_.done(reply_target{r}, {});
+        replies_.done(where, {});
     }
 }
 
@@ -242,13 +226,6 @@ void inbound::withdraw(std::uint64_t id) {
     }
 }
 
-void inbound::serve_task(const protocol::request_line& r, time_point arrived, time_point now) {
-    const auto due = saturating_add(arrived, std::chrono::milliseconds{r.deadline_ms});
-    auto storage = std::exchange(decoded_, {}); // the handler may cause other requests to be served meanwhile
-    task_execution{node_, r, peer_, due, now, storage}.run(*this, memory_);
-    shrink_if_large(decoded_ = std::move(storage));
-}
-
 std::shared_ptr<call> inbound::make_call(const protocol::request_line& r, time_point due, time_point now) {
     if (lost_) {
         replies_.fail(r, protocol::failure{.code = errc::unavailable, .message = {}});
@@ -258,10 +235,9 @@ std::shared_ptr<call> inbound::make_call(const protocol::request_line& r, time_p
         replies_.fail(r, *why);
         return nullptr;
     }
-    auto wanted = call::terms_of(r);
+    call::terms wanted{r};
     wanted.routed = true;
-    call_owner& owner = *this;
-    auto c = call::begin(node_, owner, std::move(wanted), memory_, r.text.size(), due, now);
+    auto c = call::begin(node_, *this, std::move(wanted), memory_, r.text.size(), due, now);
     if (c) {
         keep(r, c);
     } else {
@@ -309,8 +285,6 @@ void inbound::refuse(const task_execution& task, const protocol::failure& why) {
     }
 }
 
-void inbound::keep(const task_execution& task, const std::shared_ptr<call>& c) { keep(task.line(), c); }
-
 void inbound::answer(const call& c, std::string_view json) {
     replies_.done(reply_target{c.wanted()}, json, c.head());
     forget(c);
@@ -326,8 +300,7 @@ bool inbound::report(const call& c, double fraction, std::string_view json) {
         return false;
     }
     if (!out_.is_behind()) { // else the next report supersedes it
-        auto& out = c.wanted().urgent ? out_.urgent_output() : out_.output();
-        append_progress_line(out, c.wanted().id, fraction, json, replies_.longest());
+        replies_.progress(reply_target{c.wanted()}, fraction, json);
         out_.wake();
     }
     return true;

@@ -1,22 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/identity.hpp>
-#include <cles/limits.hpp>
-
-#include "node/base/memory_budget.hpp"
-#include "node/node_state.hpp"
 #include "node/publish/bind_requests.hpp"
-#include "node/routing/router.hpp"
-#include "node/session/call.hpp"
 #include "node/session/datagram_rules.hpp"
-#include "node/session/line_sink.hpp"
 #include "node/session/ordered_requests.hpp"
 #include "node/session/reply_writer.hpp"
 #include "node/session/task_execution.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
 
@@ -26,7 +15,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 
 namespace cles::core {
 
@@ -34,7 +22,7 @@ namespace cles::core {
 ///
 /// Requests with an id start at once; those without run one after another. Plain handlers run inline and write their
 /// replies to the link's output; other handlers become calls. Only `on_request` and `serve_more` start handlers.
-class inbound final : private task_sink, private call_factory {
+class inbound final : private task_sink {
   public:
     inbound(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer);
     inbound(const inbound&) = delete;
@@ -44,26 +32,26 @@ class inbound final : private task_sink, private call_factory {
     /// A valid request; `line` is its text.
     void on_request(std::string_view line, const protocol::request_line& request, time_point now);
     /// A line that is not a valid request.
-    void on_malformed(std::string_view line, const protocol::malformed_request& what, time_point now);
+    void on_malformed(const protocol::malformed_request& what);
     /// A line over the limit: it is answered, then a stream ends.
-    void on_overlong(std::string_view head, time_point now);
+    void on_overlong(std::string_view head);
     /// The peer sends no more: requests with an id are cancelled, the others are still answered, then the link
     /// finishes.
-    void end(time_point now);
+    void end();
     /// The link is lost.
-    void lose() {
-        lost_ = true;
-        drop_all();
-    }
+    void lose();
     /// From now on, new and waiting requests are answered with `busy`. Running ones still complete.
     void refuse_new_requests() noexcept { refuses_new_requests_ = true; }
     /// Answers running requests with `unavailable` and stops their handlers; answers waiting ones with `busy`.
     void abort_running();
 
+    /// A call for a request that is answered later. Null if there are too many; the request has then been refused.
+    std::shared_ptr<call> make_call(const protocol::request_line& request, time_point due, time_point now);
+
     /// Whether requests are ready to run, but exceed what one pass serves.
     [[nodiscard]] bool has_more() const noexcept { return ordered_.has_more(); }
     /// Serves some of them.
-    void serve_more(time_point now) { serve_waiting(now); }
+    void serve_more(time_point now);
     /// Sends pending updates: the link has room again.
     void drain(time_point now) { bound_.drain(now); }
     [[nodiscard]] std::size_t in_flight() const noexcept { return calls_.size() + ordered_.size(); }
@@ -77,29 +65,25 @@ class inbound final : private task_sink, private call_factory {
     static constexpr std::size_t max_frame = 64; // around a reply: "id=7 " and the closing characters
 
     void serve(const protocol::request_line& request, time_point arrived, time_point now);
-    void serve_cancel(const protocol::request_line& request, std::uint64_t id, time_point now);
-    void serve_locally(const protocol::request_line& request, time_point arrived, time_point now);
-    void serve_task(const protocol::request_line& request, time_point arrived, time_point now);
+    void serve_cancel(const protocol::request_line& request, std::uint64_t id);
+    void serve_locally(const protocol::request_line& request, time_point due, time_point now);
     void keep(const protocol::request_line& request, const std::shared_ptr<call>& c);
     void forget(const call& c);
-    std::shared_ptr<call> make_call(const protocol::request_line& request, time_point due, time_point now) override;
 
-    /// Whether a reply to such a request has to wait for its turn.
-    [[nodiscard]] bool must_wait(std::uint64_t id, bool wants_reply) const noexcept {
-        return id == 0 && wants_reply && ordered_.must_wait();
+    /// Whether the reply has to wait for its turn.
+    [[nodiscard]] bool must_wait(reply_target where) const noexcept {
+        return where.id == 0 && where.wanted && ordered_.must_wait();
     }
-    void refuse_in_turn(const protocol::request_line& request, const protocol::failure& why, time_point now);
-    void serve_waiting(time_point now);
-    void withdraw_all();
-    void drop_all();
-    void finish_if_done();
-
+    void refuse_in_turn(reply_target where, const protocol::failure& why);
     void withdraw(std::uint64_t id);
+    /// The peer has broken the protocol: it gets what has been written, and then the link ends.
+    void break_off();
+    void finish_if_done();
 
     // task_sink
     void write_result(task_execution& task) override;
     void refuse(const task_execution& task, const protocol::failure& why) override;
-    void keep(const task_execution& task, const std::shared_ptr<call>& c) override;
+    void keep(const task_execution& task, const std::shared_ptr<call>& c) override { keep(task.line(), c); }
     void answer(const call& c, std::string_view json) override;
     void refuse(const call& c, const protocol::failure& why) override;
     [[nodiscard]] bool can_answer(std::size_t bytes) override { return out_.reserve(bytes + max_frame); }

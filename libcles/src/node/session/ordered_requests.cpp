@@ -15,23 +15,32 @@ constexpr std::size_t bytes_per_turn = 65536;
 
 } // namespace
 
-bool ordered_requests::push(std::string_view line, time_point now, bool always) {
-    if (!waiting_.push_line(line, now, always)) {
+bool ordered_requests::push(std::string_view line, time_point arrived, bool always) {
+    const auto bytes = held_.size() + line.size();
+    if (always) {
+        held_.resize(bytes);
+    } else if (!held_.try_resize(bytes)) {
         return false;
     }
+    waiting_.push_back({.line = std::string{line}, .reply = {}, .arrived = arrived});
     update_pause();
     return true;
 }
 
-void ordered_requests::push_reply(std::string reply, time_point now) {
-    waiting_.push_reply(std::move(reply), now);
+void ordered_requests::push_reply(std::string reply) {
+    held_.resize(held_.size() + reply.size());
+    if (!waiting_.empty() && waiting_.back().line.empty() && waiting_.back().reply == reply) {
+        ++waiting_.back().times;
+    } else {
+        waiting_.push_back({.line = {}, .reply = std::move(reply)});
+    }
     update_pause();
 }
 
 // Pauses reading while the waiting requests take too much memory.
 void ordered_requests::update_pause() {
     const auto most = node_.bounds.waiting;
-    const bool too_much = waiting_.bytes() > (paused_ ? most / 2 : most);
+    const bool too_much = held_.size() > (paused_ ? most / 2 : most);
     if (too_much != paused_) {
         paused_ = too_much;
         out_.pause(too_much);
@@ -47,7 +56,9 @@ void ordered_requests::serve(const serve_function& run) {
             out_.wake(); // continues after the pending output has been sent
             break;
         }
-        const auto next = waiting_.pop();
+        const auto next = std::move(waiting_.front());
+        waiting_.pop_front();
+        held_.resize(held_.size() - next.line.size() - next.reply.size() * next.times);
         if (!next.line.empty()) {
             protocol::request_line r;
             protocol::malformed_request ignored;
@@ -64,6 +75,7 @@ void ordered_requests::serve(const serve_function& run) {
 
 std::shared_ptr<call> ordered_requests::clear() noexcept {
     waiting_.clear();
+    held_.resize(0);
     return std::exchange(running_, nullptr);
 }
 

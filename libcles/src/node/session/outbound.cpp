@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/outbound.hpp"
 
-#include "node/session/request_checks.hpp"
-
 #include <algorithm>
-#include <string>
 #include <utility>
 
 namespace cles::core {
@@ -27,18 +24,18 @@ void outbound::send(protocol::outgoing_request request, time_point deadline, tim
     request.id += first_id_;
     auto& out = out_.output();
     const auto line = out.size();
-    e->no_memory = !has_memory_for(request);
+    const bool has_memory = has_memory_for(request);
     protocol::append_request(out, request);
     e->operation = std::move(operation);
     e->progress = std::move(progress);
     if (out.size() - line > longest()) {
-        e->too_large = true;
-        e->no_memory = false;
+        e->refused = errc::too_large;
+    } else if (!has_memory) {
+        e->refused = errc::busy;
+    }
+    if (e->refused) {
         out.resize(line);
         node_.deadlines.arm(*e, now); // fails later: no operation completes inside its initiation
-    } else if (e->no_memory) {
-        out.resize(line);
-        node_.deadlines.arm(*e, now);
     } else if (is_datagram()) {
         e->copies.emplace(out.substr(line), now, deadline,
                           static_cast<std::uint32_t>((e->id + first_id_) * 2654435761U));
@@ -61,11 +58,11 @@ bool outbound::has_memory_for(const protocol::outgoing_request& r) {
 std::size_t outbound::longest() const noexcept { return is_datagram() ? out_.datagram() : node_.bounds.line + 1; }
 
 void outbound::on_due(entry& e, time_point now) {
-    if (e.too_large) {
+    if (e.refused == errc::too_large) {
         fail(e.id, errc::too_large,
              is_datagram() ? "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP"
                            : "a request has at most " + std::to_string(node_.bounds.line) + " bytes");
-    } else if (e.no_memory) {
+    } else if (e.refused) {
         fail(e.id, errc::busy, "too much waits for the peer or others to take it (limits.memory)");
     } else if (e.copies && !e.copies->over(now)) {
         out_.output().append(e.copies->again(now));
@@ -94,8 +91,7 @@ void outbound::recycle(std::unique_ptr<entry> e) {
         e->progress = nullptr;
         e->reported = 0;
         e->copies.reset();
-        e->too_large = false;
-        e->no_memory = false;
+        e->refused.reset();
         spare_.push_back(std::move(e));
     }
 }

@@ -4,16 +4,13 @@
 #include <cles/pending.hpp>
 
 #include "node/base/backoff.hpp"
-#include "node/base/deadlines.hpp"
 #include "node/node_state.hpp"
 #include "node/session/line_sink.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <boost/unordered/unordered_flat_map.hpp>
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -81,8 +78,7 @@ class outbound {
         progress_function progress;
         double reported = 0;
         std::optional<retransmission> copies; // over datagrams
-        bool too_large = false;
-        bool no_memory = false;
+        std::optional<errc> refused;          // why it was not sent
     };
 
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }

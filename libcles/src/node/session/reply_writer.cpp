@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/reply_writer.hpp"
 
-#include "node/session/dedup.hpp"
-
 #include <algorithm>
-#include <utility>
 
 namespace cles::core {
 namespace {
@@ -37,9 +34,9 @@ reply_writer::reply_writer(node_state& host, line_sink& out) noexcept
     : node_(host), out_(out),
       max_reply_(out.datagram() == 0 ? host.bounds.line : std::min(host.bounds.line, out.datagram() - 1)) {}
 
-void reply_writer::note(std::uint64_t id, std::string_view reply) {
-    if (seen_ != nullptr && id != 0 && !seen_->empty()) {
-        seen_->set_reply(id, reply, node_.time.now());
+void reply_writer::note(reply_target where, std::string_view reply) {
+    if (seen_ != nullptr && where.id != 0 && !where.apart && !seen_->empty()) {
+        seen_->set_reply(where.id, reply, node_.time.now());
     }
 }
 
@@ -72,16 +69,16 @@ void reply_writer::send(reply_target where, std::string& text, std::size_t body)
     } else if (where.wanted) {
         text.push_back('\n');
         output_for(where).append(text);
-        note(where.id, text);
+        note(where, text);
     } else {
-        note(where.id, {});
+        note(where, {});
     }
 }
 
 void reply_writer::fail(reply_target where, const protocol::failure& why) {
     if (!where.wanted) {
         ++(where.housekeeping ? node_.counts.housekeeping_errors : node_.counts.errors_unsent);
-        note(where.id, {});
+        note(where, {});
         return;
     }
     ++(where.housekeeping ? node_.counts.housekeeping_errors : node_.counts.errors);
@@ -101,13 +98,20 @@ void reply_writer::fail(reply_target where, const protocol::failure& why) {
         protocol::append_failure(out, told);
     }
     out.push_back('\n');
-    note(where.id, std::string_view{out}.substr(line));
+    note(where, std::string_view{out}.substr(line));
 }
 
-void reply_writer::fail_apart(reply_target where, const protocol::failure& why) {
-    auto* seen = std::exchange(seen_, nullptr);
-    fail(where, why);
-    seen_ = seen;
+void reply_writer::progress(reply_target where, double fraction, std::string_view json) {
+    auto& out = output_for(where);
+    const auto line = out.size();
+    protocol::append_progress_head(out, where.id, fraction);
+    const auto body = out.size();
+    out.append(json);
+    close_body(out, body);
+    if (out.size() - line > max_reply_) {
+        out.replace(body, out.size() - body, "{}");
+    }
+    out.push_back('\n');
 }
 
 } // namespace cles::core

@@ -3,10 +3,8 @@
 
 #include <cles/json_writer.hpp>
 
-#include "node/node_state.hpp"
 #include "node/session/call.hpp"
 #include "node/session/line_sink.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -47,14 +45,20 @@ struct reply_target {
     bool urgent = false;
     bool housekeeping = false;
     bool reserved = false; ///< for the task `cles`, which is answered even without free memory
+    bool apart = false;    ///< not the reply to the request in flight with that id
 
-    reply_target(std::uint64_t of, bool reply_wanted, bool is_urgent = false) noexcept
-        : id(of), wanted(reply_wanted), urgent(is_urgent && of != 0) {} // without an id, order matters
     explicit reply_target(const call::terms& r) noexcept : reply_target(r.id, r.wants_reply, r.urgent) {}
     explicit reply_target(const protocol::request_line& r) noexcept : reply_target(r.id, r.wants_reply, r.urgent) {
         housekeeping = is_housekeeping(r);
         reserved = r.noun.task == "cles";
     }
+    explicit reply_target(const protocol::malformed_request& r) noexcept : reply_target(r.id, r.wants_reply, false) {
+        apart = true;
+    }
+
+  private:
+    reply_target(std::uint64_t of, bool reply_wanted, bool is_urgent) noexcept
+        : id(of), wanted(reply_wanted), urgent(is_urgent && of != 0) {} // without an id, order matters
 };
 
 /// Writes the replies of one link: a handler's result, or the failure that replaces it.
@@ -87,19 +91,20 @@ class reply_writer {
     /// Sends a reply with this body; empty means {}. `head`: adverbs before it, if the request had an id.
     void done(reply_target where, std::string_view body, std::string_view head = {});
     void fail(reply_target where, const protocol::failure& why);
-    /// The same, if it does not answer the request in flight with that id.
-    void fail_apart(reply_target where, const protocol::failure& why);
     void fail(const protocol::request_line& r, const protocol::failure& why) { fail(reply_target{r}, why); }
     void fail(const protocol::request_line& r, errc code, std::string message) {
         fail(reply_target{r}, {.code = code, .message = std::move(message)});
     }
+    /// Sends an interim reply. If the line would be too long, it is sent without its details: the peer would close the
+    /// link over it, or it would not fit into a datagram.
+    void progress(reply_target where, double fraction, std::string_view json);
 
   private:
     [[nodiscard]] std::string& output_for(reply_target where) {
         return where.urgent ? out_.urgent_output() : out_.output();
     }
     void send(reply_target where, std::string& text, std::size_t body);
-    void note(std::uint64_t id, std::string_view reply);
+    void note(reply_target where, std::string_view reply);
 
     node_state& node_;
     line_sink& out_;
@@ -107,20 +112,5 @@ class reply_writer {
     dedup* seen_ = nullptr;
     std::string spare_;
 };
-
-/// Appends an interim reply and its LF. If the line would be too long, it is sent without its details: the peer would
-/// close the link over it, or it would not fit into a datagram.
-inline void append_progress_line(std::string& out, std::uint64_t id, double fraction, std::string_view json,
-                                 std::size_t longest) {
-    const auto line = out.size();
-    protocol::append_progress_head(out, id, fraction);
-    const auto body = out.size();
-    out.append(json);
-    close_body(out, body);
-    if (out.size() - line > longest) {
-        out.replace(body, out.size() - body, "{}");
-    }
-    out.push_back('\n');
-}
 
 } // namespace cles::core

@@ -6,33 +6,9 @@
 #include "protocol/grammar.hpp"
 
 #include <exception>
-#include <string>
 #include <utility>
 
 namespace cles::core {
-
-decoded_parameters decode(const protocol::noun_view& noun, std::string& storage) {
-    decoded_parameters result;
-    storage.clear();
-    storage.reserve(noun.path.size());
-    for (const auto raw : noun.parameters) {
-        if (raw.find('%') == std::string_view::npos) {
-            result.push_back(raw);
-            continue;
-        }
-        const auto start = storage.size();
-        protocol::decode_parameter(raw, storage);
-        result.push_back(std::string_view{storage}.substr(start));
-    }
-    return result;
-}
-
-void shrink_if_large(std::string& decoded) {
-    constexpr std::size_t kept = 4096;
-    if (decoded.capacity() > kept) {
-        std::string{}.swap(decoded);
-    }
-}
 
 bool is_in_via(std::string_view via, std::string_view name) {
     while (!via.empty()) {
@@ -45,30 +21,21 @@ bool is_in_via(std::string_view via, std::string_view name) {
     return false;
 }
 
-namespace {
-
-// Access rules that throw deny access.
-bool evaluate_access_rules(const node_state& n, const access& asked, std::uint64_t id) {
-    try {
-        return n.authorise(asked);
-    } catch (const std::exception& thrown) {
-        const auto why = std::string{"denied, since the access rules threw: "} + thrown.what();
-        n.write_log(log_level::error, {why, asked.peer.address, id});
-    } catch (...) {
-        n.write_log(log_level::error, {"denied, since the access rules threw", asked.peer.address, id});
-    }
-    return false;
-}
-
-} // namespace
-
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& r) {
     if (!n.authorise) {
         return true;
     }
     std::string scratch;
     const auto path = protocol::canonical_path(r.noun, scratch);
-    return evaluate_access_rules(n, {peer, r.verb, r.noun.task, path}, r.id);
+    try {
+        return n.authorise({peer, r.verb, r.noun.task, path});
+    } catch (const std::exception& thrown) {
+        const auto why = std::string{"denied, since the access rules threw: "} + thrown.what();
+        n.write_log(log_level::error, {why, peer.address, r.id});
+    } catch (...) {
+        n.write_log(log_level::error, {"denied, since the access rules threw", peer.address, r.id});
+    }
+    return false; // rules that throw deny access
 }
 
 bool is_local_target(const node_state& n, const protocol::request_line& r) {
@@ -112,16 +79,15 @@ std::optional<protocol::failure> refusal_reason(const node_state& n, const ident
     return std::nullopt;
 }
 
-bool is_leave_notice(const protocol::request_line& r) noexcept {
-    return r.verb == verb::push && !r.wants_reply && r.noun.target == "self" && r.noun.path == "cles/leaving";
-}
-
 protocol::failure shutting_down(const node_state& n) {
     return {.code = errc::busy, .message = n.name + " is shutting down", .retry_ms = 1000};
 }
 
-protocol::failure link_limit_reached(const node_state& n) {
-    return {.code = errc::busy, .message = n.name + " has as many links as it may", .retry_ms = 1000};
+void append_link_refusal(std::string& out, const node_state& n, std::uint64_t id) {
+    protocol::append_reply_head(out, id);
+    protocol::append_failure(
+        out, {.code = errc::busy, .message = n.name + " has as many links as it may", .retry_ms = 1000});
+    out.push_back('\n');
 }
 
 std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun) {

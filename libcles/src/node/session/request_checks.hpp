@@ -4,11 +4,8 @@
 #include <cles/identity.hpp>
 
 #include "node/node_state.hpp"
-#include "protocol/datagram.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
-
-#include <boost/container/static_vector.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -16,9 +13,9 @@
 #include <string>
 #include <string_view>
 
-/// The failures that refuse requests.
-
 namespace cles::core {
+
+// -- failures that refuse requests ---------------------------------------------------------------------------------
 
 protocol::failure busy(std::string message);
 /// The memory limit is reached, of the node or of this peer.
@@ -33,19 +30,7 @@ protocol::failure after_run(protocol::failure why);
 
 std::string failure_text(const protocol::failure& why);
 
-} // namespace cles::core
-
-/// The checks before a request is served.
-
-namespace cles::core {
-
-using decoded_parameters = boost::container::static_vector<std::string_view, protocol::max_parameters>;
-
-/// The decoded parameters: those with escapes are stored in `storage`, the others are views of the line.
-decoded_parameters decode(const protocol::noun_view& noun, std::string& storage);
-
-/// Releases the scratch space that a link reuses for each request's noun, if it has become unusually large.
-void shrink_if_large(std::string& decoded);
+// -- checks before a request is served -----------------------------------------------------------------------------
 
 /// Whether `name` is in the comma-separated list `via`.
 bool is_in_via(std::string_view via, std::string_view name);
@@ -60,15 +45,11 @@ bool is_local_target(const node_state& n, const protocol::request_line& request)
 std::optional<protocol::failure> refusal_reason(const node_state& n, const identity& peer,
                                                 const protocol::request_line& request);
 
-/// Whether the peer announces that it leaves: what it has not answered by then, it has not started (docs/protocol.md,
-/// "Leaving").
-bool is_leave_notice(const protocol::request_line& request) noexcept;
-
 /// The reply of a node that shuts down to new requests.
 protocol::failure shutting_down(const node_state& n);
 
-/// The reply to a link beyond the limit.
-protocol::failure link_limit_reached(const node_state& n);
+/// Appends the reply to a link beyond the limit, and its LF.
+void append_link_refusal(std::string& out, const node_state& n, std::uint64_t id = 0);
 
 /// The id in "cles/cancel/<id>"; nothing for other nouns or an invalid id.
 std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun);

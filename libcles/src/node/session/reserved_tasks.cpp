@@ -1,12 +1,16 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/reserved_tasks.hpp"
 
+#include <cles/convert.hpp>
 #include <cles/json_reader.hpp>
 #include <cles/version.hpp>
 
+#include "json/json_members.hpp"
+#include "node/membership/gossip.hpp"
 #include "node/membership/peer_table.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <string>
@@ -17,31 +21,33 @@ namespace {
 
 void write_task(json_writer& w, std::string_view verb, std::string_view task, const task_info& info) {
     w.begin_object();
-    w.key("verb");
-    w.value(verb);
-    w.key("task");
-    w.value(task);
+    write_member(w, "verb", verb);
+    write_member(w, "task", task);
     if (!info.description.empty()) {
-        w.key("description");
-        w.value(std::string_view{info.description});
+        write_member(w, "description", std::string_view{info.description});
     }
     if (!info.parameters.empty()) {
-        w.key("parameters");
-        w.begin_array();
-        for (const auto& p : info.parameters) {
-            w.value(std::string_view{p});
-        }
-        w.end_array();
+        write_member(w, "parameters", info.parameters);
     }
     if (info.idempotent) {
-        w.key("idempotent");
-        w.value(true);
+        write_member(w, "idempotent", true);
     }
     w.end_object();
 }
 
 std::int64_t milliseconds_since(time_point then, time_point now) {
     return std::chrono::duration_cast<std::chrono::milliseconds>(now - then).count();
+}
+
+struct counter {
+    std::string_view name;
+    std::uint64_t counters::*value;
+};
+
+// Those that are described.
+template <class... D>
+constexpr std::array<counter, sizeof...(D)> all_counters(detail::descriptors<D...>) {
+    return {counter{D::name, D::pointer}...};
 }
 
 // The program's metrics as members of an object; empty if its function throws or does not write valid JSON.
@@ -60,12 +66,12 @@ std::string own_metrics(const node_state& n) {
 
 void serve_peers(node_state& host, reply_writer& replies, const protocol::request_line& r) {
     const auto now = host.time.now();
-    if (r.since.empty() || host.gossip_responder == nullptr) {
-        replies.write(r, [&](json_writer& w) { write_peers(w, host.peers, now); });
-        return;
-    }
     replies.write(r, [&](json_writer& w) {
-        host.gossip_responder->write_delta(w, {r.since, r.describe}, replies.longest(), now);
+        if (r.since.empty() || host.gossip_responder == nullptr) {
+            write_peers(w, host.peers, now);
+        } else {
+            host.gossip_responder->write_delta(w, {r.since, r.describe}, replies.longest(), now);
+        }
     });
 }
 
@@ -92,94 +98,38 @@ void write_tasks(json_writer& w, const node_state& n) {
 
 void write_description(json_writer& w, const node_state& n) {
     w.begin_object();
-    w.key("node");
-    w.value(std::string_view{n.name});
+    write_member(w, "node", std::string_view{n.name});
     if (!n.peers.pool().empty()) {
-        w.key("pool");
-        w.value(std::string_view{n.peers.pool()});
+        write_member(w, "pool", std::string_view{n.peers.pool()});
     }
-    w.key("version");
-    w.value(std::string_view{version});
-    w.key("protocol");
-    w.value(std::int64_t{1});
-    w.key("features"); // additions to the first version that it understands
-    w.begin_array();
-    w.value(std::string_view{"mark"});
-    w.end_array();
-    w.key("epoch");
-    w.value(std::string_view{n.epoch});
-    w.key("uptime_ms");
-    w.value(milliseconds_since(n.started, n.time.now()));
-    w.key("endpoints");
-    w.begin_array();
-    for (const auto& endpoint : n.endpoints) {
-        w.value(std::string_view{endpoint});
-    }
-    w.end_array();
+    write_member(w, "version", std::string_view{version});
+    write_member(w, "protocol", std::int64_t{1});
+    write_member(w, "features", std::vector<std::string>{"mark"}); // additions to the first version that it understands
+    write_member(w, "epoch", std::string_view{n.epoch});
+    write_member(w, "uptime_ms", milliseconds_since(n.started, n.time.now()));
+    write_member(w, "endpoints", n.endpoints);
     w.key("tasks");
     write_tasks(w, n);
-    w.key("load");
-    write_load(w, n.load_now());
+    write_load_member(w, n.load_now());
     w.end_object();
 }
 
 void write_metrics(json_writer& w, const node_state& n) {
-    const auto number = [&](std::string_view name, std::uint64_t value) {
-        w.key(name);
-        w.value(value);
-    };
-    const auto& c = n.counts;
+    const auto number = [&](std::string_view name, std::uint64_t value) { write_member(w, name, value); };
+    auto counts = n.counts;
+    counts.peers_known = n.peers.size();
     w.begin_object();
-    w.key("uptime_ms");
-    w.value(milliseconds_since(n.started, n.time.now()));
+    write_member(w, "uptime_ms", milliseconds_since(n.started, n.time.now()));
     w.key("requests");
     w.begin_object();
     for (std::size_t i = 0; i < verb_count; ++i) {
-        number(verb_names[i], c.requests[i]);
+        number(verb_names[i], counts.requests[i]);
     }
     w.end_object();
-    number("errors", c.errors);
-    number("errors_unsent", c.errors_unsent);
-    number("housekeeping", c.housekeeping);
-    number("housekeeping_errors", c.housekeeping_errors);
-    number("handlers_running", c.handlers_running);
-    number("routed", c.routed);
-    number("requests_repeated", c.requests_repeated);
-    number("requests_sent", c.requests_sent);
-    number("requests_resent", c.requests_resent);
-    number("replies_dropped", c.replies_dropped);
-    number("updates_published", c.updates_published);
-    number("nouns_retired", c.nouns_retired);
-    number("updates_delivered", c.updates_delivered);
-    number("updates_shed", c.updates_shed);
-    number("updates_too_large", c.updates_too_large);
-    number("updates_received", c.updates_received);
-    number("updates_dropped", c.updates_dropped);
-    number("announcements_sent", c.announcements_sent);
-    number("announcements_received", c.announcements_received);
-    number("announcements_dropped", c.announcements_dropped);
-    number("announcements_foreign", c.announcements_foreign);
-    number("peers_known", n.peers.size());
-    number("peers_refused", c.peers_refused);
-    number("tables_asked", c.tables_requested);
-    number("tables_failed", c.tables_failed);
-    number("tables_told", c.tables_sent);
-    number("entries_dropped", c.entries_dropped);
-    number("leases_expired", c.leases_expired);
-    number("datagrams_withheld", c.datagrams_withheld);
-    number("group_received", c.group_received);
-    number("group_dropped", c.group_dropped);
-    number("group_repeated", c.group_repeated);
-    number("group_sent", c.group_sent);
-    number("group_unsent", c.group_unsent);
-    number("group_leases", c.group_leases);
-    number("links_open", c.links_open);
-    number("links_accepted", c.links_accepted);
-    number("links_refused", c.links_refused);
-    number("links_evicted", c.links_evicted);
-    number("links_lost", c.links_lost);
-    number("bytes_received", c.bytes_received);
-    number("bytes_sent", c.bytes_sent);
+    static constexpr auto all = all_counters(detail::fields_of<counters>{});
+    for (const auto& c : all) {
+        number(c.name, counts.*c.value);
+    }
     w.key("memory");
     w.begin_object();
     number("limit", n.memory.limit());
@@ -192,8 +142,7 @@ void write_metrics(json_writer& w, const node_state& n) {
     w.begin_object();
     number("samples", n.handler_time.count());
     const auto quantile = [&](std::string_view name, double q) {
-        w.key(name);
-        w.value(static_cast<double>(n.handler_time.quantile(q).count()) / 1000.0);
+        write_member(w, name, static_cast<double>(n.handler_time.quantile(q).count()) / 1000.0);
     };
     quantile("p50", 0.5);
     quantile("p99", 0.99);

@@ -1,14 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/identity.hpp>
-#include <cles/json_writer.hpp>
-
-#include "node/node_state.hpp"
 #include "node/session/reply_writer.hpp"
-#include "protocol/datagram.hpp"
-#include "protocol/reply_line.hpp"
-#include "protocol/request_line.hpp"
 
 namespace cles::core {
 

@@ -6,7 +6,6 @@
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
-#include <string>
 #include <utility>
 
 namespace cles::core {
@@ -24,6 +23,12 @@ bool is_web_datagram(std::string_view datagram) {
     return false;
 }
 
+// Whether the peer announces that it leaves: what it has not answered by then, it has not started (docs/protocol.md,
+// "Leaving").
+bool is_leave_notice(const protocol::request_line& r) noexcept {
+    return r.verb == verb::push && !r.wants_reply && r.noun.target == "self" && r.noun.path == "cles/leaving";
+}
+
 } // namespace
 
 session::session(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer)
@@ -36,11 +41,11 @@ void session::on_line(std::string_view line, time_point now) {
     }
     if (is_datagram() && protocol::has_many_lines(line)) {
         if (!is_web_datagram(line)) {
-            refuse(line, "a datagram holds one line", now);
+            refuse(line, "a datagram holds one line");
         }
         return;
     }
-    if (refusal_ != refusal::ruled_out) {
+    if (may_be_refused_ || !refusal_.empty()) {
         note_refusal(line);
     }
     if (const auto found = subscriptions_.recognise(line); found.update != nullptr) {
@@ -63,7 +68,7 @@ void session::on_line(std::string_view line, time_point now) {
     protocol::request_line request;
     protocol::malformed_request malformed;
     if (!protocol::parse_request(line, request, malformed)) {
-        inbound_.on_malformed(line, malformed, now);
+        inbound_.on_malformed(malformed);
     } else if (request.is_update()) {
         on_update(subscriptions_.find(line, request));
     } else if (!is_datagram() && is_leave_notice(request)) {
@@ -75,22 +80,20 @@ void session::on_line(std::string_view line, time_point now) {
 
 // A `busy` without id refuses the link if it is the only line that ever arrives.
 void session::note_refusal(std::string_view line) {
-    const bool first = refusal_ == refusal::possible;
-    refusal_ = refusal::ruled_out;
-    refusal_text_.clear();
+    const bool first = std::exchange(may_be_refused_, false);
+    refusal_.clear();
     protocol::failure why;
     if (first && protocol::is_failure(line) && protocol::parse_failure(line, why) && why.code == errc::busy &&
         !why.ran) {
-        refusal_ = refusal::received;
-        refusal_text_ = line;
+        refusal_ = line;
     }
 }
 
 void session::lose_requests(std::string_view why) {
-    if (refusal_ == refusal::received) {
-        outbound_.refuse(refusal_text_);
-    } else {
+    if (refusal_.empty()) {
         outbound_.lose(errc::unavailable, why);
+    } else {
+        outbound_.refuse(refusal_);
     }
 }
 
@@ -129,41 +132,33 @@ void session::send_leave_notice() {
 }
 
 // The id for the reply is in the first line.
-void session::refuse(std::string_view text, const char* why, time_point now) {
+void session::refuse(std::string_view text, const char* why) {
     if (protocol::is_reply(text)) {
         ++node_->counts.replies_dropped;
         return;
     }
     auto meant = protocol::salvage(protocol::trim(text.substr(0, text.find('\n'))));
     meant.why = why;
-    inbound_.on_malformed(text, meant, now);
+    inbound_.on_malformed(meant);
 }
 
 void session::reject(std::string_view line) {
     line = protocol::trim(line);
     const auto meant = protocol::salvage(line);
     if (!line.empty() && !protocol::is_reply(line) && meant.wants_reply) {
-        auto& out = out_.output();
-        protocol::append_reply_head(out, meant.id);
-        protocol::append_failure(out, link_limit_reached(*node_));
-        out.push_back('\n');
+        append_link_refusal(out_.output(), *node_, meant.id);
     }
 }
 
-void session::send_busy() {
-    auto& out = out_.output();
-    protocol::append_failure(out, link_limit_reached(*node_));
-    out.push_back('\n');
-}
-
-void session::on_overlong(std::string_view head, time_point now) {
-    refusal_ = refusal::ruled_out;
+void session::on_overlong(std::string_view head) {
+    may_be_refused_ = false;
+    refusal_.clear();
     head = protocol::trim(head);
     if (is_datagram() && is_web_datagram(head)) {
         return;
     }
     if (!protocol::is_reply(head)) {
-        inbound_.on_overlong(head, now);
+        inbound_.on_overlong(head);
         return;
     }
     if (is_datagram()) {
@@ -181,15 +176,15 @@ void session::on_overlong(std::string_view head, time_point now) {
 }
 
 // The line may be incomplete, so it is not run.
-void session::on_cut(std::string_view rest, time_point now) {
+void session::on_cut(std::string_view rest) {
     rest = protocol::trim(rest);
     if (!rest.empty() && !closed_) {
-        refuse(rest, "the last line is not ended by LF", now);
+        refuse(rest, "the last line is not ended by LF");
     }
 }
 
-void session::on_end(time_point now) {
-    inbound_.end(now);
+void session::on_end() {
+    inbound_.end();
     lose_requests("the peer ended the link before it answered");
 }
 

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/identity.hpp>
-
-#include "node/node_state.hpp"
-#include "node/publish/subscriptions.hpp"
+#include "node/publish/subscription.hpp"
 #include "node/session/inbound.hpp"
-#include "node/session/line_sink.hpp"
 #include "node/session/outbound.hpp"
 
-#include <cstdint>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -23,11 +18,11 @@ class session {
     session(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer);
 
     void on_line(std::string_view line, time_point now);
-    void on_overlong(std::string_view head, time_point now);
+    void on_overlong(std::string_view head);
     /// The peer has ended in the middle of this line.
-    void on_cut(std::string_view rest, time_point now);
+    void on_cut(std::string_view rest);
     /// The peer sends no more.
-    void on_end(time_point now);
+    void on_end();
     /// The link is gone; `why` is the reason.
     void on_lost(std::string_view why);
 
@@ -40,17 +35,15 @@ class session {
     void send_leave_notice();
     /// Answers a line with `busy`, and does nothing else.
     void reject(std::string_view line);
-    /// Sends a `busy` that answers no request: the node has no room for this link.
-    void send_busy();
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
     [[nodiscard]] outbound& asking() noexcept { return outbound_; }
     [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }
     /// This node opened the link: the peer may refuse it as a whole, with a `busy` that answers no request.
-    void expect_refusal() noexcept { refusal_ = refusal::possible; }
+    void expect_refusal() noexcept { may_be_refused_ = true; }
 
   private:
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
-    void refuse(std::string_view text, const char* why, time_point now);
+    void refuse(std::string_view text, const char* why);
     void on_reply(std::string_view line);
     void note_refusal(std::string_view line);
     void lose_requests(std::string_view why);
@@ -63,8 +56,8 @@ class session {
     inbound inbound_;
     outbound outbound_;
     subscriptions subscriptions_;
-    enum class refusal : std::uint8_t { ruled_out, possible, received } refusal_ = refusal::ruled_out;
-    std::string refusal_text_; // the line that refused the link
+    bool may_be_refused_ = false; // by the first line
+    std::string refusal_;         // the line that refused the link, if it remains the only one
     bool closed_ = false;
 };
 

@@ -3,18 +3,91 @@
 
 #include <cles/json_reader.hpp>
 
+#include "node/session/call.hpp"
 #include "node/session/handler_failure.hpp"
+#include "node/session/request_checks.hpp"
 
 #include <cstdint>
 #include <exception>
 #include <utility>
 
 namespace cles::core {
+
+// -- the tasks -----------------------------------------------------------------------------------------------------
+
+void check_name(std::string_view name, std::string_view of) {
+    if (!protocol::is_name(name)) {
+        throw error(errc::invalid_name, protocol::quoted(name) + " is not a " + std::string{of} +
+                                            "'s name (1 to 64 letters, digits, '_', '-', '.')");
+    }
+}
+
+void task_registry::add(cles::verb verb, std::string_view task, handler entry) {
+    check_name(task, "task");
+    if (task == "cles") {
+        throw error(errc::invalid_name, "the task 'cles' is reserved");
+    }
+    auto& slot = tasks_[std::string{task}][static_cast<std::size_t>(verb)];
+    if (slot.present) {
+        throw error(errc::already_registered, std::string{to_string(verb)} + " '" + std::string{task} + "'");
+    }
+    slot = std::move(entry);
+    slot.present = true;
+}
+
+const handler* task_registry::find(cles::verb verb, std::string_view task) const noexcept {
+    const auto found = tasks_.find(task);
+    if (found == tasks_.end()) {
+        return nullptr;
+    }
+    const auto& entry = found->second[static_cast<std::size_t>(verb)];
+    return entry.present ? &entry : nullptr;
+}
+
+bool task_registry::can_bind(std::string_view task) const noexcept {
+    return find(verb::bind, task) != nullptr || find(verb::update, task) != nullptr;
+}
+
+// -- running one ---------------------------------------------------------------------------------------------------
+
 namespace {
 
-constexpr std::uint64_t sample_every = 16; // of plain handlers, whose time is measured
+/// Measures the time of every 16th plain handler.
+class sampled_time {
+  public:
+    explicit sampled_time(node_state& host) noexcept
+        : node_(host), runs_(host.plain_runs++ % 16 == 0), before_(runs_ ? host.time.now() : time_point{}) {}
+    sampled_time(const sampled_time&) = delete;
+    sampled_time& operator=(const sampled_time&) = delete;
+    ~sampled_time() {
+        if (runs_) {
+            node_.handler_time.record(node_.time.now() - before_);
+        }
+    }
+
+  private:
+    node_state& node_;
+    bool runs_;
+    time_point before_;
+};
 
 } // namespace
+
+decoded_parameters decode(const protocol::noun_view& noun, std::string& storage) {
+    decoded_parameters result;
+    storage.clear();
+    storage.reserve(noun.path.size());
+    for (const auto raw : noun.parameters) {
+        if (raw.find('%') == std::string_view::npos) {
+            result.push_back(raw);
+            continue;
+        }
+        const auto start = storage.size();
+        protocol::decode_parameter(raw, storage);
+        result.push_back(std::string_view{storage}.substr(start));
+    }
+    return result;
+}
 
 task_execution::task_execution(const std::shared_ptr<node_state>& host, const protocol::request_line& line,
                                const identity& peer, time_point due, time_point now, std::string& decoded)
@@ -29,13 +102,20 @@ task_execution::task_execution(const std::shared_ptr<node_state>& host, const pr
       request_(data_) {}
 
 void task_execution::run(task_sink& to, const std::shared_ptr<memory_account>& memory) {
-    if (const auto why = refusal(memory.get())) {
-        to.refuse(*this, *why);
-    } else if (handler_->plain) {
-        run_plain(to);
-    } else {
+    auto why = refusal(memory.get());
+    if (!why && !handler_->plain) {
         start(to, memory);
+        return;
     }
+    if (!why) {
+        try {
+            to.write_result(*this);
+            return;
+        } catch (...) {
+            why = after_run(describe(std::current_exception()));
+        }
+    }
+    to.refuse(*this, *why);
 }
 
 // Why the request cannot start, or nothing.
@@ -52,43 +132,24 @@ std::optional<protocol::failure> task_execution::refusal(const memory_account* m
     return handler_->plain ? std::nullopt : no_room_to_run(*node_);
 }
 
-void task_execution::run_plain(task_sink& to) {
-    std::optional<protocol::failure> why;
-    try {
-        to.write_result(*this);
-        return;
-    } catch (...) {
-        why = after_run(describe(std::current_exception()));
-    }
-    to.refuse(*this, *why);
-}
-
 void task_execution::write(json_writer& w) {
-    auto& node = *node_;
-    const bool timed = node.plain_runs++ % sample_every == 0;
-    const auto before = timed ? node.time.now() : time_point{};
-    const auto note_time = [&] {
-        if (timed) {
-            node.handler_time.record(node.time.now() - before);
-        }
-    };
+    const sampled_time during{*node_};
     started_ = true;
-    try {
-        handler_->plain(request_, w);
-    } catch (...) {
-        note_time();
-        throw;
-    }
+    handler_->plain(request_, w);
     if (line_.verb == verb::update) {
         std::string body;
         append_compact_json(request_.body(), body);
-        node.published.publish_body(publish_path(), body);
+        node_->published.publish_body(publish_path(), body);
     }
-    note_time();
 }
 
 void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>& memory) {
-    const auto c = call::begin(node_, to, terms(), memory, line_.text.size(), due_, now_);
+    call::terms wanted{line_};
+    if (line_.verb == verb::update) {
+        wanted.publish_path = publish_path();
+        append_compact_json(request_.body(), wanted.publish_body);
+    }
+    const auto c = call::begin(node_, to, std::move(wanted), memory, line_.text.size(), due_, now_);
     if (!c) {
         to.refuse(*this, no_memory(*node_));
         return;
@@ -100,15 +161,6 @@ void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>&
     } catch (...) {
         c->fail(describe(std::current_exception()));
     }
-}
-
-call::terms task_execution::terms() {
-    auto wanted = call::terms_of(line_);
-    if (line_.verb == verb::update) {
-        wanted.publish_path = publish_path();
-        append_compact_json(request_.body(), wanted.publish_body);
-    }
-    return wanted;
 }
 
 } // namespace cles::core

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/identity.hpp>
 #include <cles/json_writer.hpp>
 #include <cles/request.hpp>
+#include <cles/task_info.hpp>
 
-#include "node/base/deadlines.hpp"
 #include "node/base/memory_budget.hpp"
-#include "node/node_state.hpp"
-#include "node/session/call.hpp"
-#include "node/session/request_checks.hpp"
-#include "node/session/task_registry.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
+#include <boost/container/static_vector.hpp>
+
+#include <array>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,13 +21,49 @@
 
 namespace cles::core {
 
+class call;
+struct node_state;
 class task_execution;
 
-/// Receives the outcome of a request that a task of this node serves: by one of these functions if the handler replies
-/// at once, else as the owner of its call.
-class task_sink : public call_owner {
+/// A handler as the core runs it. At most one of the two functions is set.
+struct handler {
+    bool present = false;
+    task_info info{};
+    std::function<void(const request&, json_writer&)> plain{};
+    std::function<void(const request&, const std::shared_ptr<call>&)> start{};
+};
+
+/// The tasks that a node offers.
+class task_registry {
   public:
-    using call_owner::refuse;
+    /// \throws cles::error: `invalid_name`, `already_registered`
+    void add(cles::verb verb, std::string_view task, handler entry);
+
+    /// The handler, or null.
+    [[nodiscard]] const handler* find(cles::verb verb, std::string_view task) const noexcept;
+    /// Whether a BIND of the task is served: BIND or UPDATE is registered for it.
+    [[nodiscard]] bool can_bind(std::string_view task) const noexcept;
+
+    using handlers = std::array<handler, verb_count>;
+    /// All tasks, sorted by name.
+    [[nodiscard]] const std::map<std::string, handlers, std::less<>>& tasks() const noexcept { return tasks_; }
+
+  private:
+    std::map<std::string, handlers, std::less<>> tasks_;
+};
+
+/// \throws cles::error with `invalid_name` if the name of a task or the like is not valid
+void check_name(std::string_view name, std::string_view of);
+
+/// Receives the outcome of a request that a task of this node serves: from its `task_execution` if the handler replies
+/// at once, else from its `call`. Usually serves the link on which the request arrived. The call has ended by then, so
+/// the sink only has to release it.
+class task_sink {
+  public:
+    task_sink() = default;
+    task_sink(const task_sink&) = delete;
+    task_sink& operator=(const task_sink&) = delete;
+
     /// Has the result written by `task.write`, and replies with it. An exception from there passes through, and nothing
     /// has been replied then.
     virtual void write_result(task_execution& task) = 0;
@@ -36,9 +72,23 @@ class task_sink : public call_owner {
     /// The handler is about to be called and replies later. Keeps the call until its outcome.
     virtual void keep(const task_execution& task, const std::shared_ptr<call>& c) = 0;
 
+    virtual void answer(const call& c, std::string_view json) = 0;
+    virtual void refuse(const call& c, const protocol::failure& why) = 0;
+    /// `fraction` never decreases. Returns false if nobody waits for progress.
+    virtual bool report(const call& c, double fraction, std::string_view json) = 0;
+    /// Whether the node has memory for a reply of this size.
+    [[nodiscard]] virtual bool can_answer(std::size_t /*bytes*/) { return true; }
+    /// The requester's URL; empty if it is this node itself.
+    [[nodiscard]] virtual std::string_view peer_address() const noexcept { return {}; }
+
   protected:
     ~task_sink() = default;
 };
+
+using decoded_parameters = boost::container::static_vector<std::string_view, protocol::max_parameters>;
+
+/// The decoded parameters: those with escapes are stored in `storage`, the others are views of the line.
+decoded_parameters decode(const protocol::noun_view& noun, std::string& storage);
 
 /// Runs a task of this node for one request: of a link, or of this node itself as a part of `any` or `all`. Decides
 /// whether it may run and what it publishes; the sink delivers the result.
@@ -66,9 +116,7 @@ class task_execution {
 
   private:
     [[nodiscard]] std::optional<protocol::failure> refusal(const memory_account* memory);
-    void run_plain(task_sink& to);
     void start(task_sink& to, const std::shared_ptr<memory_account>& memory);
-    [[nodiscard]] call::terms terms();
     [[nodiscard]] std::string_view publish_path() { return protocol::canonical_path(line_.noun, path_); }
 
     const std::shared_ptr<node_state>& node_;

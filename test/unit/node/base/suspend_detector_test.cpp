@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/base/deadline_schedule.hpp"
+#include "node/base/deadlines.hpp"
 
 #include <boost/test/unit_test.hpp>
 

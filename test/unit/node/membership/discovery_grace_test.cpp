@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/membership/announcer.hpp"
+#include "node/membership/discovery.hpp"
 #include "support/manual_clock.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -11,8 +11,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct fixture : cles::core::discovery_grace::listener {
-    void on_discovery_grace_over() override { ++times_over; }
+struct fixture {
     void pass(std::chrono::milliseconds by) {
         clock.advance(by);
         deadlines.expire(clock.now());
@@ -21,7 +20,7 @@ struct fixture : cles::core::discovery_grace::listener {
     int times_over = 0;
     cles::test::manual_clock clock;
     cles::core::deadline_queue deadlines;
-    cles::core::discovery_grace grace{*this, deadlines};
+    cles::core::discovery_grace grace{deadlines, [this] { ++times_over; }};
 };
 
 } // namespace

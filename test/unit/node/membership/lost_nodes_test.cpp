@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/membership/gossip_candidates.hpp"
+#include "node/membership/gossip_contacts.hpp"
 
 #include <boost/test/unit_test.hpp>
 

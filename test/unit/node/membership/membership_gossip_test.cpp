@@ -31,8 +31,7 @@ struct fixture : cles::test::watched_membership {
         return {.announced = {.node = std::move(node), .endpoints = {std::move(endpoint)}, .tasks = "00"},
                 .epoch = epoch,
                 .seq = seq,
-                .age = age,
-                .has_interval = true};
+                .age = age};
     }
     verdict apply(const peer_report& r, const observed_source& by = by_other_host) {
         return table.apply_gossip(r, by, clock.now(), clock.now());

@@ -23,16 +23,15 @@ using cles::core::probe_outcome;
 constexpr group_source here{0x0A000007, 40000};
 constexpr group_source there{0x0A000008, 41000};
 
-struct fixture : cles::test::watched_membership, cles::core::membership::prober {
+struct fixture : cles::test::watched_membership {
     fixture() {
-        table.set_prober(this);
+        table.set_prober([this](std::uint64_t ticket, std::string_view url) {
+            last = ticket;
+            asked.emplace_back(url);
+        });
         table.begin({}, clock.now());
     }
 
-    void probe(std::uint64_t ticket, std::string_view url) override {
-        last = ticket;
-        asked.emplace_back(url);
-    }
     verdict receive(const std::string& node, std::uint32_t epoch, std::uint64_t seq, const group_source& from = here,
                     const std::string& pool = {}) {
         return table.apply_announcement({.node = node, .endpoints = {"tcp://0.0.0.0:1"}, .pool = pool}, epoch, seq,
@@ -69,7 +68,7 @@ BOOST_AUTO_TEST_CASE(name_moves_at_once_if_its_owner_is_absent) {
     receive("car1", 2, 1, there);
     is_absent();
     BOOST_TEST(where("car1") == "tcp://10.0.0.8:1");
-    BOOST_TEST((*table.source_of("car1") == there));
+    BOOST_TEST((table.announced("car1")->from == there));
     check(take_changes(), {"car1 appeared tcp://10.0.0.7:1", "car1 moved tcp://10.0.0.8:1"});
     BOOST_TEST((receive("car1", 1, 1) == verdict::old)); // late, of the former owner
 }

@@ -21,9 +21,10 @@ constexpr group_source first{0x0A000007, 40000};
 constexpr group_source second{0x0A010007, 41000};
 constexpr group_source forger{0x0A000009, 42000};
 
-struct fixture : cles::test::watched_membership, cles::core::membership::prober {
-    fixture() { table.set_prober(this); }
-    void probe(std::uint64_t, std::string_view url) override { asked.emplace_back(url); }
+struct fixture : cles::test::watched_membership {
+    fixture() {
+        table.set_prober([this](std::uint64_t, std::string_view url) { asked.emplace_back(url); });
+    }
 
     static announcement make_announcement(std::string endpoint = "tcp://0.0.0.0:1") {
         return {.node = "car1", .endpoints = {std::move(endpoint)}, .sources = {loopback, first, second}};

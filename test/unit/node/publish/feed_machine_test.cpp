@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/publish/feed_machine.hpp"
-#include "node/publish/subscriptions.hpp"
 #include "support/manual_clock.hpp"
 #include "support/recorded_reply.hpp"
 
@@ -9,6 +8,7 @@
 #include <chrono>
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -473,6 +473,76 @@ BOOST_AUTO_TEST_CASE(a_reply_to_a_renewal_of_an_earlier_binding_is_ignored) {
     feed.on_leased(clock.now(), 9s);
     feed.on_renewal_refused(asked, errc::deadline, "", clock.now());
     BOOST_TEST(host.detaches == 0);
+}
+
+BOOST_AUTO_TEST_CASE(it_renews_at_a_third_of_the_lease_with_jitter) {
+    std::set<cles::time_point> times;
+    for (std::uint32_t seed = 1; seed < 100; ++seed) {
+        cles::core::feed_machine one{host, deadlines, completions, {}, "car1", "speed", false, seed * 7919};
+        auto [operation, result] = cles::test::record();
+        one.start(std::move(operation));
+        one.on_bound("{}");
+        const auto now = clock.now();
+        one.on_leased(now, 9s);
+        const auto due = *deadlines.next();
+        BOOST_TEST((due >= now + 2250ms));
+        BOOST_TEST((due <= now + 3s));
+        times.insert(due);
+    }
+    BOOST_TEST(times.size() > 10U);
+}
+
+BOOST_AUTO_TEST_CASE(each_reply_renews_the_lease_from_the_time_of_the_request) {
+    bound();
+    const auto begun = clock.now();
+    feed.on_leased(begun, 9s);
+    pass(3s);
+    BOOST_TEST(host.renewals == 1);
+    BOOST_TEST((host.renew_until == begun + 9s)); // a later reply counts as none
+    const auto asked = clock.now();
+    pass(500ms);
+    feed.on_renewed(asked);
+    pass(2500ms);
+    BOOST_TEST(host.renewals == 2);
+    BOOST_TEST((host.renew_until == asked + 9s));
+}
+
+BOOST_AUTO_TEST_CASE(a_late_reply_is_followed_by_a_renewal_at_once) {
+    bound();
+    const auto asked = clock.now();
+    clock.advance(4s);
+    feed.on_leased(asked, 9s);
+    pass(0ms);
+    BOOST_TEST(host.renewals == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_busy_publisher_is_asked_again_until_the_lease_expires) {
+    bound();
+    const auto begun = clock.now();
+    feed.on_leased(begun, 9s);
+    pass(3s);
+    int tries = 0;
+    for (;;) {
+        feed.on_renewal_refused(clock.now(), errc::busy, "later", clock.now());
+        if (host.detaches != 0) {
+            break;
+        }
+        const auto before = host.renewals;
+        pass(std::chrono::duration_cast<std::chrono::milliseconds>(*deadlines.next() - clock.now()) + 1ms);
+        BOOST_TEST(host.renewals == before + 1);
+        BOOST_REQUIRE(++tries < 50);
+    }
+    BOOST_TEST(tries >= 3);
+    BOOST_TEST((begun + 9s - clock.now() < 20ms));
+    BOOST_TEST(next() == "lost later");
+}
+
+BOOST_AUTO_TEST_CASE(a_lost_feed_is_not_renewed) {
+    bound();
+    feed.on_leased(clock.now(), 9s);
+    lose();
+    pass(1h);
+    BOOST_TEST(host.renewals == 0);
 }
 
 BOOST_AUTO_TEST_CASE(a_closed_feed_is_not_renewed) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // The subscriber's side of docs/protocol.md, "Multicast".
 #include "node/publish/group_feeds.hpp"
+#include "node/publish/multicast_group.hpp"
 #include "support/group_recorder.hpp"
 #include "support/session_fixture.hpp"
 
@@ -35,6 +36,7 @@ struct wait final : cles::detail::pending_event {
 };
 
 struct fixture {
+    fixture() { group.add(out); }
     /// Receives an update; returns whether a feed accepted it.
     bool hear(const std::string& line) {
         cles::protocol::request_line r;
@@ -62,7 +64,8 @@ struct fixture {
 
     test_node node;
     group_recorder out;
-    cles::core::group_feeds feeds{*node.host, out, 3};
+    cles::core::multicast_group group{node.host, 3};
+    cles::core::group_feeds& feeds = group.feeds();
     group_feed all{node.host->bounds, node.host->completions, "all", "speed"};
     group_feed one{node.host->bounds, node.host->completions, "car1", "speed"};
 };

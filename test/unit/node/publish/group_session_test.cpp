@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/publish/group_session.hpp"
+#include "node/publish/multicast_group.hpp"
 #include "support/group_recorder.hpp"
 #include "support/hear.hpp"
 #include "support/session_fixture.hpp"
@@ -35,9 +35,9 @@ class recording_presence final : public cles::core::announcement_listener {
 };
 
 struct fixture {
-    fixture() { dispatcher.set_listener(&membership); }
+    fixture() { group.set_listener(&membership); }
     void hear(std::string_view datagram, const group_source& from = other) {
-        cles::test::hear(session, from, datagram, node.clock.now());
+        cles::test::hear(session, from, datagram);
     }
     /// Whether the datagram was dropped.
     bool drops(std::string_view datagram) {
@@ -48,9 +48,9 @@ struct fixture {
 
     cles::test::test_node node;
     recording_presence membership;
-    cles::test::group_recorder out;
-    cles::core::group_dispatcher dispatcher{*node.host, out, 1};
-    cles::core::group_session session{node.host, dispatcher, self, out, 1};
+    cles::test::group_recorder out{self};
+    cles::core::multicast_group group{node.host, 1};
+    cles::core::group_session session{node.host, group, out.share(), 1};
 };
 
 } // namespace
@@ -165,12 +165,12 @@ BOOST_AUTO_TEST_CASE(the_access_rules_apply_as_on_links) {
                                                      std::string{to_string(a.verb)} + " " + std::string{a.path});
                                      return a.task == "open";
                                  }};
-    cles::core::group_dispatcher intake_there{*strict.host, out, 1};
-    cles::core::group_session guarded{strict.host, intake_there, self, out, 1};
+    cles::core::multicast_group group_there{strict.host, 1};
+    cles::core::group_session guarded{strict.host, group_there, out.share(), 1};
     recording_presence told;
-    intake_there.set_listener(&told);
+    group_there.set_listener(&told);
     for (const auto* line : {"BIND all:open", "BIND all:secret/x", "BIND all:cles"}) {
-        cles::test::hear(guarded, other, line, strict.clock.now());
+        cles::test::hear(guarded, other, line);
     }
     BOOST_TEST(strict.counts().group_leases == 1U);
     BOOST_TEST(strict.counts().group_dropped == 2U);
@@ -198,19 +198,19 @@ BOOST_AUTO_TEST_CASE(an_update_that_nobody_wants_is_counted) {
 
 BOOST_AUTO_TEST_CASE(an_update_that_begins_like_a_failure_is_dropped) {
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    dispatcher.feeds().add(feed, node.clock.now());
+    group.feeds().add(feed, node.clock.now());
     hear(R"(UPDATE car2:speed seq=1 epoch=5f3a09c1 {"error":"failed"})");
     BOOST_TEST(node.counts().updates_dropped == 1U);
     hear("UPDATE car2:speed seq=2 epoch=5f3a09c1 {}");
     BOOST_TEST(node.counts().updates_received == 1U);
-    dispatcher.feeds().remove(feed);
+    group.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_CASE(a_forged_update_does_not_displace_a_publisher) {
     using namespace std::chrono_literals;
     constexpr group_source forger{.address = 0x7f000001, .port = 4666};
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    dispatcher.feeds().add(feed, node.clock.now());
+    group.feeds().add(feed, node.clock.now());
     node.host->peers.apply_announcement({.node = "car2", .endpoints = {"tcp://127.0.0.1:1"}}, 0x5f3a09c1, 1, other,
                                         node.clock.now());
     const auto received = [&](std::string_view update, const group_source& from) {
@@ -231,19 +231,19 @@ BOOST_AUTO_TEST_CASE(a_forged_update_does_not_displace_a_publisher) {
     BOOST_TEST(!received("UPDATE car3:speed seq=3 epoch=5f3a09c1 {}", other));
     node.pass(3500ms);
     BOOST_TEST(received("UPDATE car3:speed seq=4 epoch=5f3a09c1 {}", other));
-    dispatcher.feeds().remove(feed);
+    group.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_CASE(another_pool_is_ignored) {
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    dispatcher.feeds().add(feed, node.clock.now());
+    group.feeds().add(feed, node.clock.now());
     out.take();
-    dispatcher.ignore_until(other, node.clock.now() + std::chrono::seconds{15});
+    group.ignore_until(other, node.clock.now() + std::chrono::seconds{15});
     hear("UPDATE car2:speed seq=1 epoch=5f3a09c1 {}");
     BOOST_TEST(node.counts().updates_received == 0U);
     BOOST_TEST(drops("BIND all:speed"));
     BOOST_TEST(node.counts().group_leases == 0U);
-    dispatcher.feeds().remove(feed);
+    group.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/publish/lease.hpp"
+#include "node/publish/binding.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>

@@ -2,7 +2,7 @@
 // Bindings in the group whose handler decides later.
 #include <cles/error.hpp>
 
-#include "node/publish/group_session.hpp"
+#include "node/publish/multicast_group.hpp"
 #include "support/group_recorder.hpp"
 #include "support/hear.hpp"
 #include "support/session_fixture.hpp"
@@ -24,14 +24,14 @@ constexpr group_source other{.address = 0x7f000001, .port = 4001};
 struct fixture {
     fixture() { node.on_later(verb::bind, "pose"); }
     void hear(std::string_view datagram, const group_source& from = other) {
-        cles::test::hear(session, from, datagram, node.clock.now());
+        cles::test::hear(session, from, datagram);
     }
     [[nodiscard]] auto leases() const { return node.counts().group_leases; }
 
     cles::test::test_node node;
-    cles::test::group_recorder out;
-    cles::core::group_dispatcher dispatcher{*node.host, out, 1};
-    cles::core::group_session session{node.host, dispatcher, self, out, 1};
+    cles::test::group_recorder out{self};
+    cles::core::multicast_group group{node.host, 1};
+    cles::core::group_session session{node.host, group, out.share(), 1};
 };
 
 } // namespace
@@ -82,8 +82,8 @@ BOOST_AUTO_TEST_CASE(the_number_of_pending_bindings_is_limited) {
     for (std::uint16_t i = 0; i < 300; ++i) {
         hear("BIND all:pose", {.address = 0x7f000001, .port = static_cast<std::uint16_t>(5000 + i)});
     }
-    BOOST_TEST(node.started.size() == cles::core::pending_group_bindings::max_pending);
-    BOOST_TEST(node.counts().group_dropped == 300U - cles::core::pending_group_bindings::max_pending);
+    BOOST_TEST(node.started.size() == cles::core::group_session::max_pending);
+    BOOST_TEST(node.counts().group_dropped == 300U - cles::core::group_session::max_pending);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

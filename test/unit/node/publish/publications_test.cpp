@@ -462,7 +462,7 @@ BOOST_AUTO_TEST_CASE(it_waits_until_the_queue_of_every_subscriber_has_room) {
     BOOST_TEST(all.find("speed")->seq() == 2U);
     slow.room = 100;
     drain(); // nothing is new, so nothing is drained
-    all.find("speed")->bindings().drain(clock.now());
+    all.find("speed")->drain(clock.now());
     all.admit(*all.find("speed"));
     tell();
     BOOST_TEST(third->ended);
@@ -484,7 +484,7 @@ BOOST_AUTO_TEST_CASE(waiting_updates_are_published_in_order) {
     BOOST_REQUIRE((second && third));
     slow.room = 100;
     auto& noun = *all.find("speed");
-    noun.bindings().drain(clock.now());
+    noun.drain(clock.now());
     all.admit(noun);
     BOOST_TEST(!second->ended); // not inside the call
     tell();
@@ -506,7 +506,7 @@ BOOST_AUTO_TEST_CASE(a_later_update_does_not_overtake) {
     drain();
     when_room("speed", "[2]");
     slow.room = 100;
-    all.find("speed")->bindings().drain(clock.now()); // there is room, but the next has not been published yet
+    all.find("speed")->drain(clock.now()); // there is room, but the next has not been published yet
     BOOST_TEST(when_room("speed", "[3]") != nullptr);
 }
 
@@ -521,7 +521,7 @@ BOOST_AUTO_TEST_CASE(an_update_that_cannot_be_published_fails_in_its_turn) {
     const auto next = small.when_room("speed", "[3]");
     slow.room = 100;
     auto& noun = *small.all.find("speed");
-    noun.bindings().drain(small.clock.now());
+    noun.drain(small.clock.now());
     small.all.admit(noun);
     small.tell();
     BOOST_TEST((large->code == errc::too_large));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/publish/group_dispatcher.hpp"
+#include "node/publish/multicast_group.hpp"
 #include "support/watched_membership.hpp"
 
 #include <boost/test/unit_test.hpp>

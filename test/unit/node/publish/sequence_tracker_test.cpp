@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/publish/sequence_tracker.hpp"
+#include "node/publish/subscription.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/publish/subscription.hpp"
-#include "node/publish/subscriptions.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -33,7 +33,7 @@ struct fixture {
             publish("[" + std::to_string(n) + "]");
         }
     }
-    void drain() { speed.bindings().drain(clock.now()); }
+    void drain() { speed.drain(clock.now()); }
     void pass(std::chrono::milliseconds by) {
         clock.advance(by);
         deadlines.expire(clock.now());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/publish/update_log.hpp"
+#include "node/publish/topic.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/routing/scatter_gather.hpp"
+#include "node/routing/deferred_request.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -8,6 +8,7 @@
 BOOST_AUTO_TEST_SUITE(aggregate_reply)
 
 using namespace std::chrono_literals;
+using cles::protocol::failure;
 
 BOOST_AUTO_TEST_CASE(reply_of_no_nodes_is_empty) {
     BOOST_TEST(cles::core::aggregate_reply{}.whole() == R"({"results":{},"errors":{}})");
@@ -15,10 +16,10 @@ BOOST_AUTO_TEST_CASE(reply_of_no_nodes_is_empty) {
 
 BOOST_AUTO_TEST_CASE(results_and_failures_are_separate) {
     cles::core::aggregate_reply answer;
-    answer.add_result("car1", "{}");
-    answer.add_failure("car2", {.code = cles::errc::busy, .message = "full", .retry_ms = 7});
-    answer.add_result("car3", "[1]");
-    answer.add_failure("car4", {.answer = R"({"error":"new","x":1})"});
+    answer.add("car1", {.result = "{}"});
+    answer.add("car2", {.failure = failure{.code = cles::errc::busy, .message = "full", .retry_ms = 7}});
+    answer.add("car3", {.result = "[1]"});
+    answer.add("car4", {.failure = failure{.answer = R"({"error":"new","x":1})"}});
     BOOST_TEST(answer.whole() == R"({"results":{"car1":{},"car3":[1]},"errors":{"car2":{"error":"busy",)"
                                  R"("message":"full","retry_ms":7},"car4":{"error":"new","x":1}}})");
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/routing/any_request.hpp"
+#include "node/routing/deferred_request.hpp"
 #include "support/routing_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>

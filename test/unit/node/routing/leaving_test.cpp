@@ -36,13 +36,6 @@ struct fixture {
     cles::test::test_link link{node};
 };
 
-struct asked final : cles::core::subrequest_events {
-    void on_result(std::size_t, std::string_view) override {}
-    void on_failure(std::size_t, cles::core::subrequest_failure why) override { failures.push_back(std::move(why)); }
-    void on_progress(std::size_t, double, std::string_view) override {}
-    std::vector<cles::core::subrequest_failure> failures;
-};
-
 } // namespace
 } // namespace leaving
 
@@ -147,15 +140,20 @@ BOOST_AUTO_TEST_CASE(requests_that_a_leaving_node_has_not_answered_were_not_star
 }
 
 BOOST_AUTO_TEST_CASE(request_to_any_continues_with_another_node_as_if_busy) {
-    const auto to = std::make_shared<asked>();
+    const auto failures = std::make_shared<std::vector<cles::core::subrequest_failure>>();
     const auto now = node.clock.now();
     link.session().asking().send({.verb = verb::delegate, .noun = "car2:work", .id = 9}, now + 5s, now,
-                                 cles::detail::pending_ptr{new cles::core::subrequest{to, 0}});
+                                 cles::detail::pending_ptr{new cles::core::subrequest{
+                                     [failures](std::string_view, cles::core::subrequest_failure* why) {
+                                         if (why != nullptr) {
+                                             failures->push_back(*why);
+                                         }
+                                     }}});
     link.ask("PUSH self:cles/leaving reply=no");
-    BOOST_REQUIRE_EQUAL(to->failures.size(), 1U);
-    BOOST_TEST((to->failures[0].told.code == errc::busy));
-    BOOST_TEST(!to->failures[0].may_have_started);
-    BOOST_TEST(to->failures[0].told.retry_ms.value_or(0) == 1000U);
+    BOOST_REQUIRE_EQUAL(failures->size(), 1U);
+    BOOST_TEST(((*failures)[0].told.code == errc::busy));
+    BOOST_TEST(!(*failures)[0].may_have_started);
+    BOOST_TEST((*failures)[0].told.retry_ms.value_or(0) == 1000U);
 }
 
 BOOST_AUTO_TEST_CASE(closed_link_without_a_leave_notice_leaves_open_what_started) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/base/memory_budget.hpp"
-#include "node/routing/local_request.hpp"
+#include "node/routing/subrequest.hpp"
 #include "support/session_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -8,6 +8,7 @@
 #include <chrono>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 BOOST_AUTO_TEST_SUITE(local_request)
@@ -18,14 +19,21 @@ using cles::verb;
 
 namespace {
 
-struct log final : cles::core::subrequest_events {
-    void on_result(std::size_t, std::string_view json) override { lines.push_back("ok " + std::string{json}); }
-    void on_failure(std::size_t, cles::core::subrequest_failure why) override {
-        lines.push_back(std::string{wire_name(why.told.code)} + (why.told.ran ? " ran" : "") +
-                        (why.may_have_started ? " begun: " : ": ") + why.told.message);
+struct log {
+    [[nodiscard]] cles::core::subrequest_outcome outcome() {
+        return [this](std::string_view json, const cles::core::subrequest_failure* why) {
+            if (why == nullptr) {
+                lines.push_back("ok " + std::string{json});
+                return;
+            }
+            lines.push_back(std::string{wire_name(why->told.code)} + (why->told.ran ? " ran" : "") +
+                            (why->may_have_started ? " begun: " : ": ") + why->told.message);
+        };
     }
-    void on_progress(std::size_t, double fraction, std::string_view json) override {
-        lines.push_back(std::to_string(static_cast<int>(fraction * 100)) + " % " + std::string{json});
+    [[nodiscard]] cles::core::outbound::progress_function progress() {
+        return [this](double fraction, std::string_view json) {
+            lines.push_back(std::to_string(static_cast<int>(fraction * 100)) + " % " + std::string{json});
+        };
     }
     std::vector<std::string> lines;
 };
@@ -35,20 +43,18 @@ struct fixture {
         cles::protocol::request_line r;
         cles::protocol::malformed_request wrong;
         BOOST_REQUIRE_MESSAGE(cles::protocol::parse_request(line, r, wrong), wrong.why);
-        deferred_request->lines.clear();
-        one = std::make_unique<cles::core::local_request>(node.host, deferred_request, 0, account);
+        reported.lines.clear();
+        one = std::make_unique<cles::core::local_request>(node.host, reported.outcome(), account, reported.progress());
         one->run(r, peer, node.clock.now() + 1s, node.clock.now());
         return last();
     }
-    [[nodiscard]] std::string last() const {
-        return deferred_request->lines.empty() ? "" : deferred_request->lines.back();
-    }
+    [[nodiscard]] std::string last() const { return reported.lines.empty() ? "" : reported.lines.back(); }
 
     cles::test::test_node node{cles::limits{.nouns = 1, .memory = 10'000}};
     std::shared_ptr<cles::core::memory_account> account =
         std::make_shared<cles::core::memory_account>(node.host->memory);
     cles::identity peer;
-    std::shared_ptr<log> deferred_request = std::make_shared<log>();
+    log reported;
     std::unique_ptr<cles::core::local_request> one;
 };
 
@@ -92,7 +98,7 @@ BOOST_FIXTURE_TEST_CASE(number_of_running_handlers_is_bounded, fixture) {
     cles::protocol::request_line r;
     cles::protocol::malformed_request wrong;
     BOOST_REQUIRE(cles::protocol::parse_request("DELEGATE any:work", r, wrong));
-    cles::core::local_request second{full.host, deferred_request, 0};
+    cles::core::local_request second{full.host, reported.outcome()};
     second.run(r, peer, full.clock.now() + 1s, full.clock.now());
     BOOST_TEST(last() == "busy: car1 runs as many handlers as it may");
     BOOST_TEST(link.reply("DELEGATE self:work id=2").message == "car1 runs as many handlers as it may");
@@ -128,7 +134,7 @@ BOOST_FIXTURE_TEST_CASE(cancellation_notifies_only_the_handler, fixture) {
     one->withdraw();
     BOOST_TEST(node.started.at(0)->stopped);
     node.started.at(0)->call->done("1");
-    BOOST_TEST(deferred_request->lines.empty());
+    BOOST_TEST(reported.lines.empty());
     one.reset();
     node.started.clear();
     BOOST_TEST(node.counts().handlers_running == 0U);

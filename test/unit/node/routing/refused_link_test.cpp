@@ -24,14 +24,6 @@ using namespace std::chrono_literals;
 
 constexpr std::string_view busy = R"({"error":"busy","message":"car2 has as many links as it may","retry_ms":1000})";
 
-/// Records what a router is told about its request.
-struct client final : cles::core::subrequest_events {
-    void on_result(std::size_t, std::string_view) override {}
-    void on_failure(std::size_t, cles::core::subrequest_failure why) override { failed = std::move(why); }
-    void on_progress(std::size_t, double, std::string_view) override {}
-    std::optional<cles::core::subrequest_failure> failed;
-};
-
 struct fixture {
     fixture() { link.session().expect_refusal(); }
 
@@ -79,16 +71,21 @@ BOOST_AUTO_TEST_CASE(empty_lines_do_not_count) {
 }
 
 BOOST_AUTO_TEST_CASE(router_gets_not_started_and_the_retry_time) {
-    const auto asked = std::make_shared<client>();
+    const auto failed = std::make_shared<std::optional<cles::core::subrequest_failure>>();
     const auto now = node.clock.now();
     link.session().asking().send({.verb = verb::delegate, .noun = "car2:work", .id = 1}, now + 5s, now,
-                                 cles::detail::pending_ptr{new cles::core::subrequest(asked, 0)});
+                                 cles::detail::pending_ptr{new cles::core::subrequest(
+                                     [failed](std::string_view, cles::core::subrequest_failure* why) {
+                                         if (why != nullptr) {
+                                             *failed = *why;
+                                         }
+                                     })});
     link.ask(busy);
     link.half_close();
-    BOOST_REQUIRE(asked->failed.has_value());
-    BOOST_TEST(!asked->failed->may_have_started);
-    BOOST_TEST((asked->failed->told.code == errc::busy));
-    BOOST_TEST(asked->failed->told.retry_ms.value_or(0) == 1000U);
+    BOOST_REQUIRE(failed->has_value());
+    BOOST_TEST(!(*failed)->may_have_started);
+    BOOST_TEST(((*failed)->told.code == errc::busy));
+    BOOST_TEST((*failed)->told.retry_ms.value_or(0) == 1000U);
 }
 
 BOOST_AUTO_TEST_CASE(after_another_line_it_is_a_normal_link) {

@@ -27,7 +27,7 @@ BOOST_AUTO_TEST_CASE(waiters_that_have_ended_are_not_kept) {
     const auto kept = std::make_shared<int>();
     int told = 0;
     auto waits = std::make_shared<int>();
-    const auto tell = [kept, &told](cles::core::topic*, std::string_view, const cles::protocol::failure&) { ++told; };
+    const auto tell = [kept, &told](auto*, std::string_view, const auto& /*mark*/, const auto& /*why*/) { ++told; };
     for (int i = 0; i < 100; ++i) {
         from->join("car2", "pose", "hops=7 via=car1", waits, tell);
         waits = std::make_shared<int>();

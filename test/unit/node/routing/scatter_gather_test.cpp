@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/routing/scatter_gather.hpp"
+#include "node/routing/deferred_request.hpp"
 #include "support/routing_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>

@@ -15,57 +15,55 @@ using cles::errc;
 
 namespace {
 
-struct told final : cles::core::subrequest_events {
-    void on_result(std::size_t number, std::string_view json) override {
-        which = number;
-        result = json;
-    }
-    void on_failure(std::size_t number, cles::core::subrequest_failure why) override {
-        which = number;
-        failure = std::move(why);
-        failed = true;
-    }
-    void on_progress(std::size_t, double, std::string_view) override {}
-
-    std::size_t which = 0;
+struct told {
     std::string result;
     bool failed = false;
     cles::core::subrequest_failure failure;
 };
 
+cles::core::subrequest* reporting_to(const std::shared_ptr<told>& to) {
+    return new cles::core::subrequest([to](std::string_view json, const cles::core::subrequest_failure* why) {
+        to->result = json;
+        to->failed = why != nullptr;
+        if (why != nullptr) {
+            to->failure = *why;
+        }
+    });
+}
+
 struct fixture {
-    std::shared_ptr<told> deferred_request = std::make_shared<told>();
-    cles::core::subrequest* one = new cles::core::subrequest(deferred_request, 3);
+    std::shared_ptr<told> outcome = std::make_shared<told>();
+    cles::core::subrequest* one = reporting_to(outcome);
 
     cles::core::subrequest_failure fails(boost::system::error_code code) {
         one->fail(code, "why");
-        BOOST_TEST(deferred_request->failed);
-        return deferred_request->failure;
+        BOOST_TEST(outcome->failed);
+        return outcome->failure;
     }
     cles::core::subrequest_failure refuses(const std::string& code, const std::string& more = {}) {
         const auto answer = R"({"error":")" + code + R"(","message":"car2: no")" + more + "}";
         one->refuse({}, {}, answer);
-        BOOST_TEST(deferred_request->failed);
-        BOOST_TEST(deferred_request->failure.told.answer == answer);
-        return deferred_request->failure;
+        BOOST_TEST(outcome->failed);
+        BOOST_TEST(outcome->failure.told.answer == answer);
+        return outcome->failure;
     }
     void again() {
-        deferred_request = std::make_shared<told>();
-        one = new cles::core::subrequest(deferred_request, 3);
+        outcome = std::make_shared<told>();
+        one = reporting_to(outcome);
     }
 };
 
 } // namespace
 
-BOOST_FIXTURE_TEST_CASE(result_is_reported_with_its_index, fixture) {
+BOOST_FIXTURE_TEST_CASE(result_is_reported, fixture) {
     BOOST_TEST((one->offer("{\"x\":1}") == cles::detail::pending::verdict::completed));
-    BOOST_TEST(deferred_request->result == "{\"x\":1}");
-    BOOST_TEST(deferred_request->which == 3U);
+    BOOST_TEST(outcome->result == "{\"x\":1}");
+    BOOST_TEST(!outcome->failed);
 }
 
 BOOST_FIXTURE_TEST_CASE(invalid_json_is_not_a_result, fixture) {
     BOOST_TEST((one->offer("{\"x\":") == cles::detail::pending::verdict::malformed));
-    BOOST_TEST(deferred_request->result.empty());
+    BOOST_TEST(outcome->result.empty());
     one->discard();
 }
 
@@ -76,7 +74,7 @@ BOOST_FIXTURE_TEST_CASE(unreached_node_has_not_started, fixture) {
     BOOST_TEST((why.told.code == errc::unavailable));
     again();
     BOOST_TEST(fails(errc::no_target).unreachable);
-    BOOST_TEST((deferred_request->failure.told.code == errc::no_target));
+    BOOST_TEST((outcome->failure.told.code == errc::no_target));
 }
 
 BOOST_FIXTURE_TEST_CASE(lost_node_may_have_started, fixture) {
@@ -88,18 +86,18 @@ BOOST_FIXTURE_TEST_CASE(lost_node_may_have_started, fixture) {
         again();
     }
     BOOST_TEST(fails(errc::deadline).may_have_started);
-    BOOST_TEST((deferred_request->failure.told.code == errc::deadline));
+    BOOST_TEST((outcome->failure.told.code == errc::deadline));
 }
 
 BOOST_FIXTURE_TEST_CASE(request_too_large_to_send_has_not_started, fixture) {
     BOOST_TEST(!fails(errc::too_large).may_have_started);
-    BOOST_TEST(!deferred_request->failure.unreachable);
+    BOOST_TEST(!outcome->failure.unreachable);
 }
 
 BOOST_FIXTURE_TEST_CASE(request_without_memory_on_this_node_is_busy, fixture) {
     BOOST_TEST(!fails(errc::busy).may_have_started);
-    BOOST_TEST(!deferred_request->failure.unreachable);
-    BOOST_TEST((deferred_request->failure.told.code == errc::busy));
+    BOOST_TEST(!outcome->failure.unreachable);
+    BOOST_TEST((outcome->failure.told.code == errc::busy));
 }
 
 BOOST_FIXTURE_TEST_CASE(refusing_node_has_not_started_unless_it_says_so, fixture) {

@@ -3,6 +3,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
 #include <string>
 #include <string_view>
 
@@ -11,6 +12,16 @@ BOOST_AUTO_TEST_SUITE(task_list)
 using cles::verb;
 using cles::core::read_task_list;
 
+namespace {
+
+const cles::core::task_list::entry* find(const cles::core::task_list& in, cles::verb verb, std::string_view task) {
+    const auto found = std::find_if(in.entries.begin(), in.entries.end(),
+                                    [&](const auto& e) { return e.verb == verb && e.task == task; });
+    return found == in.entries.end() ? nullptr : &*found;
+}
+
+} // namespace
+
 BOOST_AUTO_TEST_CASE(is_read_from_a_description) {
     const auto list = read_task_list(
         R"({"node":"car1","version":"1","tasks":[{"verb":"PULL","task":"speed","description":"m/s","parameters":["a"]},)"
@@ -18,11 +29,11 @@ BOOST_AUTO_TEST_CASE(is_read_from_a_description) {
         "car1");
     BOOST_REQUIRE(list);
     BOOST_TEST(list->entries.size() == 2U);
-    BOOST_REQUIRE(list->find(verb::pull, "speed") != nullptr);
-    BOOST_TEST(!list->find(verb::pull, "speed")->idempotent);
-    BOOST_REQUIRE(list->find(verb::delegate, "work") != nullptr);
-    BOOST_TEST(list->find(verb::delegate, "work")->idempotent);
-    BOOST_TEST(list->find(verb::push, "speed") == nullptr);
+    BOOST_REQUIRE(find(*list, verb::pull, "speed") != nullptr);
+    BOOST_TEST(!find(*list, verb::pull, "speed")->idempotent);
+    BOOST_REQUIRE(find(*list, verb::delegate, "work") != nullptr);
+    BOOST_TEST(find(*list, verb::delegate, "work")->idempotent);
+    BOOST_TEST(find(*list, verb::push, "speed") == nullptr);
 }
 
 BOOST_AUTO_TEST_CASE(entries_that_are_not_tasks_are_skipped) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/session/dedup.hpp"
+#include "node/session/datagram_rules.hpp"
 #include "support/manual_clock.hpp"
 
 #include <boost/test/unit_test.hpp>

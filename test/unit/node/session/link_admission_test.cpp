@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/session/link_admission.hpp"
+#include "node/session/link_monitor.hpp"
 #include "support/manual_clock.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -19,10 +19,9 @@ using cles::core::link_monitor;
 struct fixture;
 
 /// An accepted link, in the state that the test needs.
-struct peer final : link_admission::admitted_link, link_monitor::owner {
+struct peer final : link_monitor::owner {
     peer(fixture& in, std::string called);
 
-    [[nodiscard]] const link_monitor& monitor() const override { return watch; }
     [[nodiscard]] bool is_idle() const override { return rests; }
     void evict() override;
     void on_silence() override {}
@@ -41,7 +40,7 @@ struct fixture {
     peer& open(const std::string& name, std::string_view address) {
         auto& made = peers.emplace_back(*this, name);
         if (admission.make_room(address, clock.now())) {
-            admission.enter(made, address);
+            admission.enter(made.watch, address);
         } else {
             made.name = "busy";
         }
@@ -69,7 +68,7 @@ peer::peer(fixture& in, std::string called)
 
 void peer::evict() {
     world.left += name + " ";
-    world.admission.leave(*this);
+    world.admission.leave(watch);
 }
 
 } // namespace
@@ -84,7 +83,7 @@ BOOST_AUTO_TEST_CASE(links_in_use_stay_and_the_next_is_refused) {
     clock.advance(1h);
     BOOST_TEST(talk("e").name == "busy");
     BOOST_TEST(gone().empty());
-    admission.leave(peers.front());
+    admission.leave(peers.front().watch);
     BOOST_TEST(talk("f").name == "f");
     BOOST_TEST(admission.size() == 4U);
 }

@@ -14,7 +14,9 @@ using namespace std::chrono_literals;
 using cles::core::link_monitor;
 
 struct fixture : link_monitor::owner {
+    [[nodiscard]] bool is_idle() const override { return rests; }
     void on_silence() override { ++silences; }
+    void evict() override {}
     void on_probe() override {
         probes.push_back(std::chrono::duration_cast<std::chrono::milliseconds>(clock.now() - begun));
         if (lost_at_probe) {
@@ -33,6 +35,7 @@ struct fixture : link_monitor::owner {
     cles::time_point begun = clock.now();
     cles::core::deadline_queue deadlines;
     int silences = 0;
+    bool rests = true;
     std::vector<std::chrono::milliseconds> probes{};
     bool lost_at_probe = false;
     link_monitor monitor{*this, deadlines, bounds, clock.now()};
@@ -133,6 +136,43 @@ BOOST_AUTO_TEST_CASE(a_link_that_ends_is_no_longer_watched) {
     monitor.stop();
     pass(2min);
     BOOST_TEST(probes.empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_source_is_dropped_after_a_minute_of_silence) {
+    monitor.expect_datagrams();
+    pass(59s);
+    BOOST_TEST(silences == 0);
+    pass(1s);
+    BOOST_TEST(silences == 1);
+    BOOST_TEST(deadlines.size() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(each_datagram_restarts_the_minute) {
+    monitor.expect_datagrams();
+    for (int i = 0; i < 10; ++i) {
+        monitor.on_line(clock.now());
+        pass(50s);
+    }
+    BOOST_TEST(silences == 0);
+    pass(10s);
+    BOOST_TEST(silences == 1);
+}
+
+BOOST_AUTO_TEST_CASE(it_stays_while_state_is_kept_for_it) {
+    monitor.expect_datagrams();
+    rests = false;
+    pass(10min);
+    BOOST_TEST(silences == 0);
+    rests = true;
+    pass(1min);
+    BOOST_TEST(silences == 1);
+}
+
+BOOST_AUTO_TEST_CASE(after_the_end_it_does_nothing) {
+    monitor.expect_datagrams();
+    monitor.stop();
+    pass(1h);
+    BOOST_TEST(silences == 0);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/session/reflection_limit.hpp"
+#include "node/session/datagram_rules.hpp"
 
 #include <boost/test/unit_test.hpp>
 

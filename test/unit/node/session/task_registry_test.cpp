@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/error.hpp>
 
-#include "node/session/task_registry.hpp"
+#include "node/session/task_execution.hpp"
 
 #include <boost/test/unit_test.hpp>
 

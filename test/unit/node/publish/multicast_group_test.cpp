@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // A node in a multicast group on two interfaces: what it receives on both, and what it sends on each.
-#include "node/publish/group_dispatcher.hpp"
-#include "node/publish/group_session.hpp"
+#include "node/publish/multicast_group.hpp"
 #include "support/group_recorder.hpp"
 #include "support/hear.hpp"
 #include "support/session_fixture.hpp"
@@ -14,11 +13,12 @@
 #include <string_view>
 #include <vector>
 
-namespace group_dispatcher {
+namespace multicast_group {
 namespace {
 
 using namespace std::chrono_literals;
 using cles::core::group_source;
+using cles::test::hear;
 
 constexpr group_source loopback{.address = 0x7F000001, .port = 4000};
 constexpr group_source card{.address = 0x0A000001, .port = 4001};
@@ -26,41 +26,29 @@ constexpr std::array<group_source, 2> car2{
     {{.address = 0x7F000001, .port = 5000}, {.address = 0x0A000001, .port = 5001}}};
 constexpr group_source forger{.address = 0x0A000009, .port = 4666};
 
-/// Sends on both.
-struct both final : cles::core::group_sender {
-    both(cles::test::group_recorder& a, cles::test::group_recorder& b) : one(a), two(b) {}
-    bool send(std::string_view line) override { return one.send(line) && two.send(line); }
-    cles::test::group_recorder& one;
-    cles::test::group_recorder& two;
-};
-
 struct fixture {
-    void hear(cles::core::group_session& by, const group_source& from, std::string_view datagram) {
-        cles::test::hear(by, from, datagram, node.clock.now());
-    }
     static std::vector<std::string> of(std::initializer_list<std::string> lines) { return lines; }
 
     cles::test::test_node node;
-    cles::test::group_recorder out_lo;
-    cles::test::group_recorder out_card;
-    both out{out_lo, out_card};
-    cles::core::group_dispatcher dispatcher{*node.host, out, 1};
-    cles::core::group_session on_lo{node.host, dispatcher, loopback, out_lo, 1};
-    cles::core::group_session on_card{node.host, dispatcher, card, out_card, 2};
+    cles::test::group_recorder out_lo{loopback};
+    cles::test::group_recorder out_card{card};
+    cles::core::multicast_group group{node.host, 1};
+    cles::core::group_session on_lo{node.host, group, out_lo.share(), 1};
+    cles::core::group_session on_card{node.host, group, out_card.share(), 2};
 };
 
 } // namespace
-} // namespace group_dispatcher
+} // namespace multicast_group
 
-BOOST_FIXTURE_TEST_SUITE(group_dispatcher, fixture)
+BOOST_FIXTURE_TEST_SUITE(multicast_group, fixture)
 
 BOOST_AUTO_TEST_CASE(datagrams_of_this_node_are_ignored_on_every_interface) {
     hear(on_card, loopback, "BIND all:speed");
     hear(on_lo, card, "nonsense");
     BOOST_TEST(node.counts().group_received == 0U);
     BOOST_TEST(node.counts().group_leases == 0U);
-    BOOST_TEST(dispatcher.is_of_this_host({.address = card.address, .port = 1}));
-    BOOST_TEST(!dispatcher.is_of_this_host(forger));
+    BOOST_TEST(group.is_of_this_host({.address = card.address, .port = 1}));
+    BOOST_TEST(!group.is_of_this_host(forger));
 }
 
 BOOST_AUTO_TEST_CASE(an_update_is_sent_on_the_interfaces_with_subscribers) {
@@ -106,12 +94,12 @@ BOOST_AUTO_TEST_CASE(the_limit_on_leases_is_common) {
     cles::limits few;
     few.group_leases = 2;
     cles::test::test_node small{few};
-    cles::core::group_dispatcher shared{*small.host, out, 1};
-    cles::core::group_session a{small.host, shared, loopback, out_lo, 1};
-    cles::core::group_session b{small.host, shared, card, out_card, 2};
+    cles::core::multicast_group shared{small.host, 1};
+    cles::core::group_session a{small.host, shared, out_lo.share(), 1};
+    cles::core::group_session b{small.host, shared, out_card.share(), 2};
     for (const std::string noun : {"x", "y", "z"}) {
-        cles::test::hear(a, car2[0], "BIND all:" + noun, small.clock.now());
-        cles::test::hear(b, car2[1], "BIND all:" + noun, small.clock.now());
+        hear(a, car2[0], "BIND all:" + noun);
+        hear(b, car2[1], "BIND all:" + noun);
     }
     BOOST_TEST(small.counts().group_leases == 2U);
     BOOST_TEST(small.counts().group_dropped == 4U);
@@ -119,7 +107,7 @@ BOOST_AUTO_TEST_CASE(the_limit_on_leases_is_common) {
 
 BOOST_AUTO_TEST_CASE(a_feed_is_bound_on_both_and_receives_each_update_once) {
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    dispatcher.feeds().add(feed, node.clock.now());
+    group.feeds().add(feed, node.clock.now());
     BOOST_TEST(out_lo.take() == of({"BIND all:speed lease=10000"}), boost::test_tools::per_element());
     BOOST_TEST(out_card.take() == of({"BIND all:speed lease=10000"}), boost::test_tools::per_element());
     node.host->peers.apply_announcement({.node = "car2", .sources = {car2.begin(), car2.end()}}, 0x5f3a09c1, 1, car2[0],
@@ -141,12 +129,12 @@ BOOST_AUTO_TEST_CASE(a_feed_is_bound_on_both_and_receives_each_update_once) {
     hear(on_card, forger, "UPDATE car2:speed seq=1 epoch=00000bad {}");
     BOOST_TEST(node.counts().updates_received == 6U);
     BOOST_TEST(node.counts().updates_dropped == 2U);
-    dispatcher.feeds().remove(feed);
+    group.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_CASE(a_publisher_without_announcements_is_accepted_on_one_interface) {
     cles::core::group_feed feed{{}, node.host->completions, "all", "speed"};
-    dispatcher.feeds().add(feed, node.clock.now());
+    group.feeds().add(feed, node.clock.now());
     for (std::uint64_t seq = 1; seq <= 3; ++seq) {
         const auto update = "UPDATE car2:speed seq=" + std::to_string(seq) + " epoch=5f3a09c1 {}";
         hear(on_lo, car2[0], update);
@@ -157,7 +145,7 @@ BOOST_AUTO_TEST_CASE(a_publisher_without_announcements_is_accepted_on_one_interf
     node.pass(3500ms);
     hear(on_card, car2[1], "UPDATE car2:speed seq=4 epoch=5f3a09c1 {}");
     BOOST_TEST(node.counts().updates_received == 4U);
-    dispatcher.feeds().remove(feed);
+    group.feeds().remove(feed);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

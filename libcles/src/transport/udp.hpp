@@ -3,7 +3,7 @@
 
 #include <cles/link.hpp>
 
-#include "protocol/datagram.hpp"
+#include "protocol/request_line.hpp"
 #include "transport/datagram_io.hpp"
 
 #include <boost/asio/ip/udp.hpp>
@@ -75,24 +75,24 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
 ///
 /// It lives until it is closed and its last link is closed: the links own it, and their owners own them. Each wake-up
 /// delivers up to a number of datagrams; then other tasks run. In steady state it allocates nothing.
-class udp_port : public std::enable_shared_from_this<udp_port> {
+class udp_port final : public acceptor, public std::enable_shared_from_this<udp_port> {
   public:
     using udp = boost::asio::ip::udp;
 
     explicit udp_port(udp::socket socket);
 
     /// Listens: from now on, each new source becomes a link.
-    void accept(std::function<void(link_ptr)> on_link);
+    void start(std::function<void(link_ptr)> on_link) override;
     /// The only link of a connected socket.
     link_ptr connect_link(const udp::endpoint& peer, identity who);
     /// Accepts no new sources.
-    void close();
-    [[nodiscard]] udp::endpoint local() const;
+    void close() override;
+    [[nodiscard]] url local() const override;
 
     // For its links.
     void receive();
-    /// Sends whole lines, each with its LF as one datagram. One that cannot be sent counts as lost in the network.
-    /// \return what is done; nothing: the socket has no room now \pre there is a line
+    /// Sends whole lines, each with its LF as one datagram, as long as the socket has room. One that cannot be sent
+    /// counts as lost in the network.
     core::lines_done send(const udp_link& to, std::string_view lines);
     void wait_for_room(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
@@ -115,7 +115,6 @@ class udp_port : public std::enable_shared_from_this<udp_port> {
     std::function<void(link_ptr)> on_link_;
     boost::unordered_flat_map<udp::endpoint, udp_link*, endpoint_hash> links_; // links remove themselves
     udp_link* recent_ = nullptr; // usually the source of the previous datagram
-    std::vector<std::weak_ptr<udp_link>> waiting_;
     receive_batch arrived_;
 };
 

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/routing/deferred_request.hpp"
+
+#include "node/routing/load_balancer.hpp"
+#include "node/session/request_checks.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+// How long an unreachable node is avoided; `membership` removes those that are gone.
+constexpr std::chrono::milliseconds out_of_reach{1'000};
+
+std::chrono::milliseconds pause_after(const subrequest_failure& why) {
+    if (why.unreachable) {
+        return out_of_reach;
+    }
+    return std::chrono::milliseconds{
+        std::min<std::uint64_t>(why.told.retry_ms.value_or(protocol::default_retry_ms), 1'000)};
+}
+
+void begin_member(std::string& in, std::string_view node) {
+    in.append(in.empty() ? "\"" : ",\"").append(node).append("\":"); // a name needs no escapes
+}
+
+} // namespace
+
+void deferred_request::follow_call() {
+    call_->on_stop([weak = weak_from_this()] {
+        if (const auto self = weak.lock()) {
+            self->withdraw();
+        }
+    });
+}
+
+// -- any ------------------------------------------------------------------------------------------------------------
+
+any_request::any_request(std::shared_ptr<request_router> by, const protocol::request_line& r, const identity& peer,
+                         std::shared_ptr<call> answers, time_point due)
+    : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer) {}
+
+bool any_request::begin(time_point now) {
+    if (!retry_after_ && routing_->waits_for_discovery()) {
+        return false;
+    }
+    const auto chosen = routing_->choose(*request_, asked_, now);
+    if (over()) { // the program's load function has stopped the service
+        return true;
+    }
+    if (!chosen.nobody()) {
+        ask(chosen, now);
+    } else if (retry_after_) {
+        give_up(retry_after_->told, retry_after_->may_have_started);
+    } else if (routing_->expects_more()) {
+        return false;
+    } else {
+        call_->fail(routing_->no_provider(*request_));
+    }
+    return true;
+}
+
+void any_request::ask(const load_balancer::chosen& chosen, time_point now) {
+    idempotent_ = chosen.idempotent || request_->verb == verb::pull;
+    if (asked_.empty()) {
+        follow_call();
+    }
+    part_ = {};
+    const auto then = [this, self = shared_from_this()](std::string_view json, subrequest_failure* why) {
+        on_outcome(json, why);
+    };
+    if (chosen.other != nullptr) {
+        asked_.push_back(chosen.other->name);
+        ++chosen.other->given;
+        part_.ticket = routing_->send(*request_, chosen.other->name, reply_due_, then, progress_to(call_));
+        return;
+    }
+    asked_.push_back(routing_->host().name);
+    part_.here = std::make_unique<local_request>(call_->host(), then, call_->memory(), progress_to(call_));
+    part_.here->run(*request_, peer_, reply_due_, now);
+}
+
+void any_request::continue_after_local_refusal(const protocol::failure& why) {
+    follow_call();
+    asked_.push_back(routing_->host().name);
+    subrequest_failure failure{.told = why, .may_have_started = false};
+    on_outcome({}, &failure);
+}
+
+void any_request::on_outcome(std::string_view json, subrequest_failure* why) {
+    if (why != nullptr && routing_->stopped()) {
+        return;
+    }
+    note_end(why);
+    if (why == nullptr) {
+        call_->done(json);
+    } else if (!over()) {
+        try_next(std::move(*why));
+    }
+}
+
+// Updates the tracked load of the node that was asked.
+void any_request::note_end(const subrequest_failure* why) {
+    const bool refused = why != nullptr && (why->unreachable || why->told.code == errc::busy);
+    const auto until = refused ? saturating_add(routing_->host().time.now(), pause_after(*why)) : time_point{};
+    if (asked_.back() == routing_->host().name) {
+        if (refused) {
+            routing_->avoid_local(until);
+        }
+    } else if (auto* other = routing_->find(asked_.back())) {
+        other->given -= other->given != 0 ? 1 : 0;
+        other->given_at_report = std::min(other->given_at_report, other->given);
+        if (refused) {
+            other->avoid_until = until;
+        }
+    }
+}
+
+bool any_request::may_repeat(const subrequest_failure& why) const noexcept {
+    if (!why.may_have_started) {
+        return why.unreachable || why.told.code == errc::busy || why.told.code == errc::no_task ||
+               why.told.code == errc::no_target;
+    }
+    return why.told.code == errc::unavailable && idempotent_ && !lost_ && !why.told.ran;
+}
+
+void any_request::try_next(subrequest_failure why) {
+    const auto busy = why.told.code == errc::busy;
+    const bool may_have_started = why.may_have_started;
+    const bool lost = may_have_started && why.told.code == errc::unavailable;
+    busy_ += busy ? 1 : 0;
+    const bool repeat = may_repeat(why) && busy_ < max_busy;
+    auto told = named(std::move(why), asked_.back());
+    if (lost && lost_) {
+        told.ran = true;
+        told.answer.clear(); // another node's reply does not know of the first attempt
+    } else if (lost) {
+        lost_ = told;
+    }
+    if (busy && (!last_busy_ || told.retry_ms.value_or(0) < last_busy_->retry_ms.value_or(0))) {
+        last_busy_ = told;
+    }
+    if (!repeat) {
+        give_up(std::move(told), may_have_started);
+        return;
+    }
+    part_.ticket = 0;
+    retry_after_ = subrequest_failure{.told = std::move(told), .may_have_started = may_have_started};
+    routing_->schedule(shared_from_this());
+}
+
+void any_request::give_up(protocol::failure why, bool may_have_started) {
+    // `busy` promises that the work was not started.
+    if (!may_have_started && lost_) {
+        why = *lost_;
+    } else if (!may_have_started && last_busy_) {
+        why = *last_busy_;
+    }
+    call_->fail(std::move(why));
+}
+
+// -- all ------------------------------------------------------------------------------------------------------------
+
+scatter_gather::scatter_gather(std::shared_ptr<request_router> by, const protocol::request_line& r,
+                               const identity& peer, std::shared_ptr<call> answers, time_point due)
+    : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer) {}
+
+bool scatter_gather::begin(time_point now) {
+    if (begun_ || over()) {
+        return true;
+    }
+    if (routing_->expects_more() && !has_waited_) {
+        if (!armed()) {
+            routing_->host().deadlines.arm(*this, stop_waiting_at(reply_due_, now));
+        }
+        return false;
+    }
+    ask_known(now);
+    return true;
+}
+
+void scatter_gather::ask_known(time_point now) {
+    begun_ = true;
+    routing_->host().deadlines.disarm(*this);
+    const auto& r = *request_;
+    const auto add = [this](const std::string& node) { parts_.emplace_back().node = node; };
+    if (offers(routing_->host(), r.verb, r.noun.task)) {
+        add(routing_->host().name);
+    }
+    if (r.hops != 0) {
+        for (const auto& o : routing_->offers(r.verb, r.noun.task)) {
+            if (!is_in_via(r.via, o.by->name)) {
+                add(o.by->name);
+            }
+        }
+    }
+    if (parts_.empty()) {
+        call_->fail(routing_->no_provider(r));
+        return;
+    }
+    std::sort(parts_.begin(), parts_.end(), [](const part& a, const part& b) { return a.node < b.node; });
+    ask_all(now);
+}
+
+void scatter_gather::ask_all(time_point now) {
+    follow_call();
+    const auto by = answer_by(reply_due_, now);
+    routing_->host().deadlines.arm(*this, by);
+    const auto then = [this, self = shared_from_this()](part& at) {
+        return [this, self, &at](std::string_view json, subrequest_failure* why) { on_outcome(at, json, why); };
+    };
+    part* own = nullptr;
+    for (auto at = parts_.begin(); at != parts_.end() && !ended_; ++at) {
+        if (at->node == routing_->host().name) {
+            own = &*at;
+        } else {
+            at->ticket = routing_->send(*request_, at->node, by, then(*at));
+        }
+    }
+    if (own != nullptr && !ended_) { // last, since its handler may do anything
+        own->here = std::make_unique<local_request>(call_->host(), then(*own), call_->memory());
+        own->here->run(*request_, peer_, by, now);
+    }
+}
+
+void scatter_gather::on_outcome(part& at, std::string_view json, subrequest_failure* why) {
+    if (ended_) {
+        return;
+    }
+    if (why != nullptr) {
+        at.failure = named(std::move(*why), at.node);
+    } else if (call_->hold_more(json.size())) {
+        at.result = json;
+        bytes_ += json.size();
+    } else {
+        call_->fail({.code = errc::busy,
+                     .message = "no memory is left for the answers of all (limits.memory)",
+                     .retry_ms = 1000,
+                     .ran = true});
+        withdraw();
+        return;
+    }
+    follow();
+}
+
+void scatter_gather::on_deadline(time_point) {
+    const auto self = shared_from_this();
+    if (begun_) {
+        finish();
+    } else { // there may always be nodes whose tasks are not known yet
+        has_waited_ = true;
+        routing_->schedule(self);
+    }
+}
+
+void scatter_gather::follow() {
+    if (bytes_ > routing_->host().bounds.line) { // it cannot fit any more
+        call_->fail({.code = errc::too_large,
+                     .message = "the answers of all have more than " + std::to_string(bytes_) + " bytes",
+                     .ran = true});
+        withdraw();
+    } else if (std::none_of(parts_.begin(), parts_.end(), [](const part& p) { return p.is_open(); })) {
+        finish();
+    }
+}
+
+void scatter_gather::finish() {
+    aggregate_reply text;
+    for (const auto& p : parts_) {
+        text.add(p.node, p);
+    }
+    withdraw(); // those that are late
+    call_->done(text.whole());
+}
+
+void scatter_gather::withdraw() {
+    if (std::exchange(ended_, true)) {
+        return;
+    }
+    routing_->host().deadlines.disarm(*this);
+    for (const auto& p : parts_) {
+        if (p.is_open()) {
+            routing_->cancel(p);
+        }
+    }
+}
+
+// -- the reply -----------------------------------------------------------------------------------------------------
+
+void aggregate_reply::add(std::string_view node, const node_outcome& found) {
+    if (!found.result) {
+        begin_member(errors_, node);
+        const protocol::failure late{.code = errc::deadline, .message = std::string{node} + " did not answer in time"};
+        append_failure(errors_, found.failure ? *found.failure : late);
+        return;
+    }
+    begin_member(results_, node);
+    results_.append(*found.result);
+    if (found.mark) {
+        begin_member(marks_, node);
+        marks_.append(R"({"seq":)").append(std::to_string(found.mark->seq));
+        marks_.append(R"(,"epoch":")").append(protocol::epoch_text(found.mark->epoch)).append("\"}");
+    }
+}
+
+std::string aggregate_reply::whole() const {
+    auto text = R"({"results":{)" + results_ + R"(},"errors":{)" + errors_ + "}";
+    if (with_marks_ && !results_.empty()) {
+        text.append(R"(,"marks":{)").append(marks_).append("}");
+    }
+    return text + "}";
+}
+
+time_point answer_by(time_point due, time_point now) {
+    constexpr std::chrono::milliseconds most{50};
+    return due - std::min<time_point::duration>((due - now) / 8, most);
+}
+
+time_point stop_waiting_at(time_point due, time_point now) {
+    constexpr std::chrono::seconds most{1};
+    return now + std::min<time_point::duration>((due - now) / 2, most);
+}
+
+} // namespace cles::core

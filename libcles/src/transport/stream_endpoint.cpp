@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "transport/stream_endpoint.hpp"
+
+#include <boost/asio/error.hpp>
+
+#include <chrono>
+#include <utility>
+
+namespace cles::transport {
+namespace asio = boost::asio;
+using boost::system::error_code;
+
+// --- Dialling ---
+
+stream_dialler::stream_dialler(const asio::any_io_executor& executor, const limits& bounds, identify_function identify,
+                               dial_callback done)
+    : socket_(executor), timeout_(executor, bounds.connect), bounds_(bounds), identify_(std::move(identify)),
+      done_(std::move(done)) {}
+
+void stream_dialler::start(std::vector<stream_address> where) {
+    where_ = std::move(where);
+    timeout_.async_wait([self = shared_from_this()](error_code code) {
+        if (!code) {
+            self->fail(asio::error::timed_out);
+        }
+    });
+    connect();
+}
+
+void stream_dialler::connect() {
+    socket_.async_connect(where_[tried_++], [self = shared_from_this()](error_code code) { self->on_connected(code); });
+}
+
+void stream_dialler::on_connected(error_code code) {
+    if (!done_) {
+        return;
+    }
+    if (!code) {
+        socket_.remote_endpoint(code); // Asio takes a Unix socket for connected if the listener's queue was full
+        code = code == asio::error::not_connected ? asio::error::try_again : code;
+    }
+    if (code && tried_ < where_.size()) {
+        error_code ignored;
+        socket_.close(ignored);
+        connect();
+    } else if (code) {
+        fail(code);
+    } else {
+        const auto done = std::exchange(done_, nullptr);
+        timeout_.cancel();
+        auto peer = identify_(socket_);
+        done({}, std::make_shared<stream_link>(std::move(socket_), std::move(peer), bounds_));
+    }
+}
+
+void stream_dialler::fail(error_code why) {
+    const auto done = std::exchange(done_, nullptr);
+    give_up();
+    if (done) {
+        done(why, nullptr);
+    }
+}
+
+void stream_dialler::give_up() {
+    done_ = nullptr;
+    error_code ignored;
+    socket_.close(ignored);
+    timeout_.cancel();
+}
+
+// --- Accepting ---
+
+namespace {
+
+// Whether one connection failed before it was accepted (accept(2)): the next one may succeed. Other errors, such as a
+// lack of descriptors, would recur at once.
+bool is_the_peers(const error_code& code) {
+    using namespace boost::system::errc;
+    for (const auto one : {connection_aborted, connection_reset, protocol_error, no_protocol_option, host_unreachable,
+                           network_unreachable, network_down, operation_not_supported, timed_out, interrupted}) {
+        if (code == one) {
+            return true;
+        }
+    }
+    return false;
+}
+
+} // namespace
+
+stream_acceptor::stream_acceptor(listening_socket socket, url local, const limits& bounds, identify_function identify)
+    : acceptor_(std::move(socket)), local_(std::move(local)), pause_(acceptor_.get_executor()), bounds_(bounds),
+      identify_(std::move(identify)) {}
+
+void stream_acceptor::start(std::function<void(link_ptr)> on_link) {
+    on_link_ = std::move(on_link);
+    accept();
+}
+
+void stream_acceptor::accept_waiting() {
+    accepts_waiting_ = true;
+    error_code code;
+    acceptor_.non_blocking(true, code);
+    while (!code && on_link_) {
+        stream_socket socket{acceptor_.get_executor()};
+        acceptor_.accept(socket, code);
+        if (!code) {
+            hand_over(std::move(socket));
+        }
+    }
+}
+
+void stream_acceptor::close() {
+    error_code ignored;
+    acceptor_.close(ignored); // ends the pending accept, which releases the callback
+    pause_.cancel();
+}
+
+void stream_acceptor::hand_over(stream_socket socket) {
+    auto peer = identify_(socket);
+    on_link_(std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_));
+}
+
+void stream_acceptor::accept() {
+    acceptor_.async_accept([self = shared_from_this()](error_code code, stream_socket socket) {
+        if (!code && self->on_link_ && (self->acceptor_.is_open() || self->accepts_waiting_)) {
+            self->hand_over(std::move(socket));
+        }
+        if (!self->acceptor_.is_open() || !self->on_link_) {
+            self->on_link_ = nullptr;
+        } else if (!code || is_the_peers(code)) {
+            self->accept();
+        } else {
+            self->accept_later();
+        }
+    });
+}
+
+void stream_acceptor::accept_later() {
+    pause_.expires_after(std::chrono::milliseconds{100});
+    pause_.async_wait([self = shared_from_this()](error_code code) {
+        if (!code && self->acceptor_.is_open()) {
+            self->accept();
+        }
+    });
+}
+
+} // namespace cles::transport
