@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::core {
 namespace {
@@ -127,6 +128,7 @@ void write_metrics(json_writer& w, const node_state& n) {
     }
     w.end_object();
     static constexpr auto all = all_counters(detail::fields_of<counters>{});
+    static_assert(all.size() + verb_count == sizeof(counters) / sizeof(std::uint64_t), "describe every counter");
     for (const auto& c : all) {
         number(c.name, counts.*c.value);
     }
