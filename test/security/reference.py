@@ -1,0 +1,329 @@
+# SPDX-License-Identifier: BSL-1.0
+"""The formats of docs/security.md, written from that page alone, with PyNaCl for the primitives."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import hmac
+import json
+import re
+
+from nacl import bindings as sodium
+
+
+class Refused(Exception):
+    """What the page says is not accepted."""
+
+
+# --- Keys and texts ------------------------------------------------------------------------------------------------------
+
+
+def text(binary: bytes) -> str:
+    return base64.urlsafe_b64encode(binary).rstrip(b"=").decode()
+
+
+def binary(encoded: str, length: int) -> bytes:
+    """The bytes of base64url without padding. Every value has one spelling: other characters and stray bits are refused."""
+    if not isinstance(encoded, str) or not re.fullmatch(r"[A-Za-z0-9_-]*", encoded):
+        raise Refused("not base64url")
+    try:
+        value = base64.urlsafe_b64decode(encoded + "=" * (-len(encoded) % 4))
+    except ValueError as error:
+        raise Refused("not base64url") from error
+    if len(value) != length or text(value) != encoded:
+        raise Refused(f"not {length} bytes")
+    return value
+
+
+class Identity:
+    """An Ed25519 key pair, made from its 32-byte seed, and its X25519 form."""
+
+    def __init__(self, seed: bytes):
+        self.public, self.secret = sodium.crypto_sign_seed_keypair(seed)
+        self.dh_public = x25519_of(self.public)
+        self.dh_secret = sodium.crypto_sign_ed25519_sk_to_curve25519(self.secret)
+
+    def sign(self, message: bytes) -> bytes:
+        return sodium.crypto_sign(message, self.secret)[:64]
+
+
+def x25519_of(public: bytes) -> bytes:
+    """A key that is no point of prime order has no X25519 form."""
+    if not sodium.crypto_core_ed25519_is_valid_point(public):
+        raise Refused("a key that is not valid")
+    return sodium.crypto_sign_ed25519_pk_to_curve25519(public)
+
+
+def verify(public: bytes, message: bytes, signature: bytes) -> None:
+    try:
+        sodium.crypto_sign_open(signature + message, public)
+    except Exception as error:
+        raise Refused("wrong signature") from error
+
+
+# --- The roster ----------------------------------------------------------------------------------------------------------
+
+ROSTER_LINE = re.compile(rb'\{"signature":"([A-Za-z0-9_-]{86})","roster":(.*)\}', re.DOTALL)
+NAME = re.compile(r"[A-Za-z0-9_.-]{1,64}")
+ROSTER_KEYS = {"fleet", "version", "last", "generation", "oldest", "keys", "members"}
+MEMBER_KEYS = {"number", "name", "key", "keys", "may", "offers", "forwards"}
+SEALED_KEYS = 32 + 32 + 48
+ROSTER_LIMIT = 1_000_000
+
+
+def sign_roster(fleet: Identity, roster: dict) -> bytes:
+    content = json.dumps(roster, separators=(",", ":")).encode()
+    signature = fleet.sign(b"cles roster 1\n" + content)
+    return b'{"signature":"' + text(signature).encode() + b'","roster":' + content + b"}"
+
+
+def whole(value, low: int, high: int) -> int:
+    if type(value) is not int or not low <= value <= high:
+        raise Refused(f"not a whole number from {low} to {high}")
+    return value
+
+
+def read_roster(line: bytes, fleet: bytes) -> dict:
+    if len(line) > ROSTER_LIMIT:
+        raise Refused("too long")
+    match = ROSTER_LINE.fullmatch(line)
+    if not match:
+        raise Refused("not of the form of a roster")
+    verify(fleet, b"cles roster 1\n" + match.group(2), binary(match.group(1).decode(), 64))
+    try:
+        roster = json.loads(match.group(2), object_pairs_hook=without_repeats)
+    except ValueError as error:
+        raise Refused("not JSON") from error
+    if not isinstance(roster, dict) or binary(roster.get("fleet"), 32) != fleet:
+        raise Refused("of another fleet")
+    for known, entry in [(ROSTER_KEYS, roster)] + [(MEMBER_KEYS, m) for m in members_of(roster)]:
+        if any(key.startswith("must_") for key in set(entry) - known):
+            raise Refused("has a key that must be understood")
+    whole(roster.get("version"), 1, 2**32 - 1)
+    last = whole(roster.get("last"), 0, 2**24 - 1)
+    generation = whole(roster.get("generation"), 1, 2**32 - 2)
+    whole(roster.get("oldest"), max(1, generation - 1), generation)
+    binary(roster.get("keys"), SEALED_KEYS)
+    number = 0
+    for member in members_of(roster):
+        number = whole(member.get("number"), number + 1, last)
+        if not isinstance(member.get("name"), str) or not NAME.fullmatch(member["name"]):
+            raise Refused("has a member without a valid name")
+        if member["name"] in ("self", "any", "all"):
+            raise Refused("has a member with a reserved name")
+        x25519_of(binary(member.get("key"), 32))
+        binary(member.get("keys"), SEALED_KEYS)
+        for patterns in ("may", "offers", "forwards"):
+            listed = member.get(patterns, [])
+            if not isinstance(listed, list) or not all(isinstance(pattern, str) for pattern in listed):
+                raise Refused(f"has '{patterns}' that are not texts")
+    for unique in ("name", "key"):
+        values = [member[unique] for member in members_of(roster)]
+        if len(set(values)) != len(values):
+            raise Refused(f"has two members with one {unique}")
+    return roster
+
+
+def without_repeats(pairs: list) -> dict:
+    if len({key for key, _ in pairs}) != len(pairs):
+        raise Refused("has a key twice")
+    return dict(pairs)
+
+
+def members_of(roster: dict) -> list:
+    members = roster.get("members")
+    if not isinstance(members, list) or len(members) > 4096 or not all(isinstance(m, dict) for m in members):
+        raise Refused("has no valid list of members")
+    return members
+
+
+def group_keys(sealed: str, receiver: Identity) -> tuple[bytes, bytes]:
+    """The current key and the next one."""
+    try:
+        opened = sodium.crypto_box_seal_open(binary(sealed, SEALED_KEYS), receiver.dh_public, receiver.dh_secret)
+    except Exception as error:
+        raise Refused("sealed for somebody else") from error
+    return opened[:32], opened[32:]
+
+
+# --- Signed requests and updates -----------------------------------------------------------------------------------------
+
+CHALLENGE = 16
+
+
+def to_sign(kind: str, fleet: bytes, *lines: str) -> bytes:
+    """No line contains a line end, so that a text has one reading."""
+    if any("\n" in line for line in lines):
+        raise Refused("a line end")
+    return "".join(line + "\n" for line in (f"cles {kind} 1", text(fleet), *lines)).encode()
+
+
+def request_to_sign(fleet: bytes, requester: str, node: str, challenge: str, verb: str, noun: str, body: str) -> bytes:
+    if not NAME.fullmatch(node):
+        raise Refused("not a name")
+    binary(challenge, CHALLENGE)
+    return to_sign("request", fleet, requester, node, challenge, f"{verb.upper()} {noun}", body or "{}")
+
+
+def update_to_sign(fleet: bytes, publisher: str, noun: str, seq: int, epoch: str, body: str) -> bytes:
+    return to_sign("update", fleet, publisher, noun, f"{seq} {epoch}", body)
+
+
+def verify_announced(fleet: bytes, publisher: str, public: bytes, announced: str, entry: dict, challenge: str = "") -> None:
+    """An entry of gossip, or with a challenge the reply to PULL of cles/announced; `announced` is its text as written."""
+    noun = "cles"
+    if challenge:
+        binary(challenge, CHALLENGE)
+        noun = f"cles/announced/{challenge}"
+    message = update_to_sign(fleet, publisher, noun, entry["seq"], entry["epoch"], announced)
+    verify(public, message, binary(entry["sig"], 64))
+    if json.loads(announced).get("node") != publisher:
+        raise Refused("an announcement of another node")
+
+
+# --- Noise_KK_25519_ChaChaPoly_SHA256 ------------------------------------------------------------------------------------
+
+PROTOCOL = b"Noise_KK_25519_ChaChaPoly_SHA256"  # 32 bytes, so the first hash is the name itself
+
+
+def noise_nonce(counter: int) -> bytes:
+    return bytes(4) + counter.to_bytes(8, "little")
+
+
+def encrypt(key: bytes, counter: int, additional: bytes, plain: bytes) -> bytes:
+    return sodium.crypto_aead_chacha20poly1305_ietf_encrypt(plain, additional, noise_nonce(counter), key)
+
+
+def decrypt(key: bytes, counter: int, additional: bytes, sealed: bytes) -> bytes:
+    try:
+        return sodium.crypto_aead_chacha20poly1305_ietf_decrypt(sealed, additional, noise_nonce(counter), key)
+    except Exception as error:
+        raise Refused("not authentic") from error
+
+
+def dh(secret: bytes, public: bytes) -> bytes:
+    try:
+        return sodium.crypto_scalarmult(secret, public)
+    except Exception as error:
+        raise Refused("a key of low order") from error
+
+
+class Handshake:
+    """One end of a handshake: a sequence of mixes, as in section 5 of the Noise specification."""
+
+    def __init__(self, me: Identity, peer: bytes, initiator: bool, prologue: bytes, ephemeral: bytes):
+        self.me, self.peer, self.initiator = me, x25519_of(peer), initiator
+        self.ephemeral = ephemeral
+        self.ephemeral_public = sodium.crypto_scalarmult_base(ephemeral)
+        self.chaining_key = self.hash = PROTOCOL
+        self.key, self.counter = b"", 0
+        statics = [me.dh_public, self.peer] if initiator else [self.peer, me.dh_public]
+        for part in [prologue, *statics]:
+            self.mix_hash(part)
+
+    def mix_hash(self, data: bytes) -> None:
+        self.hash = hashlib.sha256(self.hash + data).digest()
+
+    def hkdf(self, material: bytes) -> tuple[bytes, bytes]:
+        extracted = hmac.digest(self.chaining_key, material, "sha256")
+        first = hmac.digest(extracted, b"\x01", "sha256")
+        return first, hmac.digest(extracted, first + b"\x02", "sha256")
+
+    def mix_key(self, material: bytes) -> None:
+        self.chaining_key, self.key = self.hkdf(material)
+        self.counter = 0
+
+    def write(self, payload: bytes) -> bytes:
+        self.mix_hash(self.ephemeral_public)
+        self.mix_ephemeral()
+        sealed = encrypt(self.key, self.counter, self.hash, payload)
+        self.counter += 1
+        self.mix_hash(sealed)
+        return self.ephemeral_public + sealed
+
+    def read(self, message: bytes) -> bytes:
+        self.peer_ephemeral = message[:32]
+        self.mix_hash(self.peer_ephemeral)
+        self.mix_ephemeral()
+        payload = decrypt(self.key, self.counter, self.hash, message[32:])
+        self.counter += 1
+        self.mix_hash(message[32:])
+        return payload
+
+    def mix_ephemeral(self) -> None:
+        """The first message mixes es and ss, the second ee and se."""
+        if not hasattr(self, "first_done"):
+            self.first_done = True
+            es = dh(self.ephemeral, self.peer) if self.initiator else dh(self.me.dh_secret, self.peer_ephemeral)
+            self.mix_key(es)
+            self.mix_key(dh(self.me.dh_secret, self.peer))
+        else:
+            self.mix_key(dh(self.ephemeral, self.peer_ephemeral))
+            self.mix_key(dh(self.me.dh_secret, self.peer_ephemeral) if self.initiator else dh(self.ephemeral, self.peer))
+
+    def split(self) -> tuple[bytes, bytes]:
+        """The keys for sending and for receiving."""
+        first, second = self.hkdf(b"")
+        return (first, second) if self.initiator else (second, first)
+
+
+# --- Datagrams -----------------------------------------------------------------------------------------------------------
+
+HELLO, WELCOME, DATA, GROUP = 0x81, 0x82, 0x83, 0x84
+
+
+def head(kind: int, member: int) -> bytes:
+    return bytes([kind]) + member.to_bytes(3, "big")
+
+
+def prologue(fleet: bytes, responder: int, hello_head: bytes) -> bytes:
+    return b"cles datagram 1\n" + fleet + responder.to_bytes(3, "big") + hello_head
+
+
+def hello_payload(version: int, epoch: str, salt: bytes, counter: int) -> bytes:
+    return welcome_payload(bytes(8), version, epoch, salt, counter)
+
+
+def welcome_payload(index: bytes, version: int, epoch: str, salt: bytes, counter: int) -> bytes:
+    return index + version.to_bytes(4, "big") + bytes.fromhex(epoch) + salt + counter.to_bytes(8, "big")
+
+
+def seal_data(key: bytes, member: int, index: bytes, counter: int, line: bytes) -> bytes:
+    start = head(DATA, member) + index + counter.to_bytes(8, "big")
+    return start + encrypt(key, counter, start, line)
+
+
+def open_data(key: bytes, datagram: bytes) -> bytes:
+    if len(datagram) < 36 or datagram[0] != DATA:
+        raise Refused("not DATA")
+    return decrypt(key, int.from_bytes(datagram[12:20], "big"), datagram[:20], datagram[20:])
+
+
+def seal_group(key: bytes, member: int, generation: int, salt: bytes, counter: int, line: bytes) -> bytes:
+    nonce = salt + counter.to_bytes(8, "big")
+    start = head(GROUP, member) + generation.to_bytes(4, "big") + nonce
+    return start + sodium.crypto_aead_xchacha20poly1305_ietf_encrypt(line, start, nonce, key)
+
+
+def open_group(key: bytes, datagram: bytes) -> bytes:
+    if len(datagram) < 48 or datagram[0] != GROUP:
+        raise Refused("not GROUP")
+    try:
+        return sodium.crypto_aead_xchacha20poly1305_ietf_decrypt(datagram[32:], datagram[:32], datagram[8:32], key)
+    except Exception as error:
+        raise Refused("not authentic") from error
+
+
+class ReplayWindow:
+    """Accepts each counter once, from `first` on, and none that is 1024 or more below the highest."""
+
+    def __init__(self, first: int = 0):
+        self.first, self.highest, self.seen = first, first - 1, set()
+
+    def accept(self, counter: int) -> bool:
+        if counter < self.first or counter <= self.highest - 1024 or counter in self.seen:
+            return False
+        self.highest = max(self.highest, counter)
+        self.seen = {number for number in self.seen if number > self.highest - 1024} | {counter}
+        return True
