@@ -30,8 +30,8 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     struct terms : protocol::carried_adverbs {
         /// Those that the request line states.
         explicit terms(const protocol::request_line& r)
-            : carried_adverbs(r), verb(r.verb), id(r.id), wants_reply(r.wants_reply), wants_progress(r.wants_progress) {
-        }
+            : carried_adverbs(r.carried()), verb(r.verb), id(r.id), wants_reply(r.wants_reply),
+              wants_progress(r.wants_progress) {}
 
         cles::verb verb;
         std::uint64_t id;
