@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: BSL-1.0
 
-# cles_add_plugin(target source...): a plugin for clesd, as the target's name with `.so` at its end. It links cles::plugin,
-# and shows nothing but its entry point, so that what it is built from meets neither the daemon's nor other plugins'.
+# cles_add_plugin(target source...): builds a plugin for clesd, named after the target with the suffix `.so`. It links
+# cles::plugin and exports only its entry point, so that its symbols do not conflict with those of the daemon or of
+# other plugins.
 function(cles_add_plugin target)
     add_library(${target} MODULE ${ARGN})
     target_link_libraries(${target} PRIVATE cles::plugin)
@@ -11,7 +12,7 @@ function(cles_add_plugin target)
         VISIBILITY_INLINES_HIDDEN ON)
     if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang" AND NOT APPLE)
         set(symbols "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/cles-plugin.map")
-        # What is missing is told when the plugin is linked, and not when it is loaded.
+        # Reports missing symbols when the plugin is linked, not when it is loaded.
         target_link_options(${target} PRIVATE "LINKER:--version-script=${symbols},--exclude-libs,ALL,-z,defs,--gc-sections")
         set_property(TARGET ${target} APPEND PROPERTY LINK_DEPENDS "${symbols}")
     endif()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: BSL-1.0
 
-# What `cmake --install` puts where. All of it may be moved afterwards: nothing names a path of this machine but where
-# Boost is, if that is none of the compiler's own places.
+# What `cmake --install` installs, and where. The installed tree may be moved: the only path of this machine in it is
+# that of Boost, if Boost is outside the compiler's default folders.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -31,8 +31,8 @@ install(FILES
 
 # --- pkg-config --------------------------------------------------------------------------------------------------------
 
-# cles_flags_of_boost(cflags libs): what g++ has to be told of the Boost that the library was built with, which brings no
-# pkg-config files of its own. The file's name says static or shared, as it was here.
+# cles_flags_of_boost(cflags libs): the flags that g++ needs for the Boost that the library was built with, because
+# Boost has no pkg-config files. The name of the library file determines static or shared linking.
 function(cles_flags_of_boost cflags_out libs_out)
     set(cflags "")
     get_target_property(includes Boost::headers INTERFACE_INCLUDE_DIRECTORIES)
@@ -93,7 +93,7 @@ endforeach()
 
 # --- The licence and the pages -----------------------------------------------------------------------------------------
 
-# As they lie in the tree, so that their links lead somewhere.
+# With the folders of the source tree, so that links between pages work.
 install(FILES LICENSE README.md CONTRIBUTING.md DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 install(DIRECTORY config docs DESTINATION "${CMAKE_INSTALL_DOCDIR}")
 install(DIRECTORY plugins/primes plugins/template DESTINATION "${CMAKE_INSTALL_DOCDIR}/plugins")
@@ -102,7 +102,7 @@ install(DIRECTORY apps/examples DESTINATION "${CMAKE_INSTALL_DOCDIR}/apps"
 
 # --- Completion --------------------------------------------------------------------------------------------------------
 
-# Where each shell looks by itself.
+# The default folders of each shell.
 if(TARGET cles_command)
     install(FILES apps/completion/cles.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions" RENAME cles)
     install(FILES apps/completion/_cles DESTINATION "${CMAKE_INSTALL_DATADIR}/zsh/site-functions")

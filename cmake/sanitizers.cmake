@@ -30,8 +30,8 @@ function(cles_target_sanitizers target)
     target_link_options(${target} PUBLIC ${flags})
 endfunction()
 
-# cles_target_tests_only(target): it drives what is tested. The checks of each pointer, which are half the work of compiling
-# it, are left to the library's own code; whatever reads and writes where it must not is found in both.
+# cles_target_tests_only(target): for test code. It omits the checks of each pointer, which take half the compile
+# time; the library's own code has them. Invalid reads and writes are detected in both.
 function(cles_target_tests_only target)
     if("undefined" IN_LIST CLES_SANITIZE)
         target_compile_options(${target} PRIVATE -fno-sanitize=alignment,null,object-size,pointer-overflow,vptr)

@@ -6,9 +6,9 @@ function(cles_target_defaults target)
     cles_target_sanitizers(${target})
 
     if(CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
-        # One section per function, so that a program carries only what it uses.
+        # One section per function, so that a program contains only what it uses.
         target_compile_options(${target} PRIVATE -ffunction-sections -fdata-sections)
-        # No path of the machine that compiled ends up in a program.
+        # Programs contain no path of the build machine.
         target_compile_options(${target} PRIVATE "-fmacro-prefix-map=${PROJECT_SOURCE_DIR}/=")
 
         get_target_property(type ${target} TYPE)

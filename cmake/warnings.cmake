@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: BSL-1.0
 
-# cles_target_warnings(target): the warnings that our own code is held to. Headers of other projects count as system
-# headers and are not.
+# cles_target_warnings(target): enables warnings for our own code. Headers of other projects count as system
+# headers, which are excluded.
 function(cles_target_warnings target)
     if(NOT CMAKE_CXX_COMPILER_ID MATCHES "GNU|Clang")
         return()
     endif()
 
-    # Not -Wnon-virtual-dtor, which trips over every error category made by Boost's rules; -Wall brings
-    # -Wdelete-non-virtual-dtor, which reports the deletions that would go wrong.
+    # Not -Wnon-virtual-dtor, which warns about every error category written as Boost requires; -Wall includes
+    # -Wdelete-non-virtual-dtor, which reports incorrect deletions.
     set(flags
         -Wall
         -Wextra
@@ -24,7 +24,7 @@ function(cles_target_warnings target)
         -Wredundant-decls
         -Wshadow
         -Wunused
-        # Options are given by designated initializers, which are there to leave members out.
+        # Options are passed as designated initializers, which omit members on purpose.
         -Wno-missing-field-initializers)
 
     if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")

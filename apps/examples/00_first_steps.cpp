@@ -40,7 +40,7 @@ int main() {
     asio::io_context io;
     cles::service car1{io, {.name = "car1", .listen = {"tcp://127.0.0.1:0"}}};
     car1.on_pull("localization", [] { return here(); });
-    car1.update("localization", here()); // to all that are bound
+    car1.update("localization", here()); // to all subscribers
 
     cles::service car2{io, {.name = "car2", .peers = {{"car1", car1.endpoints().front()}}}};
     asio::co_spawn(io, follow(car1, car2), rethrow);

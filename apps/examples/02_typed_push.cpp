@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Structs travel as JSON and arrive as structs. What does not fit is refused by naming the path to it.
+// Structs are sent as JSON and received as structs. A body that does not fit is refused, with the path to the error.
 #include <cles/service.hpp>
 
 #include <boost/asio/awaitable.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A feed: it begins with the last value, reports gaps, and survives its publisher.
+// A feed: it begins with the last value, reports gaps, and binds again when its publisher returns.
 #include <cles/service.hpp>
 
 #include <boost/asio/awaitable.hpp>
@@ -42,7 +42,7 @@ asio::awaitable<void> follow(std::unique_ptr<cles::service> car, cles::service& 
     show(co_await feed.async_next());
 
     for (double speed = 12.0; speed <= 111.0; ++speed) {
-        car->update("speed", speed); // far more at once than the two that are kept for this binder
+        car->update("speed", speed); // far more than the two that are queued for this subscriber
     }
     std::uint64_t total = 0; // how many are read depends on the speed; missed ones are reported, the newest arrives
     for (double newest = 0.0; newest < 111.0;) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Modules of one program talk as nodes do, without sockets: a service to itself, to others on its context by their
-// names, and to others in the process by an inproc URL.
+// Modules of one program communicate as nodes do, without sockets: a service with itself, with others on its context by
+// their names, and with others in the process by an inproc URL.
 #include <cles/service.hpp>
 
 #include <boost/asio/io_context.hpp>

@@ -6,7 +6,7 @@
 
 #include <iostream>
 
-// Everybody may look; only programs on this host, which come in by the Unix socket or in process, may steer.
+// Everyone may read; only programs on this host, which connect by Unix socket or in process, may steer.
 bool may(const cles::access& asked) {
     return asked.verb == cles::verb::pull || asked.verb == cles::verb::bind || asked.peer.transport != "tcp";
 }

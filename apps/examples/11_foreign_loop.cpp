@@ -22,7 +22,7 @@ int main() {
     auto next = std::chrono::steady_clock::now();
     while (seen < 0 && round < 1000) {
         ++round;   // the host's own work
-        io.poll(); // whatever is ready, and back at once
+        io.poll(); // runs what is ready, and returns at once
         next += 1ms;
         std::this_thread::sleep_until(next); // the rest of the cycle
     }

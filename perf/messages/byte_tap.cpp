@@ -20,7 +20,7 @@ bool pass(int from, int to, std::atomic<std::uint64_t>& count, buffer& space) {
     if (got <= 0) {
         return false;
     }
-    // Counted first, so that whoever has received the answer finds it counted.
+    // Counted first, so that the count is complete when the answer arrives.
     count += static_cast<std::uint64_t>(got);
     send_all(to, std::span{space}.first(static_cast<std::size_t>(got)));
     return true;

@@ -62,7 +62,7 @@ void datagram_tap::run(int stop) {
             socklen_t length = sizeof client;
             const auto got = ::recvfrom(client_.get(), space.data(), space.size(), 0, generic(client), &length);
             if (got > 0) {
-                // Counted first, so that whoever has received the answer finds it counted.
+                // Counted first, so that the count is complete when the answer arrives.
                 to_server_ += static_cast<std::uint64_t>(got);
                 ::send(server_.get(), space.data(), static_cast<std::size_t>(got), 0);
             }

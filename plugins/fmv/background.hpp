@@ -7,8 +7,9 @@
 
 namespace fmv {
 
-/// What stands still. At first the median of some frames that lie apart: of what moves, no place sees more than a few
-/// of them. Then it follows slowly, so that light may change, and more slowly still where something has been detected.
+/// The background. At first it is the median of some frames that are not adjacent, because a moving object covers each
+/// pixel in only a few of them. Then it adapts slowly to changes of light, and more slowly where something has been
+/// detected.
 class background {
   public:
     static constexpr int samples = 9; ///< of the median

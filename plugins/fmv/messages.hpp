@@ -15,9 +15,8 @@ struct frame_message {
     std::uint64_t frame = 0; ///< counted from the stream's first; some may be missing
     int width = 0;           ///< pixels
     int height = 0;
-    std::uint64_t deadline_ms =
-        0;                ///< as the request has it: what is left of it when work begins tells how long it waited
-    std::string pixels{}; ///< a byte each, from black to white, row by row, in base64
+    std::uint64_t deadline_ms = 0; ///< as in the request: the waiting time is this minus the time left when work begins
+    std::string pixels{};          ///< a byte each, from black to white, row by row, in base64
 };
 BOOST_DESCRIBE_STRUCT(frame_message, (), (stream, frame, width, height, deadline_ms, pixels))
 
@@ -38,7 +37,7 @@ BOOST_DESCRIBE_STRUCT(track, (), (id, x, y, vx, vy, age, missed))
 struct found {
     std::string node{};
     std::uint64_t frame = 0;
-    bool ready = false; ///< it knows what stands still; until then nothing is found
+    bool ready = false; ///< the background is known; until then nothing is found
     std::vector<track> tracks{};
     double queue_ms = 0; ///< from the frame's arrival until work began
     double run_ms = 0;

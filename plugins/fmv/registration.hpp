@@ -18,11 +18,11 @@ struct shift {
 constexpr int most_shift = 4;
 
 /// The shift for which picture and reference differ the least, by the sum of absolute differences over a grid of
-/// pixels: what moves in the picture is small beside all that stands still.
+/// pixels. Moving objects have little effect, because they are small compared with the background.
 shift register_with(const grey& reference, const grey& picture, extent size);
 
-/// The picture as the camera would have taken it from where the reference was. What it does not show is taken from the
-/// reference, so that nothing has changed there.
+/// The picture as the camera would have taken it from where the reference was. Pixels outside the picture are taken
+/// from the reference, so that they show no change.
 void align(const grey& reference, grey& picture, extent size, shift by);
 
 } // namespace fmv

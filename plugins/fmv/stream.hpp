@@ -8,16 +8,17 @@
 
 namespace fmv {
 
-/// One camera's video, frame by frame: aligned with the first, compared with what stands still, and followed over time.
+/// One camera's video, frame by frame: aligned with the first frame and compared with the background; targets are
+/// tracked over time.
 class stream {
   public:
     explicit stream(extent size) : size_(size), still_(size), detector_(size) {}
 
     [[nodiscard]] extent size() const noexcept { return size_; }
-    /// The next frame, so many after the last that came. What is found is told where the first frame would have shown
-    /// it.
+    /// The next frame, `frames` after the last one received. Targets are reported in the coordinates of the first
+    /// frame.
     void take(grey frame, int frames = 1);
-    /// Whether it knows what stands still, before which nothing is detected.
+    /// Whether the background is known; until then nothing is detected.
     [[nodiscard]] bool ready() const noexcept { return still_.known(); }
     [[nodiscard]] std::vector<tracked> targets() const { return tracker_.confirmed(); }
 

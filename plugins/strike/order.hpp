@@ -18,7 +18,7 @@ struct order {
     double vx = 0; ///< pixels per second
     double vy = 0;
     double utc = 0;
-    std::uint64_t deadline_ms = 0; ///< as the request has it: what is left of it tells how long the order waited
+    std::uint64_t deadline_ms = 0; ///< as in the request: the waiting time is this minus the time left
     std::optional<bool> drill{};   ///< all but the release
 };
 BOOST_DESCRIBE_STRUCT(order, (), (id, x, y, vx, vy, utc, deadline_ms, drill))

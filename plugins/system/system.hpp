@@ -20,9 +20,8 @@ struct settings {
 };
 BOOST_DESCRIBE_STRUCT(settings, (), (interval_ms, processes))
 
-/// What the machine knows of itself, by PULL and BIND, for all who are on it (paper, section 3.5): `utc`, `load`,
-/// `memory`, `disk`, `network` and `processes`, from the kernel's own files. What their members mean stands with the
-/// structures of that name.
+/// Information about the machine, by PULL and BIND, for all applications (paper, section 3.5): `utc`, `load`, `memory`,
+/// `disk`, `network` and `processes`, from the kernel's own files. The structures of those names document the members.
 void register_tasks(cles::registrar& to, const settings& wanted);
 
 } // namespace sysinfo

@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-// What the configuration may say under `config`; all of it may be left out.
+// The settings under `config` in the configuration; all are optional.
 struct settings {
     std::optional<std::string> greeting;
 };
@@ -17,7 +17,7 @@ struct leg {
 };
 BOOST_DESCRIBE_STRUCT(leg, (), (km, kmh))
 
-// Called once. Its handlers run on several threads at once.
+// Called once. The handlers run on several threads at the same time.
 void register_tasks(cles::registrar& to, const settings& wanted) {
     // PULL node:hello/you
     to.on_pull("hello",
@@ -36,7 +36,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                    },
                    {.description = "Time for a leg", .idempotent = true});
 
-    // PUSH node:notice {"text":"..."}, which all who are bound to `notice` hear.
+    // PUSH node:notice {"text":"..."}, which is published to all subscribers of `notice`.
     to.on_bind("notice", {.description = "What was pushed last"});
     to.on_push("notice", [updates = to.make_publisher()](const cles::request& asked) {
         updates.update("notice", cles::json_text{std::string{asked.body()}});

@@ -127,7 +127,7 @@ asio::awaitable<void> errors(cles::service& car) {
 }
 
 asio::awaitable<void> feeds(cles::service& car, position here) {
-    car.update("position", here); // to all that are bound; never blocks
+    car.update("position", here); // to all subscribers; never blocks
 
     auto feed = co_await car.async_bind<position>("car0:position", cles::bind_options{}.every(100ms));
     for (;;) {

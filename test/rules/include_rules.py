@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Checks who may see whom in the source tree, and a few other rules that no compiler checks.
+"""Checks which folders may include which others, and a few other rules that no compiler checks.
 
     include_rules.py [ROOT]        checks the tree; prints each violation; exits 1 where there is one
     include_rules.py --self-test   plants violations in a scratch tree and expects to find every one of them
 
-The rooms and what they may see are the tables below: a new folder under libcles/src needs its line in ROOMS.
+The tables below list the layers and what each may include: a new folder under libcles/src needs a line in ROOMS.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from pathlib import Path
 
 SOURCE_SUFFIXES = {".cpp", ".hpp", ".h", ".ipp"}
 
-# Where files live: the longest prefix that fits names the room. "src" is what stands in libcles/src itself, the bodies
-# of the public face.
+# Which layer a file belongs to: that of the longest matching prefix. "src" are the files directly in libcles/src, which
+# implement public headers.
 ROOMS = {
     "libcles/include/cles/": "public",
     "libcles/src/json/": "json",
@@ -38,8 +38,8 @@ ROOMS = {
 }
 LIBRARY = {"public", "json", "protocol", "port", "node", "transport", "asio", "api", "src"}
 
-# room -> the rooms whose files it may include besides its own. "plain" are the public headers that reach nothing of
-# NOT_SANS_IO, directly or through others; "face" are all public headers but FACADE_HEADERS.
+# layer -> the layers whose files it may include besides its own. "plain" are the public headers that include nothing of
+# NOT_SANS_IO, directly or indirectly; "face" are all public headers except FACADE_HEADERS.
 MAY_SEE = {
     "public": set(),
     "json": {"plain"},
@@ -57,21 +57,21 @@ MAY_SEE = {
     "test": LIBRARY | {"runtime", "plugins"},
 }
 
-# The part of the public face that a transport knows, even where it is not plain.
+# The public headers that a transport may include although they are not plain.
 LINK_HEADERS = {"cles/link.hpp"}
-# What stands above everything inside: only the bodies of the public face and the shell look up to it.
+# The top of the public API: in the library, only the layers that may include all of "public" may include these.
 FACADE_HEADERS = {f"cles/{name}.hpp" for name in ("service", "feed", "plugin", "run")}
 
-# file -> rooms it may see beyond those of its own room, each with a reason:
+# file -> layers that it may include beyond those of its own layer, each with a reason:
 #     "perf/grammar_speed.cpp": {"protocol"},  # measures the parser without a link
 EXCEPTIONS: dict[str, set[str]] = {
-    "test/plugins/three_homes_test.cpp": {"apps"},  # an example's tasks, in one more home
-    "test/effort/impaired_line_test.cpp": {"perf"},  # what the measurements' bad link decides
+    "test/plugins/three_homes_test.cpp": {"apps"},  # the tasks of an example, in service, test and plugin
+    "test/effort/impaired_line_test.cpp": {"perf"},  # the decisions of the measurements' impaired link
     "perf/routing/choice_cost.cpp": {"node", "protocol"},  # measures a choice without a link
     "perf/jobs/job_cost.cpp": {"runtime"},  # measures a daemon in a process of its own
 }
 
-# Headers that move bytes, wait, or start threads: nothing for rooms where time is a parameter.
+# Headers for I/O, waiting or threads: forbidden in sans-I/O layers, where time is a parameter.
 NOT_SANS_IO = re.compile(
     r"""boost/(asio|beast|dll|process|thread|interprocess)(\.hpp$|/)
       | (thread|mutex|shared_mutex|condition_variable|future|semaphore|latch|barrier|stop_token)$
@@ -87,7 +87,7 @@ WITHOUT_IO = {
     "libcles/src/node/base/ip_network.cpp": {"arpa/inet.h"},  # inet_pton and inet_ntop read and write text
 }
 
-# What sans-I/O code must not say, for time and chance are given to it.
+# What sans-I/O code must not use, because it is passed the time and its random numbers.
 NOT_SANS_IO_WORDS = [
     (re.compile(r"\b\w*_?clock\s*::\s*now\b"), "reads a clock: take the time as a parameter"),
     (re.compile(r"\b(clock_gettime|gettimeofday|timespec_get)\b"), "reads a clock: take the time as a parameter"),
@@ -107,7 +107,7 @@ RESERVED_HEADERS = [
     (re.compile(r"spdlog/"), re.compile(r"(?!libcles/)"), "the library logs through its sink; spdlog is for programs"),
 ]
 
-# Costs every user of the header seconds.
+# These add seconds to the compile time of every user of the header.
 HEAVY_IN_PUBLIC = re.compile(r"boost/asio\.hpp$|boost/asio/(use_future|experimental/awaitable_operators)\.hpp$|boost/json\.hpp$")
 
 INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*([<"])([^>"\n]+)[>"]', re.MULTILINE)
@@ -316,7 +316,7 @@ class Tree:
 
 # --- The self-test -------------------------------------------------------------------------------------------------------
 
-# A tree that keeps the rules, and does what looks forbidden but is not.
+# A tree that follows the rules, including code that only looks forbidden.
 GOOD = {
     "libcles/include/cles/error.hpp": "#pragma once\n#include <string>\n",
     "libcles/include/cles/link.hpp": "#pragma once\n#include <cles/error.hpp>\n#include <boost/asio/awaitable.hpp>\n",
@@ -341,7 +341,7 @@ GOOD = {
     "test/support/clock.hpp": "#pragma once\n",
 }
 
-# One violation each: the file, what it says, and a piece of the complaint.
+# One violation each: the file, its text, and a part of the expected message.
 PLANTED = [
     ("libcles/src/protocol/a.cpp", '#include "node/session.hpp"\n', "protocol must not see node"),
     ("libcles/src/protocol/a.cpp", '#include "../node/session.hpp"\n', "protocol must not see node"),

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Checks what every file of the project has to keep to: licence line, white space, words, links, the names of suites.
+"""Checks rules for every file of the project: licence line, white space, words, links, the names of suites.
 
     text_rules.py [ROOT]        checks the tree; prints each violation; exits 1 where there is one
     text_rules.py --self-test   plants violations in a scratch tree and expects to find every one of them
@@ -17,7 +17,7 @@ SPDX = "SPDX-License-Identifier: BSL-1.0"
 SLASH_SUFFIXES = {".cpp", ".hpp", ".h", ".ipp"}
 HASH_SUFFIXES = {".py", ".sh", ".cmake", ".yaml", ".yml", ".toml", ".service"}
 HASH_NAMES = {"CMakeLists.txt", ".clang-format", ".clang-tidy"}
-# No comment can stand there, or the file is not ours to mark.
+# Files that cannot contain a comment, or are not ours to mark.
 UNMARKED = {"LICENSE", ".gitignore", ".gitattributes"}
 # Inputs of tests, which are as they are.
 DATA = "test/fuzz/corpus/"

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Checks the ways that CONTRIBUTING.md draws through the sources, and the paths that it names, against the tree.
+"""Checks the code paths that CONTRIBUTING.md lists, and the file names in it, against the tree.
 
     way_rules.py [ROOT]        checks the page; prints each violation; exits 1 where there is one
     way_rules.py --self-test   plants violations in a scratch tree and expects to find every one of them
@@ -31,7 +31,7 @@ sys.dont_write_bytecode = True  # the next line would leave it among the sources
 from include_rules import includes_of, without_comments_and_strings, write_tree  # noqa: E402
 
 PAGE = "CONTRIBUTING.md"
-# Each has to be drawn. How many files and types it may have at most, where there is a limit.
+# The paths that the page must list, and the maximum number of files and types where there is one.
 WANTED = {
     "PULL, served": 12,
     "PULL, asked": None,

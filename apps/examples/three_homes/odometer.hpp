@@ -15,7 +15,7 @@ struct trip {
 BOOST_DESCRIBE_STRUCT(trip, (), (km))
 
 inline void register_odometer(cles::registrar& to) {
-    // In a plugin several threads call: what handlers share is guarded.
+    // In a plugin, several threads call the handlers, so shared data needs a mutex.
     struct odometer {
         std::mutex mutex;
         double km = 0;

@@ -7,8 +7,8 @@
 namespace cles {
 
 /// The time since the machine was booted (`CLOCK_BOOTTIME`). Like `std::chrono::steady_clock`, it does not change when
-/// the system time is set; unlike that clock, it continues while the machine is suspended. A deadline that passes while
-/// a laptop's lid is closed has passed when it is opened.
+/// the system time is set; unlike that clock, it continues while the machine is suspended. A deadline that passes
+/// during the suspension has expired when the machine resumes.
 ///
 /// Its points in time have their own type. They do not convert to those of `std::chrono::steady_clock`, from which they
 /// differ once the machine has been suspended.

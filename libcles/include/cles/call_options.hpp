@@ -65,16 +65,16 @@ class bind_options : public call_options {
         every_ = interval;
         return *this;
     }
-    /// How many updates the publisher queues while this binder is slow: 1 to 65536; 0: the protocol's default, 64.
+    /// How many updates the publisher queues while this subscriber is slow: 1 to 65536; 0: the protocol's default, 64.
     /// Larger values are refused.
     bind_options& keep(std::uint32_t updates) {
         keep_ = updates;
         return *this;
     }
     /// Binds through the multicast group instead of a link, so that the publisher sends one datagram for all such
-    /// binders; `all:` does so by default if the service has no routing. `every` and `keep` then have no effect, and
-    /// there is no reply: the feed begins with the publisher's last value as an update, and does not report if there is
-    /// no publisher.
+    /// subscribers; `all:` does so by default if the service has no routing. `every` and `keep` then have no effect,
+    /// and there is no reply: the feed begins with the publisher's last value as an update, and a missing publisher is
+    /// not reported.
     bind_options& multicast(bool wanted = true) {
         multicast_ = wanted;
         return *this;

@@ -123,7 +123,7 @@ template <class T>
 std::string to_json(const T& value) {
     std::string out;
     if constexpr (detail::described_struct<T>) {
-        constexpr std::size_t usual = 200; // room for most at once
+        constexpr std::size_t usual = 200; // enough for most values without reallocation
         out.reserve(usual);
     }
     json_writer writer{out};

@@ -195,7 +195,7 @@ class bind_operation final : public binding {
 
 } // namespace detail
 
-/// A binding from the binder's side: it receives the updates of one noun, and changes of the binding's state.
+/// A binding from the subscriber's side: it receives the updates of one noun, and changes of the binding's state.
 ///
 /// Events arrive in order. At most `limits::feed` updates wait to be fetched; if more arrive, the oldest are dropped
 /// and reported as a gap. When the publisher is lost, the feed reports it once and binds again by itself, with a

@@ -54,7 +54,7 @@ class json_reader {
     [[nodiscard]] bool ok() const noexcept { return message_.empty(); }
     /// Fails with this message at the current position.
     bool fail(std::string_view message);
-    /// Fails as another reader did that read a part of this reader's text.
+    /// Fails with the error of another reader, which read a part of this reader's text.
     bool fail_as(const json_reader& part);
     /// Called while unwinding from a failure: adds the member or element in which it happened to the path.
     void inside_member(std::string_view name);

@@ -12,14 +12,14 @@ namespace cles {
 /// suspended.
 using time_point = boottime_clock::time_point;
 
-/// Limits on the resources that a service uses, whatever its peers do (docs/protocol.md, "Limits"). When a count is
+/// Limits on the resources that a service's peers can make it use (docs/protocol.md, "Limits"). When a count is
 /// exceeded, requests fail with `busy`; when a size is, with `too_large`. Each comment ends with the range. A service
 /// whose limits are out of range is refused with `invalid_option` (see <cles/limit_ranges.hpp>).
 struct limits {
     std::size_t line = 1U << 20U; ///< bytes of a line or reply on a stream; 256 to 64 MiB
     std::size_t depth = 32;       ///< nested brackets of JSON, the outermost being 1; 1 to 64
     std::size_t links = 1024;     ///< links opened by peers; 1 to 1,000,000, like all counts below
-    /// Of these, how many one address keeps when others need room; 0: three quarters of them.
+    /// Of these, how many one address keeps when other addresses need links; 0: three quarters of them.
     std::size_t links_per_address = 0;
     std::size_t in_flight = 4096; ///< requests per link that are queued or running
     std::size_t bindings = 1024;  ///< bindings per link
@@ -38,8 +38,8 @@ struct limits {
     std::size_t publishers = 1024;   ///< publishers of one noun that a feed of `all:` distinguishes
     std::size_t feed = 1024;         ///< updates that a feed queues until they are fetched
     /// Bytes that the node holds for all its peers: queued and running requests, results and requests that a peer has
-    /// not read yet, last values, queued updates. Beyond it, new work is `busy`, and no link holds more than is left
-    /// for others. 64 KiB to 1 TiB.
+    /// not read yet, last values, queued updates. Beyond it, new work is `busy`. No link holds more than remains free
+    /// for the others. 64 KiB to 1 TiB.
     std::size_t memory = 256U << 20U;
     /// A link is closed if its peer reads nothing for this long; 1 ms to a day.
     std::chrono::milliseconds stall{30'000};

@@ -25,8 +25,8 @@ struct log_entry {
 };
 
 /// The log of a service. Called on the service's executor; it must neither throw nor block. The library links no
-/// logging framework, so a program passes a function to its own. If the function does not need the peer, its second
-/// parameter may be a `std::string_view`.
+/// logging framework, so a program passes a function that writes to its own framework. If the function does not need
+/// the peer, its second parameter may be a `std::string_view`.
 using log_sink = std::function<void(log_level, const log_entry&)>;
 
 } // namespace cles

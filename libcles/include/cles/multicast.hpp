@@ -17,7 +17,7 @@ struct multicast_options {
     /// that `interfaces_of` returns when the service starts. Empty: no multicast.
     std::string interface {};
     std::string group = "239.255.25.37"; ///< an address from 224.0.0.0 to 239.255.255.255
-    std::uint16_t port = 25370;          ///< not 0, because other nodes could not know it
+    std::uint16_t port = 25370;          ///< not 0, because all nodes must use the same port
     /// If false, failing to join the group is a warning in the log, and the service works without multicast. If only
     /// some of several interfaces can join, those are used.
     bool required = true;

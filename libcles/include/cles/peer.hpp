@@ -22,7 +22,7 @@ struct node_load {
 
 enum class peer_state : std::uint8_t {
     live,
-    suspect, ///< not heard from for 3.5 of its announcement intervals; forgotten after 15
+    suspect, ///< nothing received for 3.5 of its announcement intervals; forgotten after 15
     clash,   ///< a second live node with a name that is already used, possibly by this node: receives no requests
 };
 
@@ -35,7 +35,7 @@ struct peer {
     std::string node;
     std::vector<std::string> endpoints; ///< URLs usable from here; requests are sent to the first
     std::string epoch;                  ///< identifies its current run
-    std::chrono::milliseconds age{0};   ///< since it was last heard from
+    std::chrono::milliseconds age{0};   ///< since it was last received
     peer_state state = peer_state::live;
     node_load load;
     std::string tasks; ///< a digest of its tasks, which changes when they do

@@ -24,15 +24,15 @@ class update_sink {
 /// Publishes updates from any thread. Copies may be kept by handlers, threads and jobs. Made by
 /// `registrar::make_publisher`, so the same code works in an application and in a plugin.
 ///
-/// `update` passes the value to the service, which sends it soon on its executor. It does not block, and errors are not
-/// returned: updates after the service's end are dropped, and so are the oldest if updates come faster than they can be
-/// sent, and those of a noun that the service refuses; the latter two are logged. On the service's own executor,
+/// `update` passes the value to the service, which sends it soon on its executor. It does not block and reports no
+/// errors. Updates are dropped if the service has ended, if it refuses the noun, and, oldest first, if they are
+/// published faster than they can be sent; the last two cases are logged. On the service's own executor,
 /// `service::update` reports errors.
 class publisher {
   public:
     explicit publisher(std::shared_ptr<detail::update_sink> to) noexcept : to_(std::move(to)) {}
 
-    /// Publishes a value to all binders of the task (or of "task/parameter/...").
+    /// Publishes a value to all subscribers of the task (or of "task/parameter/...").
     /// \throws cles::error with `conversion` if it cannot be written as JSON, for example text that is not UTF-8
     template <class T>
     void update(std::string_view noun, const T& value) const {

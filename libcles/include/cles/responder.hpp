@@ -82,8 +82,8 @@ class responder {
     /// Replies `busy`: the work was not started. `retry` tells the requester when a retry makes sense.
     void refuse(std::string_view message, std::chrono::milliseconds retry) const { call_->refuse(message, retry); }
 
-    /// Reports progress from 0 to 1. False if nobody receives it: none was requested, or the requester is gone. A lower
-    /// fraction than in an earlier report is replaced by that one.
+    /// Reports progress from 0 to 1. False if nobody receives it: none was requested, or the requester is gone. A
+    /// fraction below that of an earlier report is raised to it.
     bool progress(double fraction) const { return call_->progress(fraction, "{}"); }
     template <class T>
     bool progress(double fraction, const T& details) const {

@@ -12,9 +12,9 @@ namespace cles {
 
 struct run_options {
     /// How long to poll for work before sleeping; zero: not at all. Waking a core often takes longer than the rest of
-    /// an exchange; polling avoids that, at the cost of processor time. It is suspended, except for rare attempts,
-    /// while it finds nothing or keeps the peer from the core that both run on. 50 µs is a good value for request and
-    /// reply on one host. More than a day counts as a day; negative values are refused.
+    /// an exchange; polling avoids that, at the cost of processor time. Polling is suspended, except for rare attempts,
+    /// while it finds no work, or while the peer needs the same core. 50 µs is a good value for request and reply on
+    /// one host. More than a day counts as a day; negative values are refused.
     std::chrono::microseconds busy_poll{0};
     /// The thread's priority under SCHED_FIFO while it runs the context, 1 to 99; 0: unchanged. When it has work, such
     /// a thread preempts all others of the system except those with a higher priority (sched(7)).

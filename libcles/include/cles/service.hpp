@@ -208,18 +208,18 @@ class service : public registrar {
             },
             token, limit);
     }
-    /// Ends all listeners, links and feeds. Operations fail with `stopped`, and running handlers are told to stop.
+    /// Ends all listeners, links and feeds. Operations fail with `stopped`, and running handlers are notified to stop.
     /// Replies and updates that are already queued are sent first, as far as the peer accepts them at once. Idempotent.
     void stop();
 
     void add(registration task) override;
     [[nodiscard]] publisher make_publisher() override;
 
-    /// Publishes a value to all binders of the task (or of "task/parameter/..."), and keeps it as the last value. Also
-    /// opens the task for BIND. Never blocks: updates that a slow binder does not accept in time are dropped for that
-    /// binder, which is notified. A single update, at least 100 us after the previous one, is written in this call.
-    /// Updates in quick succession are written together, soon after. What a handler publishes before it first suspends
-    /// is written after a reply that it gives by then.
+    /// Publishes a value to all subscribers of the task (or of "task/parameter/..."), and keeps it as the last value.
+    /// Also opens the task for BIND. Never blocks: updates that a slow subscriber does not accept in time are dropped
+    /// for that subscriber, which is notified. A single update, at least 100 us after the previous one, is written in
+    /// this call. Updates in quick succession are written together, soon after. If a handler replies before it first
+    /// suspends, its reply is written before the updates that it has published.
     /// \throws cles::error: `invalid_name`, `too_large`, `busy` (the maximum number of nouns is bound, or no memory is
     /// left), `failed` (the value begins like a failure, or is being written while another value of the noun is),
     /// `conversion` (text that is not UTF-8)
@@ -228,15 +228,16 @@ class service : public registrar {
         publish(noun, [&](json_writer& w) { write_json(w, value); });
     }
 
-    /// Forgets the last value of a noun; later binders receive `{}`. Existing binders stay bound, and still receive
-    /// what was published before. False if there is no value.
+    /// Forgets the last value of a noun; later subscribers receive `{}`. Existing subscribers stay bound, and still
+    /// receive what was published before. False if there is no value.
     ///
-    /// Tasks whose nouns come and go ("session/17") need not call this: beyond `limits::nouns`, or the memory for
-    /// values, nouns without binders are retired automatically, least recently used first.
+    /// Tasks with many short-lived nouns ("session/17") need not call this: beyond `limits::nouns`, or the memory for
+    /// values, nouns without subscribers are retired automatically, least recently used first.
     bool retire(std::string_view noun);
 
-    /// Publishes when every binder's queue has room, so that nothing is dropped: `void(error_code)`. It completes when
-    /// the update is in all queues, in the order of the calls. If it is cancelled earlier, the update is not published.
+    /// Publishes when every subscriber's queue has space, so that nothing is dropped: `void(error_code)`. It completes
+    /// when the update is in all queues, in the order of the calls. If it is cancelled earlier, the update is not
+    /// published.
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(

@@ -20,7 +20,7 @@
 
 namespace cles::runtime {
 
-/// `clesd`: a node that runs plugins on its workers until it is told to stop.
+/// `clesd`: a node that runs plugins on its workers until it is stopped by a signal or a name conflict.
 ///
 /// To be used on the thread that runs the context. After SIGTERM or SIGINT it admits no more jobs, lets the running
 /// ones end within `config::drain`, and stops the context; a second signal stops it at once. It also stops if another

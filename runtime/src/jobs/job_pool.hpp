@@ -184,9 +184,10 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
 /// Runs the jobs of a service on workers.
 ///
 /// A job is admitted to a bounded queue, or answered `busy` with `retry_ms`, an estimate of how long the queue will
-/// take. Requesters (links) take turns, so one with many jobs does not delay the others. A job that is withdrawn, whose
-/// link is lost or whose time is over is removed from the queue; if it runs already, it is told to stop. A job that
-/// does not stop then is stuck: it is reported, and its worker is replaced while there are replacements.
+/// take. Requesters (links) take turns, so one with many jobs does not delay the others. A job that is cancelled, whose
+/// link is lost or whose deadline has passed is removed from the queue; if it is already running, it is notified to
+/// stop. A job that does not stop then is stuck: it is reported, and its worker is replaced while there are
+/// replacements.
 ///
 /// All functions have to be called on the service's executor, and the pool has to be destroyed before its service. At
 /// its end, jobs without an answer are answered `unavailable`. Threads that are still in a job or an `on_stop` callback
