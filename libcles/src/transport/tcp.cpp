@@ -88,6 +88,7 @@ class tcp_transport final : public link_transport {
             std::move(done));
         const auto connect = [dialler, port = where.port](const std::vector<asio::ip::address>& found) {
             std::vector<stream_address> endpoints;
+            endpoints.reserve(found.size());
             for (const auto& address : found) {
                 endpoints.emplace_back(tcp::endpoint{address, port});
             }

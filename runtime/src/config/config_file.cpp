@@ -390,11 +390,16 @@ std::string to_yaml(const config& setup) {
         const std::string key{each.key};
         const auto text = each.text(setup);
         const auto origin = setup.origins.find(key);
+        out.append(key).append(":");
         if (text.ends_with('\n')) {
-            out += key + ":" + text;
-        } else {
-            out += key + ": " + text + (origin == setup.origins.end() ? "" : "  # " + origin->second) + "\n";
+            out.append(text);
+            continue;
         }
+        out.append(" ").append(text);
+        if (origin != setup.origins.end()) {
+            out.append("  # ").append(origin->second);
+        }
+        out.push_back('\n');
     }
     return out;
 }
