@@ -35,7 +35,7 @@ class link_follower final : public follower, private core::feed_host {
                 }
             }));
         if (at().fault() == planted::rebind_hurried) {
-            hurry();
+            cap_pauses();
         }
     }
     void close() override { machine_.close(errc::cancelled); }
@@ -45,12 +45,12 @@ class link_follower final : public follower, private core::feed_host {
         return std::static_pointer_cast<link_follower>(shared_from_this());
     }
     core::feed_mailbox& mail() override { return machine_.mail(); }
-    // What a planted fault does: no pause lasts longer than this.
-    void hurry() {
+    // What a planted fault does: it ends each pause after 20 ms at most.
+    void cap_pauses() {
         at().later(milliseconds{20}, [weak = weak_self()] {
             if (const auto self = weak.lock()) {
                 self->machine_.expedite(self->at().now());
-                self->hurry();
+                self->cap_pauses();
             }
         });
     }

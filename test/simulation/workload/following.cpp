@@ -162,7 +162,7 @@ class following final : public part {
             f->at().run([closed = f] { closed->close(); });
         }
         followers_.clear();
-        // Whoever left without a word is noticed when something is written to him.
+        // A peer that is gone without notice is detected when something is written to it.
         for (unsigned host = 0; host < world_.hosts(); ++host) {
             world_.node(host)->later(std::chrono::seconds{1}, [this, host] {
                 for (unsigned noun = 0; noun < own_nouns; ++noun) {

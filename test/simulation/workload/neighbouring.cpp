@@ -232,12 +232,12 @@ class neighbouring final : public part {
 
     // -- judging ---------------------------------------------------------------------------------------------------
 
-    // Silence counts from the last word, or from when whoever listens was back.
+    // Silence counts from the last announcement, or from when the receiver was back.
     [[nodiscard]] static time_point last_chance(const node_run& n, const heard_run& r) {
         return std::max(r.at, n.back_since());
     }
 
-    // Whether that run has been there for long enough, and within reach, to answer whoever asked it whether it is.
+    // Whether that run has existed and been reachable for long enough to answer a probe.
     [[nodiscard]] bool could_answer(node_run& at, std::string_view node, std::uint32_t epoch) {
         constexpr seconds enough{2};
         const auto listens = [&](node_run& n) {

@@ -97,7 +97,7 @@ class talker final : public place, public link_events {
 
     void on_batch() override {}
     void on_end() override {
-        // Whoever was asked without ids answers all before it ends.
+        // A node answers all requests without ids before it ends the link.
         if (!expected_.empty() && !excused_ && !link_->was_cut()) {
             complain(rule::reply_order,
                      std::to_string(expected_.size()) + " requests were not answered before the end");
