@@ -5,7 +5,7 @@
     include_rules.py [ROOT]        checks the tree; prints each violation; exits 1 where there is one
     include_rules.py --self-test   plants violations in a scratch tree and expects to find every one of them
 
-The tables below list the layers and what each may include: a new folder under libcles/src needs a line in ROOMS.
+The tables below list the layers and what each may include: a new folder under libcles/src needs a line in LAYERS.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ SOURCE_SUFFIXES = {".cpp", ".hpp", ".h", ".ipp"}
 
 # Which layer a file belongs to: that of the longest matching prefix. "src" are the files directly in libcles/src, which
 # implement public headers.
-ROOMS = {
+LAYERS = {
     "libcles/include/cles/": "public",
     "libcles/src/json/": "json",
     "libcles/src/protocol/": "protocol",
@@ -39,13 +39,13 @@ ROOMS = {
 LIBRARY = {"public", "json", "protocol", "port", "node", "transport", "asio", "api", "src"}
 
 # layer -> the layers whose files it may include besides its own. "plain" are the public headers that include nothing of
-# NOT_SANS_IO, directly or indirectly; "face" are all public headers except FACADE_HEADERS.
-MAY_SEE = {
+# NOT_SANS_IO, directly or indirectly; "below_facade" are all public headers except FACADE_HEADERS.
+MAY_INCLUDE = {
     "public": set(),
     "json": {"plain"},
     "protocol": {"json", "plain"},
     "port": {"protocol", "plain", "link"},
-    "node": {"json", "protocol", "port", "face"},
+    "node": {"json", "protocol", "port", "below_facade"},
     "transport": {"json", "protocol", "port", "plain", "link"},
     "asio": {"public", "protocol", "port", "node", "transport"},
     "api": {"public", "json", "protocol", "port", "node", "transport", "asio"},
@@ -191,8 +191,8 @@ class Tree:
         self.root = root
         self.violations: list[str] = []
         self.texts: dict[str, str] = {}
-        for room in sorted({prefix.split("/")[0] for prefix in ROOMS}):
-            for path in sorted((root / room).rglob("*")):
+        for folder in sorted({prefix.split("/")[0] for prefix in LAYERS}):
+            for path in sorted((root / folder).rglob("*")):
                 if path.suffix in SOURCE_SUFFIXES and path.is_file():
                     self.texts[path.relative_to(root).as_posix()] = path.read_text(encoding="utf-8")
         self.includes = {name: includes_of(text) for name, text in self.texts.items()}
@@ -201,8 +201,8 @@ class Tree:
     def complain(self, name: str, line: int, what: str) -> None:
         self.violations.append(f"{name}:{line}: {what}")
 
-    def room_of(self, name: str) -> str:
-        return ROOMS[max((p for p in ROOMS if name.startswith(p)), key=len)]
+    def layer_of(self, name: str) -> str:
+        return LAYERS[max((p for p in LAYERS if name.startswith(p)), key=len)]
 
     def resolve(self, name: str, quote: str, header: str) -> str | None:
         """The file of this tree that an include means, or nothing where it is another project's."""
@@ -243,53 +243,54 @@ class Tree:
         return reason
 
     def check_include(self, name: str, line: int, quote: str, header: str) -> None:
-        room = self.room_of(name)
+        layer = self.layer_of(name)
 
         for pattern, allowed, what in RESERVED_HEADERS:
             if pattern.match(header) and not allowed.match(name):
                 self.complain(name, line, f"<{header}>: {what}")
-        if room in SANS_IO and NOT_SANS_IO.match(header) and header not in WITHOUT_IO.get(name, set()):
-            self.complain(name, line, f"<{header}>: {room} is sans-I/O")
-        if room == "public" and HEAVY_IN_PUBLIC.match(header):
+        if layer in SANS_IO and NOT_SANS_IO.match(header) and header not in WITHOUT_IO.get(name, set()):
+            self.complain(name, line, f"<{header}>: {layer} is sans-I/O")
+        if layer == "public" and HEAVY_IN_PUBLIC.match(header):
             self.complain(name, line, f"<{header}> costs every user seconds: keep it out of public headers")
 
         target = self.resolve(name, quote, header)
         if target is None:
-            if (quote == '"' and room in LIBRARY) or header.startswith("cles/"):
-                self.complain(name, line, f'"{header}" is no file of this project')
+            if (quote == '"' and layer in LIBRARY) or header.startswith("cles/"):
+                self.complain(name, line, f'"{header}" is not a file of this project')
             return
-        seen = self.room_of(target)
-        allowed = MAY_SEE[room] | EXCEPTIONS.get(name, set()) | {room}
-        if seen in allowed:
+        target_layer = self.layer_of(target)
+        allowed = MAY_INCLUDE[layer] | EXCEPTIONS.get(name, set()) | {layer}
+        if target_layer in allowed:
             return
-        if seen == "public":
+        if target_layer == "public":
             public = target.removeprefix("libcles/include/")
             if "link" in allowed and public in LINK_HEADERS:
                 return
-            if public in FACADE_HEADERS and room in LIBRARY:
-                self.complain(name, line, f"{room} must not see the facade: <{public}>")
+            if public in FACADE_HEADERS and layer in LIBRARY:
+                self.complain(name, line, f"{layer} must not include the facade: <{public}>")
                 return
-            if "face" in allowed:
+            if "below_facade" in allowed:
                 return
             if "plain" in allowed:
                 reason = self.why_not_plain(target)
                 if reason:
-                    self.complain(name, line, f"{room} may see only public headers that are sans-I/O: {reason}")
+                    self.complain(name, line, f"{layer} may include only public headers that are sans-I/O: {reason}")
                 return
-        self.complain(name, line, f"{room} must not see {seen}: {target}")
+        self.complain(name, line, f"{layer} must not include {target_layer}: {target}")
 
     def check_file(self, name: str) -> None:
         text = self.texts[name]
-        room = self.room_of(name)
+        layer = self.layer_of(name)
         for line, quote, header in self.includes[name]:
             self.check_include(name, line, quote, header)
 
         parts = name.split("/")
-        if room == "src" and len(parts) > 3:
-            self.complain(name, 1, f"libcles/src/{parts[2]}/ is no room yet: give it its line in test/rules/include_rules.py")
+        if layer == "src" and len(parts) > 3:
+            self.complain(name, 1, f"libcles/src/{parts[2]}/ is not a known layer: add it to LAYERS in "
+                          "test/rules/include_rules.py")
 
         clean = without_comments_and_strings(text)
-        if room in SANS_IO:
+        if layer in SANS_IO:
             for pattern, what in NOT_SANS_IO_WORDS:
                 for match in pattern.finditer(clean):
                     self.complain(name, clean.count("\n", 0, match.start()) + 1, f"'{match.group(0)}': sans-I/O code {what}")
@@ -343,38 +344,38 @@ GOOD = {
 
 # One violation each: the file, its text, and a part of the expected message.
 PLANTED = [
-    ("libcles/src/protocol/a.cpp", '#include "node/session.hpp"\n', "protocol must not see node"),
-    ("libcles/src/protocol/a.cpp", '#include "../node/session.hpp"\n', "protocol must not see node"),
-    ("libcles/src/protocol/a.cpp", "#include <cles/service.hpp>\n", "must not see the facade"),
+    ("libcles/src/protocol/a.cpp", '#include "node/session.hpp"\n', "protocol must not include node"),
+    ("libcles/src/protocol/a.cpp", '#include "../node/session.hpp"\n', "protocol must not include node"),
+    ("libcles/src/protocol/a.cpp", "#include <cles/service.hpp>\n", "must not include the facade"),
     ("libcles/src/protocol/a.cpp", "#include <cles/registrar.hpp>\n", "registrar.hpp -> cles/link.hpp -> boost/asio/awaitable.hpp"),
     ("libcles/src/protocol/a.cpp", "#include <boost/asio/buffer.hpp>\n", "protocol is sans-I/O"),
-    ("libcles/src/node/a.cpp", "#include <cles/service.hpp>\n", "must not see the facade"),
+    ("libcles/src/node/a.cpp", "#include <cles/service.hpp>\n", "must not include the facade"),
     ("libcles/src/node/a.cpp", "#include <boost/asio/any_io_executor.hpp>\n", "node is sans-I/O"),
     ("libcles/src/node/a.cpp", "#  include <thread>\n", "node is sans-I/O"),
     ("libcles/src/node/a.cpp", "#include <sys/socket.h>\n", "node is sans-I/O"),
-    ("libcles/src/node/a.cpp", '#include "transport/tcp.hpp"\n', "node must not see transport"),
-    ("libcles/src/node/a.cpp", '#include "api/connection.hpp"\n', "node must not see api"),
+    ("libcles/src/node/a.cpp", '#include "transport/tcp.hpp"\n', "node must not include transport"),
+    ("libcles/src/node/a.cpp", '#include "api/connection.hpp"\n', "node must not include api"),
     ("libcles/src/node/a.cpp", "auto t = std::chrono::steady_clock::now();\n", "reads a clock"),
     ("libcles/src/node/a.cpp", "auto t = clock::now();\n", "reads a clock"),
     ("libcles/src/node/a.cpp", "std::random_device entropy;\n", "global chance"),
     ("libcles/src/node/a.cpp", "static std::mt19937 chance;\n", "global generator"),
-    ("libcles/src/transport/a.cpp", '#include "node/session.hpp"\n', "transport must not see node"),
-    ("libcles/src/transport/a.cpp", '#include "api/connection.hpp"\n', "transport must not see api"),
-    ("libcles/src/transport/a.cpp", "#include <cles/service.hpp>\n", "must not see the facade"),
+    ("libcles/src/transport/a.cpp", '#include "node/session.hpp"\n', "transport must not include node"),
+    ("libcles/src/transport/a.cpp", '#include "api/connection.hpp"\n', "transport must not include api"),
+    ("libcles/src/transport/a.cpp", "#include <cles/service.hpp>\n", "must not include the facade"),
     ("libcles/src/api/a.cpp", "#include <spdlog/spdlog.h>\n", "spdlog is for programs"),
-    ("libcles/src/api/a.cpp", '#include "nowhere.hpp"\n', "is no file of this project"),
-    ("libcles/src/util/a.cpp", "int a;\n", "is no room yet"),
-    ("libcles/include/cles/a.hpp", '#include "protocol/line.hpp"\n', "public must not see protocol"),
+    ("libcles/src/api/a.cpp", '#include "nowhere.hpp"\n', "is not a file of this project"),
+    ("libcles/src/util/a.cpp", "int a;\n", "is not a known layer"),
+    ("libcles/include/cles/a.hpp", '#include "protocol/line.hpp"\n', "public must not include protocol"),
     ("libcles/include/cles/a.hpp", "#include <boost/asio/use_future.hpp>\n", "costs every user seconds"),
     ("libcles/include/cles/a.hpp", "#include <boost/asio/experimental/awaitable_operators.hpp>\n", "costs every user seconds"),
     ("libcles/include/cles/a.hpp", "#include <boost/asio.hpp>\n", "costs every user seconds"),
-    ("apps/a.cpp", '#include "../libcles/src/node/session.hpp"\n', "apps must not see node"),
-    ("apps/a.cpp", '#include "protocol/line.hpp"\n', "apps must not see protocol"),
+    ("apps/a.cpp", '#include "../libcles/src/node/session.hpp"\n', "apps must not include node"),
+    ("apps/a.cpp", '#include "protocol/line.hpp"\n', "apps must not include protocol"),
     ("apps/a.cpp", "#include <yaml-cpp/yaml.h>\n", "runtime/config alone"),
-    ("perf/a.cpp", '#include "api/connection.hpp"\n', "perf must not see api"),
-    ("plugins/a.cpp", '#include "runtime/config.hpp"\n#include <cles/nowhere.hpp>\n', "is no file of this project"),
+    ("perf/a.cpp", '#include "api/connection.hpp"\n', "perf must not include api"),
+    ("plugins/a.cpp", '#include "runtime/config.hpp"\n#include <cles/nowhere.hpp>\n', "is not a file of this project"),
     ("runtime/a.cpp", "#include <boost/dll.hpp>\n", "runtime/plugins/plugin_library alone"),
-    ("runtime/a.cpp", '#include "node/session.hpp"\n', "runtime must not see node"),
+    ("runtime/a.cpp", '#include "node/session.hpp"\n', "runtime must not include node"),
     ("apps/a.cpp", "task f() { if (ready && co_await g()) { } }\n", "co_await under"),
     ("apps/a.cpp", "task f() { x = co_await g() || y; }\n", "co_await under"),
     ("apps/a.cpp", "task f() { return use(ready ? (co_await g()).x : 0); }\n", "co_await under"),
