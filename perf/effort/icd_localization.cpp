@@ -172,7 +172,7 @@ void receive(const descriptor& socket, std::span<std::byte> bytes,
 // --- The server ------------------------------------------------------------------------------------------------------
 
 constexpr int most_clients = 1000;
-std::counting_semaphore<most_clients> room{most_clients};
+std::counting_semaphore<most_clients> slots{most_clients};
 
 void serve(const descriptor& client) try {
     tune(client);
@@ -201,10 +201,10 @@ void serve(const descriptor& client) try {
     checked(::getsockname(listener.get(), generic, &length), "getsockname");
     std::cout << "listening on 127.0.0.1:" << ntohs(address.sin_port) << std::endl;
     for (;;) {
-        room.acquire();
+        slots.acquire();
         descriptor client{::accept4(listener.get(), nullptr, nullptr, SOCK_NONBLOCK | SOCK_CLOEXEC)};
         if (client.get() < 0) {
-            room.release();
+            slots.release();
             if (errno != EINTR && errno != ECONNABORTED) {
                 checked(-1, "accept");
             }
@@ -212,7 +212,7 @@ void serve(const descriptor& client) try {
         }
         std::thread([mine = std::move(client)] {
             serve(mine);
-            room.release();
+            slots.release();
         }).detach();
     }
 }

@@ -49,7 +49,7 @@ inline constexpr std::chrono::milliseconds silence{100};
 /// Counts what the code of all binders receives in a pass.
 class arrivals {
   public:
-    /// Latencies are recorded if there is a recorder, which must have room for all.
+    /// Latencies are recorded if there is a recorder, which must have capacity for all.
     explicit arrivals(latency_recorder* record) : record_(record) {
         if (record_ != nullptr) {
             record_->clear();

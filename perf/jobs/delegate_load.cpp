@@ -11,7 +11,7 @@ delegate_load::delegate_load(boost::asio::io_context& io, cles::service& client,
 
 std::chrono::nanoseconds delegate_load::run(std::size_t in_flight, latency_recorder& record) {
     record_ = &record;
-    to_send_ = record.room();
+    to_send_ = record.remaining();
     begun_.assign(in_flight, {});
     const auto began = clock::now();
     for (auto& lane : begun_) {

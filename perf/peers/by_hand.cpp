@@ -42,7 +42,7 @@ class hand_caller final : public caller {
         }
         // Answers come in the order of the requests.
         std::vector<clock::time_point> began(in_flight);
-        auto to_ask = record.room();
+        auto to_ask = record.remaining();
         for (std::size_t i = 0; i < in_flight && to_ask > 0; ++i, --to_ask) {
             began[i] = clock::now();
             send_all(socket_.get(), request_);

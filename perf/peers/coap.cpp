@@ -145,7 +145,7 @@ class coap_caller final : public caller {
         ::coap_session_set_nstart(session_, static_cast<std::uint16_t>(in_flight + 1));
         record_ = &record;
         asked_.assign(in_flight, {});
-        to_ask_ = record.room();
+        to_ask_ = record.remaining();
         for (std::size_t place = 0; place < in_flight && to_ask_ > 0; ++place) {
             send(place);
         }

@@ -148,7 +148,7 @@ class cyclone_caller final : public caller {
         std::unique_lock lock{guard_};
         record_ = &record;
         began_.assign(in_flight, {});
-        to_ask_ = record.room();
+        to_ask_ = record.remaining();
         first_id_ = next_id_;
         for (std::size_t i = 0; i < in_flight && to_ask_ > 0; ++i) {
             next();

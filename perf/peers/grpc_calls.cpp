@@ -137,7 +137,7 @@ class grpc_caller final : public caller {
             return;
         }
         std::vector<flight<Call>> flights(in_flight);
-        auto to_ask = record.room();
+        auto to_ask = record.remaining();
         for (std::size_t i = 0; i < in_flight && to_ask > 0; ++i, --to_ask) {
             start(flights[i]);
         }

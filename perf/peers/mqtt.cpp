@@ -133,7 +133,7 @@ class mqtt_caller final : public caller {
     void ask(std::size_t in_flight, latency_recorder& record) override {
         record_ = &record;
         began_.assign(in_flight, {});
-        to_ask_ = record.room();
+        to_ask_ = record.remaining();
         at_ = 0;
         for (std::size_t i = 0; i < in_flight && to_ask_ > 0; ++i) {
             next(i);

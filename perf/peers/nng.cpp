@@ -127,7 +127,7 @@ class served {
 class run_of_calls {
   public:
     run_of_calls(call what, std::size_t lanes, latency_recorder& record)
-        : what_(what), record_(record), to_ask_(record.room()), lanes_(lanes) {}
+        : what_(what), record_(record), to_ask_(record.remaining()), lanes_(lanes) {}
 
     /// Whether a lane has to send another request; otherwise it has ended.
     bool next() {

@@ -35,7 +35,7 @@ class zeromq_caller final : public caller {
     void ask(std::size_t in_flight, latency_recorder& record) override {
         // Answers of one server arrive in the order of the requests.
         std::vector<clock::time_point> began(in_flight);
-        auto to_ask = record.room();
+        auto to_ask = record.remaining();
         for (std::size_t i = 0; i < in_flight && to_ask > 0; ++i, --to_ask) {
             began[i] = clock::now();
             (void)socket_.send(buffer_of(request_), zmq::send_flags::none);

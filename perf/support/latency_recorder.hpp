@@ -25,7 +25,7 @@ class latency_recorder {
     void clear() noexcept { count_ = 0; }
     [[nodiscard]] bool full() const noexcept { return count_ == nanoseconds_.size(); }
     [[nodiscard]] std::size_t count() const noexcept { return count_; }
-    [[nodiscard]] std::size_t room() const noexcept { return nanoseconds_.size() - count_; }
+    [[nodiscard]] std::size_t remaining() const noexcept { return nanoseconds_.size() - count_; }
     /// \pre it is not full
     void record(std::chrono::nanoseconds latency) noexcept {
         nanoseconds_[count_++] = static_cast<std::uint64_t>(latency.count());

@@ -209,7 +209,7 @@ class Wire(unittest.TestCase):
         self.assertEqual((code, out), (5, ""), err)
         self.assertTrue(err.startswith("cles: unavailable: "), err)
 
-    def test_a_node_that_has_no_room_for_the_link(self):
+    def test_a_node_that_has_reached_its_limit_of_links(self):
         def refuse(_, send):
             send('{"error":"busy","message":"car1 has as many links as it may","retry_ms":1000}')
             return "close"

@@ -291,7 +291,7 @@ BOOST_DATA_TEST_CASE(an_owner_may_close_the_link_from_inside_its_line, every_dat
 }
 
 // Else whoever limits what leaves, and counts it when he flushes, would count it again or not at all.
-BOOST_AUTO_TEST_CASE(what_is_flushed_is_taken_even_where_the_socket_has_no_room) {
+BOOST_AUTO_TEST_CASE(flushed_output_is_consumed_even_if_the_socket_is_not_writable) {
     asio::io_context io;
     std::array<int, 2> ends{}; // of a kind of datagram that waits for its reader
     BOOST_REQUIRE(::socketpair(AF_UNIX, SOCK_DGRAM, 0, ends.data()) == 0);

@@ -56,7 +56,7 @@ struct member final : cles::core::group_listener {
             port->close();
         }
     }
-    void on_room() override {}
+    void on_writable() override {}
 
     std::shared_ptr<cles::transport::group_port> port;
     std::vector<std::string> heard;

@@ -197,7 +197,7 @@ BOOST_DATA_TEST_CASE(all_calls_on_a_closed_link_do_nothing, every_carrier, kind)
     BOOST_TEST(pair.far.lines() == 0U);
 }
 
-// Every callback but `on_room` and `on_overlong`, which have cases of their own below.
+// Every callback but `on_writable` and `on_overlong`, which have cases of their own below.
 BOOST_DATA_TEST_CASE(close_from_inside_a_callback_is_the_end,
                      every_carrier* boost::unit_test::data::make({'l', 'b', 'e', 'x'}), kind, at) {
     link_pair pair{kind};
@@ -250,7 +250,7 @@ BOOST_DATA_TEST_CASE(close_from_inside_on_overlong_is_the_end, every_carrier, ki
     BOOST_TEST(head_is_whole);
 }
 
-BOOST_DATA_TEST_CASE(close_from_inside_on_room_is_the_end, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(close_from_inside_on_writable_is_the_end, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.events->hook = [&](char call) {
@@ -283,7 +283,7 @@ struct prying_owner final : cles::link_events {
     void on_batch() override {}
     void on_end() override {}
     void on_lost(boost::system::error_code) override {}
-    void on_room() override {}
+    void on_writable() override {}
 
     void end() const {
         if (finishing) {

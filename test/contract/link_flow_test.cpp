@@ -80,7 +80,7 @@ BOOST_DATA_TEST_CASE(what_is_urgent_passes_what_waits_and_breaks_no_line, every_
     }
 }
 
-BOOST_DATA_TEST_CASE(on_room_is_not_told_from_inside_flush, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(on_writable_is_not_called_from_inside_flush, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     bool flushing = false;
@@ -97,8 +97,8 @@ BOOST_DATA_TEST_CASE(on_room_is_not_told_from_inside_flush, every_carrier, kind)
     BOOST_TEST(!told_inside);
 }
 
-// Whoever waits for room after a flush that left something behind must be told, however little it was.
-BOOST_DATA_TEST_CASE(room_is_told_after_any_flush_that_left_something, every_carrier, kind) {
+// An owner that waits after a flush that could not write everything is notified, even if only a little was left.
+BOOST_DATA_TEST_CASE(on_writable_follows_any_flush_that_left_something, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });

@@ -60,7 +60,7 @@ BOOST_AUTO_TEST_CASE(all_come_in_their_order_with_where_they_come_from) {
     send(one, "third");
     const std::vector<std::string> expected{"first", "", "third"};
     BOOST_TEST(take_all() == expected, boost::test_tools::per_element());
-    BOOST_TEST(fetches == 1); // fewer than there is room for: no need to look again
+    BOOST_TEST(fetches == 1); // fewer than the capacity: no further call is necessary
     BOOST_TEST((senders == std::vector{one.local_endpoint(), two.local_endpoint(), one.local_endpoint()}));
 }
 

@@ -49,7 +49,7 @@ struct steady_publisher {
     }
 };
 
-BOOST_DATA_TEST_CASE(async_update_waits_for_room_so_that_all_is_delivered, carriers, kind) {
+BOOST_DATA_TEST_CASE(async_update_waits_for_capacity_so_that_all_is_delivered, carriers, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     cles::service tower{io, knowing("tower", car)};

@@ -216,7 +216,7 @@ BOOST_FIXTURE_TEST_CASE(an_update_that_was_withdrawn_is_not_published, fixture) 
     wait();
     BOOST_TEST(code == errc::cancelled);
     BOOST_TEST(behind == 0);
-    slow->reset(); // now there is room
+    slow->reset(); // frees its capacity
     run_until(io, [&] { return behind == 1; });
     scripted_peer late{io, tower.endpoints().front()};
     BOOST_TEST(late.ask("BIND self:full") == "{\"value\":2}");

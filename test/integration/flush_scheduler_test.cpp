@@ -127,7 +127,7 @@ BOOST_AUTO_TEST_CASE(the_service_may_be_stopped_while_an_update_is_written) {
     BOOST_TEST(p.come().find("\"value\":2") == std::string::npos);
 }
 
-BOOST_AUTO_TEST_CASE(whoever_waits_for_room_is_written_in_its_call_too) {
+BOOST_AUTO_TEST_CASE(a_publication_that_waits_for_capacity_is_written_in_its_call_too) {
     publishing p;
     auto done = p.car.async_update("speed", 1, asio::use_future);
     BOOST_TEST(p.come().ends_with("{\"value\":1}\n"));

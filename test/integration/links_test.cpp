@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Which links a node keeps: peers that vanish, that are silent, and that come when there is no room.
+// Which links a node keeps: peers that vanish, that are silent, and that connect when the limit is reached.
 
 #include <cles/service.hpp>
 
@@ -69,7 +69,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_is_gone_before_it_is_accepted_harms_nobody, tcp
     run_until(n.io, [&] { return n.open() == 0; });
 }
 
-BOOST_DATA_TEST_CASE(binders_that_close_make_room_for_others_and_take_their_bindings_along, tcp_and_unix, kind) {
+BOOST_DATA_TEST_CASE(links_that_close_free_capacity_and_end_their_bindings, tcp_and_unix, kind) {
     node n{kind, {.nouns = 50, .probe = 20ms}};
     n.own = n.metric("links_open");
     for (int i = 0; i < 1100; ++i) {
@@ -141,7 +141,7 @@ BOOST_AUTO_TEST_CASE(a_unix_peer_that_hangs_up_is_noticed_without_a_probe) {
         n.io, [&] { return n.jobs.front().stopped(); }, 3s);
 }
 
-BOOST_DATA_TEST_CASE(where_there_is_no_room_the_oldest_half_closed_link_goes, tcp_and_unix, kind) {
+BOOST_DATA_TEST_CASE(at_the_limit_the_oldest_half_closed_link_is_evicted, tcp_and_unix, kind) {
     node n{kind, {.links = 3}};
     std::vector<scripted_peer> peers;
     for (int i = 0; i < 3; ++i) {
@@ -219,7 +219,7 @@ BOOST_AUTO_TEST_CASE(an_address_beyond_its_share_gives_way_to_another) {
     }
 }
 
-// -- nodes without room --------------------------------------------------------------------------------------------
+// -- nodes at their limit ------------------------------------------------------------------------------------------
 
 BOOST_DATA_TEST_CASE(who_is_refused_gets_the_line_whatever_he_has_sent, tcp_and_unix, kind) {
     node n{kind, {.links = 1}};
@@ -234,7 +234,7 @@ BOOST_DATA_TEST_CASE(who_is_refused_gets_the_line_whatever_he_has_sent, tcp_and_
     }
 }
 
-BOOST_DATA_TEST_CASE(a_request_to_a_node_without_room_is_busy, tcp_and_unix, kind) {
+BOOST_DATA_TEST_CASE(a_request_to_a_node_at_its_limit_of_links_is_busy, tcp_and_unix, kind) {
     node n{kind, {.links = 1}};
     auto inside = n.peer();
     BOOST_TEST(inside.ask("BIND self:notice") == "{}");

@@ -162,7 +162,7 @@ BOOST_AUTO_TEST_CASE(large_requests_of_a_program_to_a_peer_that_takes_none_are_b
     }
 }
 
-BOOST_AUTO_TEST_CASE(last_values_stay_within_it_and_a_tasks_own_make_room_for_each_other) {
+BOOST_AUTO_TEST_CASE(last_values_stay_within_it_and_those_of_a_task_replace_each_other) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", carrier::tcp4, {.memory = budget})};
     for (int i = 0; i < 100; ++i) {

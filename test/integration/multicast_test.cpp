@@ -82,7 +82,7 @@ struct stranger final : cles::core::group_listener {
     }
     ~stranger() { port->close(); }
     void on_datagram(const cles::core::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
-    void on_room() override {}
+    void on_writable() override {}
     void say(std::string_view line) { port->send(line); }
     [[nodiscard]] std::size_t count(std::string_view head) const {
         return static_cast<std::size_t>(

@@ -210,7 +210,7 @@ BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_node_dies, fixture) {
     }
 }
 
-// The node that is chosen has no room for the link, and says so on a line of its own that answers nothing.
+// The chosen node has reached its limit of links and reports that in a line that replies to no request.
 BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_full_node_refuses_the_link, fixture) {
     cles::service_options loaded;
     loaded.load = [] { return cles::node_load{.queued = 50, .running = 1, .workers = 1}; };

@@ -385,7 +385,7 @@ BOOST_AUTO_TEST_CASE(past_the_sources_that_there_may_be_new_ones_are_busy) {
     BOOST_TEST(kind_of(three.ask("PULL car1:localization id=5")) == "id=5 ok");
 }
 
-BOOST_AUTO_TEST_CASE(sources_that_only_pull_take_nobodys_room) {
+BOOST_AUTO_TEST_CASE(sources_that_only_pull_use_no_capacity_of_others) {
     nodes n{carrier::udp4, {.links = 4}};
     for (int i = 0; i < 40; ++i) {
         plain_client passer_by{n.io, n.url()};

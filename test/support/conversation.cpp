@@ -279,7 +279,7 @@ void conversation::on_link(char name, std::string_view what, std::string_view re
     } else if (what == "full") {
         at.takes = false;
     } else if (what == "room") {
-        at.make_room();
+        at.make_writable();
     } else if (what == "ask") {
         ask(name, rest);
     } else if (what == "cancel") {

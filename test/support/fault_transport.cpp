@@ -127,9 +127,9 @@ class faulty_link final : public link, public link_events, public std::enable_sh
             owner->on_lost(why);
         }
     }
-    void on_room() override {
+    void on_writable() override {
         if (const auto owner = owner_) {
-            owner->on_room();
+            owner->on_writable();
         }
     }
 

@@ -31,7 +31,7 @@ class group_recorder final : public core::group_port {
         }
         return all;
     }
-    [[nodiscard]] std::size_t unsent() const noexcept override { return room ? 0 : 1; }
+    [[nodiscard]] std::size_t unsent() const noexcept override { return writable ? 0 : 1; }
     void close() override {}
     [[nodiscard]] const core::group_source& source() const noexcept override { return self_; }
 
@@ -40,7 +40,7 @@ class group_recorder final : public core::group_port {
     /// For a session, which does not own it.
     [[nodiscard]] std::shared_ptr<core::group_port> share() { return {std::shared_ptr<void>{}, this}; }
 
-    bool room = true;
+    bool writable = true;
 
   private:
     core::group_source self_;

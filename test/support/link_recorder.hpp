@@ -56,7 +56,7 @@ class link_recorder final : public link_events {
         why = code;
         note('x');
     }
-    void on_room() override { note('r'); }
+    void on_writable() override { note('r'); }
 
   private:
     void note(char call) {

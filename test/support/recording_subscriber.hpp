@@ -14,16 +14,16 @@ namespace cles::test {
 /// A subscriber that takes updates as long as the test lets it.
 class recording_subscriber final : public core::subscriber {
   public:
-    [[nodiscard]] bool takes_updates() const override { return room != 0; }
+    [[nodiscard]] bool takes_updates() const override { return capacity != 0; }
     void put_updates(std::string_view lines) override {
         text_.append(lines);
-        --room;
+        --capacity;
         ++puts;
     }
     std::string take() { return std::exchange(text_, {}); }
 
     /// How many more times it takes updates.
-    std::size_t room = std::numeric_limits<std::size_t>::max();
+    std::size_t capacity = std::numeric_limits<std::size_t>::max();
     std::size_t puts = 0;
 
   private:

@@ -129,8 +129,8 @@ class test_link final : public recording_line_sink, public core::subscriber {
     void serve_more() { session_.serving().serve_more(at_.clock.now()); }
     /// The peer has ended in the middle of this line.
     void cut(std::string_view rest) { session_.on_cut(rest); }
-    /// The link has room again.
-    void make_room() {
+    /// The link is writable again.
+    void make_writable() {
         takes = true;
         session_.serving().drain(at_.clock.now());
     }

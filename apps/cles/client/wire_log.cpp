@@ -101,9 +101,9 @@ class logged_link final : public cles::link,
             owner->on_lost(why);
         }
     }
-    void on_room() override {
+    void on_writable() override {
         if (const auto owner = owner_) {
-            owner->on_room();
+            owner->on_writable();
         }
     }
 

@@ -35,7 +35,9 @@ class link_events {
     /// The connection is lost: reset, failed to write, or closed.
     virtual void on_lost(boost::system::error_code why) = 0;
     /// The transport has accepted all output, after a `flush` that could not write all at once.
-    virtual void on_room() = 0;
+    virtual void on_writable() = 0;
+    /// The former name of `on_writable`, for callers.
+    [[deprecated("on_writable")]] void on_room() { on_writable(); }
 };
 
 /// A bidirectional connection that carries lines between two nodes; implemented by transports (docs/links.md). All

@@ -250,7 +250,7 @@ class service : public registrar {
                     publish_elsewhere(hopping(slot), path, json.text, detail::pending_ptr{operation});
                 } else {
                     connect_cancellation(slot,
-                                         publish_when_room(*engine_, path, json.text, detail::pending_ptr{operation}));
+                                         publish_or_wait(*engine_, path, json.text, detail::pending_ptr{operation}));
                 }
             },
             token, std::string{noun}, converted([&] { return to_json(value); }));
@@ -448,8 +448,8 @@ class service : public registrar {
                               detail::pending_ptr operation);
     static std::uint64_t send_command(detail::engine& inside, std::string_view command, const call_options& options,
                                       detail::pending_ptr operation);
-    static std::uint64_t publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
-                                           detail::pending_ptr operation);
+    static std::uint64_t publish_or_wait(detail::engine& inside, std::string_view noun, std::string_view json,
+                                         detail::pending_ptr operation);
     static std::uint64_t close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation);
     // The same, dispatched to the service's executor, where they set the ticket.
     void send_elsewhere(const detail::remote_withdrawal& withdraw, const detail::outgoing& request,

@@ -167,9 +167,9 @@ bool service::retire(std::string_view noun) {
     return run_on(strand_of(pooled_, get_executor()), [this, noun] { return engine_->node().published.retire(noun); });
 }
 
-std::uint64_t service::publish_when_room(detail::engine& inside, std::string_view noun, std::string_view json,
-                                         detail::pending_ptr operation) {
-    return inside.publish_when_room(noun, json, std::move(operation));
+std::uint64_t service::publish_or_wait(detail::engine& inside, std::string_view noun, std::string_view json,
+                                       detail::pending_ptr operation) {
+    return inside.publish_or_wait(noun, json, std::move(operation));
 }
 
 std::uint64_t service::close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation) {
@@ -207,7 +207,7 @@ void service::publish_elsewhere(const detail::remote_withdrawal& withdraw, const
                                 const std::string& json, detail::pending_ptr operation) {
     asio::dispatch(get_executor(), [inside = engine_, ticket = withdraw.ticket, noun, json,
                                     operation = std::move(operation)]() mutable {
-        *ticket = inside->publish_when_room(noun, json, std::move(operation));
+        *ticket = inside->publish_or_wait(noun, json, std::move(operation));
     });
 }
 

@@ -54,7 +54,7 @@ class update_coalescer {
     bool several_ = false;              // updates went out together, or in close succession
 };
 
-/// Hands the new updates of these topics to their subscribers. Then publishes the updates that wait for room there.
+/// Hands the new updates of these topics to their subscribers. Then publishes the updates that wait for capacity there.
 void send_updates(unsent_topics& unsent, publications& published, time_point now);
 
 /// A link, whose output is written in turns.
@@ -64,7 +64,7 @@ class flushable {
     flushable(const flushable&) = delete;
     flushable& operator=(const flushable&) = delete;
 
-    /// Writes pending output, and continues serving and publishing if there is room again.
+    /// Writes pending output, and continues serving and publishing if there is capacity again.
     virtual void flush() = 0;
     /// Writes pending output without running handlers. Returns false if `flush` would do more.
     [[nodiscard]] virtual bool write() = 0;

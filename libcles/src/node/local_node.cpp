@@ -67,7 +67,7 @@ node_options complete(node_options setup, const std::shared_ptr<environment>& by
     if (!setup.pool.empty()) {
         check_name(setup.pool, "pool");
     }
-    // Leaves room for the ids that one incarnation may draw, and is small enough for clients that read numbers as
+    // Leaves space for the ids that one incarnation may draw, and is small enough for clients that read numbers as
     // doubles.
     constexpr std::uint64_t apart = 1U << 20U;
     setup.epoch = by->random();
@@ -335,8 +335,7 @@ void local_node::publish(std::string_view noun, const std::function<void(json_wr
     flush_scheduler_.run_user_call([&] { node_->published.publish(noun, write); });
 }
 
-std::uint64_t local_node::publish_when_room(std::string_view noun, std::string_view json,
-                                            detail::pending_ptr operation) {
+std::uint64_t local_node::publish_or_wait(std::string_view noun, std::string_view json, detail::pending_ptr operation) {
     if (stopped_) {
         return fail_later(std::move(operation), errc::stopped, "the service has been stopped");
     }
@@ -345,7 +344,7 @@ std::uint64_t local_node::publish_when_room(std::string_view noun, std::string_v
     try {
         check_noun(noun);
         flush_scheduler_.run_user_call(
-            [&] { waits = !node_->published.publish_when_room(noun, json, operation, ticket); });
+            [&] { waits = !node_->published.publish_or_wait(noun, json, operation, ticket); });
     } catch (const error& e) {
         if (operation == nullptr) { // it was taken, and completes elsewhere
             throw;

@@ -106,7 +106,7 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     // For the public API.
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
     /// Returns a ticket that cancels the operation while it waits; 0 if it does not wait.
-    std::uint64_t publish_when_room(std::string_view noun, std::string_view json, detail::pending_ptr operation);
+    std::uint64_t publish_or_wait(std::string_view noun, std::string_view json, detail::pending_ptr operation);
     std::uint64_t send(verb how, std::string_view text, std::string_view body, const call_options& options,
                        detail::pending_ptr operation);
     /// Sends a command such as "PULL car0:localization". One that is malformed, or that cannot be sent as a request,

@@ -69,7 +69,7 @@ class group_listener {
     /// Also called for a node's own datagrams if other nodes use the same socket.
     virtual void on_datagram(const group_datagram& datagram) = 0;
     /// What was pending has been sent.
-    virtual void on_room() = 0;
+    virtual void on_writable() = 0;
 
   protected:
     ~group_listener() = default;
@@ -92,7 +92,7 @@ class group_port {
 
     /// Starts to deliver what arrives. The listener must live until `close`.
     virtual void start(group_listener& owner) = 0;
-    /// Sends whole lines, each with its LF as one datagram; those for which the socket has no room are pending. A
+    /// Sends whole lines, each with its LF as one datagram; those for which the socket has no space are pending. A
     /// datagram that cannot be sent for another reason counts as lost in the network.
     /// \return less than everything if the limit on pending bytes is reached
     virtual lines_done send(std::string_view lines) = 0;

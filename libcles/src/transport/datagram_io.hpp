@@ -29,9 +29,9 @@ class send_batch {
     explicit send_batch(udp::socket& socket) noexcept;
 
     /// Sends to the connected peer, or else to `to`. A line that cannot be sent counts as lost in the network, and as
-    /// done. \return what is done; nothing if there is no room \pre there is a line
+    /// done. \return what is done; nothing if there is no space \pre there is a line
     core::lines_done send(std::string_view lines, const udp::endpoint* to = nullptr) noexcept;
-    /// The same, as long as there is room.
+    /// The same, as long as there is space.
     core::lines_done send_all(std::string_view lines, const udp::endpoint* to) noexcept;
 
   private:

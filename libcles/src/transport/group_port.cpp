@@ -350,21 +350,21 @@ core::lines_done group_port::send(std::string_view lines) {
         ++taken.lines;
         taken.bytes += line.size();
     }
-    wait_for_room();
+    wait_until_writable();
     return taken;
 }
 
-void group_port::wait_for_room() {
-    if (unsent() == 0 || waits_for_room_) {
+void group_port::wait_until_writable() {
+    if (unsent() == 0 || waits_until_writable_) {
         return;
     }
-    waits_for_room_ = true;
+    waits_until_writable_ = true;
     own_.async_wait(udp::socket::wait_write, [self = shared_from_this()](error_code code) {
-        self->waits_for_room_ = false;
+        self->waits_until_writable_ = false;
         if (!code && self->owner_ != nullptr) {
             self->send_rest();
             if (self->unsent() == 0 && self->owner_ != nullptr) {
-                self->owner_->on_room();
+                self->owner_->on_writable();
             }
         }
     });
@@ -373,7 +373,7 @@ void group_port::wait_for_room() {
 void group_port::send_rest() {
     waiting_at_ += burst_.send_all(std::string_view{waiting_}.substr(waiting_at_), &group_).bytes;
     if (unsent() != 0) {
-        wait_for_room();
+        wait_until_writable();
         return;
     }
     waiting_.clear();

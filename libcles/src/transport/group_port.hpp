@@ -43,7 +43,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
 
   private:
     void send_rest();
-    void wait_for_room();
+    void wait_until_writable();
 
     udp::endpoint group_;
     core::group_source source_;
@@ -53,7 +53,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     core::group_listener* owner_ = nullptr; // null: closed
     std::string waiting_;
     std::size_t waiting_at_ = 0;
-    bool waits_for_room_ = false;
+    bool waits_until_writable_ = false;
 };
 
 } // namespace cles::transport

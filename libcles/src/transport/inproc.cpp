@@ -101,9 +101,11 @@ class inproc_link final : public link, public std::enable_shared_from_this<inpro
     void lose();
     [[nodiscard]] bool drained() const noexcept { return read_at_ >= text_.size() && inbox_.empty(); }
     // This much may be in transit before it counts as unsent, like data in the buffers of a socket.
-    [[nodiscard]] std::size_t on_its_way() const noexcept { return in_transit_ > room ? in_transit_ - room : 0; }
+    [[nodiscard]] std::size_t on_its_way() const noexcept {
+        return in_transit_ > capacity ? in_transit_ - capacity : 0;
+    }
 
-    static constexpr std::size_t room = 65536;
+    static constexpr std::size_t capacity = 65536;
 
     identity peer_;
     limits bounds_;
@@ -194,7 +196,7 @@ void inproc_link::consumed(std::size_t bytes) {
     if (state_ == state::finishing) {
         wait_for_peer_close();
     } else if (const auto owner = owner_) {
-        owner->on_room();
+        owner->on_writable();
     }
 }
 

@@ -253,7 +253,7 @@ void stream_link::on_written(error_code code, std::size_t count) {
     if (state_ == state::finishing) {
         shut_down_output();
     } else if (const auto owner = owner_) {
-        owner->on_room();
+        owner->on_writable();
     }
 }
 

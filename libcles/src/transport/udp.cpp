@@ -145,10 +145,10 @@ core::lines_done udp_port::send(const udp_link& to, std::string_view lines) {
     return burst_.send_all(lines, connected_ ? nullptr : &to.endpoint());
 }
 
-void udp_port::wait_for_room(std::weak_ptr<udp_link> link) {
+void udp_port::wait_until_writable(std::weak_ptr<udp_link> link) {
     socket_.async_wait(udp::socket::wait_write, [self = shared_from_this(), link = std::move(link)](error_code) {
         if (const auto alive = link.lock()) {
-            alive->on_room();
+            alive->on_writable();
         }
     });
 }
@@ -234,7 +234,7 @@ void udp_link::send_rest() {
     sending_at_ += count;
     if (sending_at_ < sending_.size()) {
         waiting_ = true;
-        port_->wait_for_room(weak_from_this());
+        port_->wait_until_writable(weak_from_this());
         return;
     }
     constexpr std::size_t max_kept = 65536;
@@ -245,14 +245,14 @@ void udp_link::send_rest() {
     sending_at_ = 0;
 }
 
-void udp_link::on_room() {
+void udp_link::on_writable() {
     waiting_ = false;
     if (port_ == nullptr) {
         return;
     }
     send_rest();
     if (const auto owner = owner_; owner && sending_.empty()) {
-        owner->on_room();
+        owner->on_writable();
     }
 }
 

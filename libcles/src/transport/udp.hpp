@@ -50,8 +50,8 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     [[nodiscard]] const boost::asio::ip::udp::endpoint& endpoint() const noexcept { return peer_; }
     /// Delivers what arrived in a datagram.
     void deliver(std::string_view datagram);
-    /// The socket has room again.
-    void on_room();
+    /// The socket is writable again.
+    void on_writable();
 
   private:
     void take_output();
@@ -63,12 +63,12 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     std::shared_ptr<link_events> owner_;
     std::vector<std::string> early_; // received before `start`
     std::string output_;
-    std::string sending_; // output for which the socket has no room
+    std::string sending_; // output for which the socket has no space
     std::size_t sending_at_ = 0;
     std::uint64_t sent_ = 0;
     std::uint64_t received_ = 0;
     bool paused_ = false;
-    bool waiting_ = false; // for room in the socket
+    bool waiting_ = false; // until the socket is writable
 };
 
 /// A UDP socket and the links that share it: one for each source if it listens, or a single one if it was dialled.
@@ -91,10 +91,10 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
 
     // For its links.
     void receive();
-    /// Sends whole lines, each with its LF as one datagram, as long as the socket has room. One that cannot be sent
+    /// Sends whole lines, each with its LF as one datagram, as long as the socket has space. One that cannot be sent
     /// counts as lost in the network.
     core::lines_done send(const udp_link& to, std::string_view lines);
-    void wait_for_room(std::weak_ptr<udp_link> link);
+    void wait_until_writable(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
 

@@ -31,7 +31,7 @@ inline constexpr std::chrono::milliseconds min_retry{10};
 inline constexpr std::chrono::milliseconds max_retry{10'000};
 
 /// When to retry a refused request (`retry_ms` of `busy`): after the workers have processed half of the queue, so that
-/// retries find room, but do not all arrive at an empty queue.
+/// retries find capacity, but do not all arrive at an empty queue.
 inline std::chrono::milliseconds retry_delay(std::size_t queued, std::size_t workers,
                                              std::chrono::nanoseconds service_time) noexcept {
     using wide = std::chrono::duration<double, std::milli>;

@@ -5,7 +5,7 @@
 //   !speed {"v":1}       the node publishes
 //   +250                 milliseconds go by
 //   *0                   its feed 0, 1 or 2 is opened, or closed if it is open
-//   -                    the socket has no room, or has again
+//   -                    the socket is not writable, or is again
 //
 // Whatever is heard, the node says nothing but BINDs of its feeds and updates of its own, each in one datagram, no more
 // of them than there is reason for, and keeps within its bounds.
@@ -61,13 +61,13 @@ class output final : public core::group_port {
         }
         return all;
     }
-    [[nodiscard]] std::size_t unsent() const noexcept override { return room ? 0 : 1; }
+    [[nodiscard]] std::size_t unsent() const noexcept override { return writable ? 0 : 1; }
     void close() override {}
     [[nodiscard]] const core::group_source& source() const noexcept override { return self_; }
 
     std::size_t updates = 0;
     std::size_t binds = 0;
-    bool room = true;
+    bool writable = true;
 
   private:
     void check(std::string_view line) {
@@ -133,7 +133,7 @@ class watched_group {
         } else if (kind == '*' && rest.size() == 1 && rest[0] >= '0' && rest[0] <= '2') {
             toggle(static_cast<std::size_t>(rest[0] - '0'));
         } else if (kind == '-') {
-            out_.room = !out_.room;
+            out_.writable = !out_.writable;
             session_.bindings().drain(clock_.now());
         }
         check();
@@ -167,7 +167,7 @@ class watched_group {
             return;
         }
         core::send_updates(node_.unsent, node_.published, clock_.now());
-        if (out_.room) {
+        if (out_.writable) {
             drained_ = published_;
         }
     }

@@ -22,9 +22,9 @@ constexpr cles_text text_of(const char* text, size_t size) { return {text, size}
 
 // Uses more of the stack than there is.
 [[maybe_unused]] int deeper(int depth) { // NOLINT(misc-no-recursion)
-    volatile char room[4096] = {};
-    room[depth % 4096] = 1;
-    return depth < 0 ? 0 : deeper(depth + 1) + room[0];
+    volatile char frame[4096] = {};
+    frame[depth % 4096] = 1;
+    return depth < 0 ? 0 : deeper(depth + 1) + frame[0];
 }
 
 // Whether this is a process that only tries the library, and dies with its parent.

@@ -14,7 +14,7 @@ using namespace cles::test;
 using namespace std::chrono_literals;
 using cles::runtime::pool_options;
 
-// One worker, which is held at a gate, and room for four jobs.
+// One worker, which is blocked at a gate, and capacity for four jobs.
 struct fixture : pooled_node {
     explicit fixture(pool_options options = {.workers = 1, .queue = 4})
         : pooled_node(std::move(options)), client(peer()) {

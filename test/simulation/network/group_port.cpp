@@ -12,8 +12,8 @@ namespace cles::simulation {
 namespace {
 
 constexpr unsigned first_port = 40'000;
-constexpr unsigned room_in_system = 24;
-constexpr std::chrono::milliseconds until_room{1};
+constexpr unsigned system_capacity = 24;
+constexpr std::chrono::milliseconds until_writable{1};
 
 bool is_announcement(std::string_view line) {
     return line.starts_with("UPDATE ") && line.find(":cles ") != std::string_view::npos;
@@ -88,7 +88,7 @@ bool group_port::put(std::string_view line) {
     const bool twice =
         net_.fault() == planted::group_sends_twice && line.starts_with("UPDATE ") && !is_announcement(line);
     for (int times = twice ? 2 : 1; times != 0; --times) {
-        if (waiting_.empty() && in_system_ < room_in_system) {
+        if (waiting_.empty() && in_system_ < system_capacity) {
             pass_on(line);
         } else if (unsent_ + line.size() > max_waiting) {
             return false;
@@ -111,7 +111,7 @@ void group_port::pass_on(std::string_view line) {
     net_.watcher().saw(to_string(local_), "==>", line);
     net_.multicast(local_, line);
     if (in_system_++ == 0) {
-        process->later(until_room, [weak = weak_from_this()] {
+        process->later(until_writable, [weak = weak_from_this()] {
             if (const auto self = weak.lock()) {
                 self->drain();
             }
@@ -122,14 +122,14 @@ void group_port::pass_on(std::string_view line) {
 void group_port::drain() {
     in_system_ = 0;
     const bool waited = !waiting_.empty();
-    while (!waiting_.empty() && in_system_ < room_in_system) {
+    while (!waiting_.empty() && in_system_ < system_capacity) {
         const auto line = std::move(waiting_.front());
         waiting_.pop_front();
         unsent_ -= line.size();
         pass_on(line);
     }
     if (waited && waiting_.empty() && owner_ != nullptr) {
-        owner_->on_room();
+        owner_->on_writable();
     }
 }
 

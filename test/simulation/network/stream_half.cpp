@@ -198,7 +198,7 @@ void stream_half::flush() {
         return;
     }
     tamper();
-    const auto count = std::min(room(), output_.size());
+    const auto count = std::min(free_window(), output_.size());
     transmit(std::string_view{output_}.substr(0, count));
     sent_ += count;
     if (count == output_.size()) {
@@ -214,7 +214,7 @@ void stream_half::write_rest() {
     if (state_ == state::closed || severed_ || sending_.empty()) {
         return;
     }
-    const auto count = std::min(room(), sending_.size() - sending_at_);
+    const auto count = std::min(free_window(), sending_.size() - sending_at_);
     transmit(std::string_view{sending_}.substr(sending_at_, count));
     sent_ += count;
     sending_at_ += count;
@@ -231,7 +231,7 @@ void stream_half::write_rest() {
     if (state_ == state::finishing) {
         say_goodbye();
     } else if (const auto owner = owner_) {
-        owner->on_room();
+        owner->on_writable();
     }
 }
 

@@ -66,7 +66,7 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     void transmit(std::string_view bytes);
     void transmit_end();
     void reset_peer();
-    [[nodiscard]] std::size_t room() const noexcept { return window - std::min(window, in_flight_); }
+    [[nodiscard]] std::size_t free_window() const noexcept { return window - std::min(window, in_flight_); }
     void write_rest();
     void say_goodbye();
     void lose();
@@ -97,7 +97,7 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     bool paused_ = false;
     bool handing_ = false;
     bool lines_left_ = false; // of what has been read
-    bool blocked_ = false;    // waits for room
+    bool blocked_ = false;    // waits until the window opens
     bool ended_ = false;
     bool told_end_ = false;
     bool overlong_ = false;

@@ -364,7 +364,7 @@ class asking final : public part {
         if (code == errc::unavailable && a.by != carrier::datagram && is_answered_by_leaver(a)) {
             complain(rule::replies_match, a, "was lost though it ran at a node that left in order");
         }
-        // A copy of a datagram may run once there is room again.
+        // A copy of a datagram may run once there is capacity again.
         if (code == errc::busy && a.by != carrier::datagram && tasks[a.what].has_effect && has_run(a)) {
             complain(rule::replies_match, a, "was refused and ran all the same");
         }

@@ -17,7 +17,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr std::size_t own_nouns = 3;         // that a node publishes by itself
-constexpr unsigned when_there_is_room = 2;   // the one of them that is published so
+constexpr unsigned waiting_noun = 2;         // the one of them that is published with publish_or_wait
 constexpr const char* beacon = "beacon";     // published once by each run, and followed by nobody before the end
 constexpr milliseconds repeated_within{600}; // twice what a repeat is put off by, and the way
 
@@ -252,9 +252,9 @@ class following final : public part {
         }
         n->run([&] {
             for (; count != 0; --count) {
-                n->local().publish_when_room(path_of(when_there_is_room), next_body(host, when_there_is_room, size),
-                                             when_ended([open = offers_](std::string_view) {}));
-                ++published_[host][when_there_is_room];
+                n->local().publish_or_wait(path_of(waiting_noun), next_body(host, waiting_noun, size),
+                                           when_ended([open = offers_](std::string_view) {}));
+                ++published_[host][waiting_noun];
             }
         });
     }

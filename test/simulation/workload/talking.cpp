@@ -113,7 +113,7 @@ class talker final : public place, public link_events {
                      std::to_string(expected_.size()) + " requests were not answered before the loss");
         }
     }
-    void on_room() override {}
+    void on_writable() override {}
 
   private:
     enum class kind : std::uint8_t { result, failure, unknown, malformed, bound };

@@ -175,7 +175,7 @@ BOOST_AUTO_TEST_CASE(an_idle_link_uses_little_memory) {
     BOOST_TEST(buffer.prepare().size() <= 4096U);
 }
 
-BOOST_AUTO_TEST_CASE(there_is_always_room_for_the_next_bytes) {
+BOOST_AUTO_TEST_CASE(there_is_always_space_for_the_next_bytes) {
     line_buffer buffer{5000};
     std::string_view text;
     std::size_t lines = 0;

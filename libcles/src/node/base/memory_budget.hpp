@@ -45,7 +45,7 @@ class memory_account {
 
     [[nodiscard]] std::size_t used() const noexcept { return used_; }
     /// Whether it may hold this many more bytes.
-    [[nodiscard]] bool has_room(std::size_t more) const noexcept {
+    [[nodiscard]] bool has_capacity(std::size_t more) const noexcept {
         const auto free = of_.free();
         if (more > free) {
             return false;
@@ -94,16 +94,16 @@ class memory_reservation {
 
     [[nodiscard]] std::size_t size() const noexcept { return bytes_; }
     [[nodiscard]] const std::shared_ptr<memory_account>& account() const noexcept { return whose_; }
-    /// Changes the number of bytes held. Shrinking always succeeds; if there is no room to grow, nothing changes and
+    /// Changes the number of bytes held. Shrinking always succeeds; growth that exceeds the limit changes nothing and
     /// the result is false.
     [[nodiscard]] bool try_resize(std::size_t bytes) noexcept {
-        if (whose_ && bytes > bytes_ && !whose_->has_room(bytes - bytes_)) {
+        if (whose_ && bytes > bytes_ && !whose_->has_capacity(bytes - bytes_)) {
             return whose_->refuse();
         }
         resize(bytes);
         return true;
     }
-    /// The same whether there is room or not, for memory that is in use already.
+    /// The same regardless of the limit, for memory that is in use already.
     void resize(std::size_t bytes) noexcept {
         if (bytes == bytes_) {
             return;

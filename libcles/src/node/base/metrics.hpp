@@ -101,7 +101,7 @@ struct counters {
     std::uint64_t group_unsent = 0; ///< too large, or too much was pending
     std::uint64_t links_accepted = 0;
     std::uint64_t links_refused = 0;
-    std::uint64_t links_evicted = 0; ///< closed to make room for others
+    std::uint64_t links_evicted = 0; ///< closed in favour of others
     std::uint64_t links_lost = 0;
     std::uint64_t bytes_received = 0;
     std::uint64_t bytes_sent = 0;

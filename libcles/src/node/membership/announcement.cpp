@@ -11,7 +11,7 @@
 namespace cles::core {
 namespace {
 
-constexpr std::size_t depth = 8; // room for additions of later versions
+constexpr std::size_t depth = 8; // allows for additions of later versions
 
 /// Reads an array of strings and passes each to `take`, valid during the call.
 template <class F>

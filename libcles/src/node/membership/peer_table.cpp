@@ -17,7 +17,7 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t table_depth = 8;
 constexpr milliseconds max_age = std::chrono::hours{24};
-constexpr std::size_t room_for_head = 256; // for the other members of the table, and the head of the reply
+constexpr std::size_t bytes_for_head = 256; // for the other members of the table, and the head of the reply
 
 std::int64_t age_of(time_point last_seen, time_point now) {
     return std::max<std::int64_t>(0, std::chrono::ceil<milliseconds>(now - last_seen).count());
@@ -217,8 +217,9 @@ void write_delta(json_writer& w, const table_owner& who, const membership& other
     }
     auto items = others.deltas_since(sent, now);
     describe(items, others, asked.describe, sent);
-    const auto room = std::min(longest, table_page);
-    const auto p = page_of(items, others.latest_revision(), room > room_for_head ? room - room_for_head : 0, now);
+    const auto available = std::min(longest, table_page);
+    const auto for_items = available > bytes_for_head ? available - bytes_for_head : 0;
+    const auto p = page_of(items, others.latest_revision(), for_items, now);
     w.begin_object();
     write_member(w, "node", who.node);
     write_member(w, "epoch", who.epoch);

@@ -79,7 +79,7 @@ void bind_requests::serve_remote(const protocol::request_line& r, time_point due
         replies_.done(reply_target{r}, {});
         return;
     }
-    // What is bound already takes no further room.
+    // A binding that exists already needs no further capacity.
     const bool known =
         remote_bindings_ && remote_bindings_->binds(r.noun.target, protocol::canonical_path(r.noun, scratch));
     if (!known && size() >= node_.bounds.bindings) {

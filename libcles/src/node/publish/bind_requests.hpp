@@ -37,7 +37,7 @@ class bind_requests {
     /// The same for nouns of other nodes, if this one routes.
     void serve_remote(const protocol::request_line& request, time_point due, time_point now, inbound& from);
     void clear();
-    /// Sends pending updates: the link has room again.
+    /// Sends pending updates: the link is writable again.
     void drain(time_point now);
     [[nodiscard]] std::size_t size() const noexcept {
         return bound_.size() + (remote_bindings_ ? remote_bindings_->size() : 0);

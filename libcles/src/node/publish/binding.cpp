@@ -8,7 +8,7 @@
 namespace cles::core {
 namespace {
 
-constexpr std::size_t piece = 65536; // bytes sent to a subscriber before it is asked for room again
+constexpr std::size_t piece = 65536; // bytes sent to a subscriber before its capacity is checked again
 
 } // namespace
 

@@ -96,7 +96,7 @@ class link_bindings {
     /// Does nothing if it is not bound.
     void unbind(std::string_view path);
     void clear();
-    /// Sends pending updates: the link has room again.
+    /// Sends pending updates: the link is writable again.
     void drain(time_point now);
 
     [[nodiscard]] std::size_t size() const noexcept { return topics_.size(); }

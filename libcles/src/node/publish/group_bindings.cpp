@@ -13,7 +13,7 @@
 namespace cles::core {
 namespace {
 
-// A node's own burst waits here while the socket has no room. A subscriber's `keep` has no effect.
+// A node's own burst waits here while the socket is not writable. A subscriber's `keep` has no effect.
 constexpr binding::terms group_terms{.every = std::chrono::milliseconds{0}, .keep = 1024};
 
 } // namespace
@@ -40,7 +40,7 @@ void group_bindings::clear() {
     bound_.clear();
 }
 
-bool group_bindings::has_room_for(const group_source& from) const {
+bool group_bindings::has_capacity_for(const group_source& from) const {
     const auto found = of_source_.find(from);
     return node_.counts.group_leases < node_.bounds.group_leases &&
            (found == of_source_.end() || found->second < node_.bounds.bindings);
@@ -59,7 +59,7 @@ bool group_bindings::bind(const group_source& from, const protocol::request_line
         return true;
     }
     if (!known) {
-        if (!has_room_for(from)) {
+        if (!has_capacity_for(from)) {
             return false;
         }
         if (found == nouns_.end()) {

@@ -39,7 +39,7 @@ class group_bindings final : private subscriber, private publications::observer 
     /// random delay if every publisher was addressed, at once if only this node was. False if the limit on leases is
     /// reached.
     bool bind(const group_source& from, const protocol::request_line& request, time_point now);
-    /// Sends pending updates: there is room again.
+    /// Sends pending updates: the port is writable again.
     void drain(time_point now) { bound_.drain(now); }
     void clear();
 
@@ -55,7 +55,7 @@ class group_bindings final : private subscriber, private publications::observer 
         std::optional<time_point> repeated_at;
     };
 
-    [[nodiscard]] bool has_room_for(const group_source& from) const;
+    [[nodiscard]] bool has_capacity_for(const group_source& from) const;
     void end(noun& n, const group_source& from);
     void repeat_soon(noun& n, bool delayed, time_point now);
     void repeat(noun& n, time_point now);

@@ -47,7 +47,7 @@ void group_session::unbind_all() {
     bindings_.clear();
 }
 
-void group_session::on_room() {
+void group_session::on_writable() {
     const auto keep = group_.keep_owner();
     bindings_.drain(node_->time.now());
 }

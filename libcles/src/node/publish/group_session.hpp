@@ -45,7 +45,7 @@ class group_session final : public group_listener {
     void unbind_all();
 
     void on_datagram(const group_datagram& datagram) override;
-    void on_room() override;
+    void on_writable() override;
 
   private:
     struct waiting {

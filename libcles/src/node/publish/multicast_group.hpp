@@ -82,7 +82,7 @@ class announcement_listener {
 };
 
 /// Sends whole lines, none of them too large, each as one datagram, and counts them. Returns true if everything has
-/// been sent or waits for room.
+/// been sent or is pending.
 bool send_to(group_port& by, counters& counts, std::string_view lines);
 
 /// A node's membership in its multicast group: a session on each interface, and what they have in common. The same

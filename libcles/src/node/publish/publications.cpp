@@ -209,10 +209,10 @@ void publications::publish_lossless(std::string_view path, std::string_view body
     publish_body(path, body);
 }
 
-bool publications::publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation,
-                                     std::uint64_t ticket) {
+bool publications::publish_or_wait(std::string_view path, std::string_view body, detail::pending_ptr& operation,
+                                   std::uint64_t ticket) {
     auto& t = open(path, true);
-    if (!t.waiters().empty() || !t.has_room()) {
+    if (!t.waiters().empty() || !t.has_capacity()) {
         t.waiters().push_back({std::string{body}, std::move(operation), ticket});
         return false;
     }
@@ -238,7 +238,7 @@ bool publications::cancel(std::uint64_t ticket) {
 
 void publications::admit(topic& t) {
     auto& waiting = t.waiters();
-    while (!waiting.empty() && t.has_room()) {
+    while (!waiting.empty() && t.has_capacity()) {
         boost::system::error_code code;
         std::string why;
         try {

@@ -83,11 +83,11 @@ class publications final : public topic_source {
     void publish(std::string_view path, const std::function<void(json_writer&)>& write);
     /// Publishes JSON that is known to be valid and compact.
     void publish_body(std::string_view path, std::string_view body);
-    /// Publishes any body now, or once every subscriber has room. Takes the operation, which completes through the
+    /// Publishes any body now, or once every subscriber has capacity. Takes the operation, which completes through the
     /// completion queue. Returns true if published now. \throws as `publish`; then the operation is not taken
-    bool publish_when_room(std::string_view path, std::string_view body, detail::pending_ptr& operation,
-                           std::uint64_t ticket = 0);
-    /// Cancels an update that waits for room: it is not published, and its operation fails with `cancelled`. False if
+    bool publish_or_wait(std::string_view path, std::string_view body, detail::pending_ptr& operation,
+                         std::uint64_t ticket = 0);
+    /// Cancels an update that waits: it is not published, and its operation fails with `cancelled`. False if
     /// none with this ticket waits.
     bool cancel(std::uint64_t ticket);
 
@@ -128,10 +128,10 @@ class publications final : public topic_source {
         remove_if_unused(t);
     }
 
-    /// Publishes the updates that wait for room in this topic, as far as there is some.
+    /// Publishes the updates that wait for capacity in this topic, as far as there is some.
     void admit(topic& t) override;
 
-    /// Removes and returns the operations of all updates that wait for room.
+    /// Removes and returns the operations of all updates that wait for capacity.
     [[nodiscard]] std::vector<detail::pending_ptr> take_waiters();
 
     /// The names of the tasks that have been published.

@@ -187,13 +187,13 @@ void topic::drain(time_point now) {
     refresh();
 }
 
-bool topic::has_room() const noexcept {
+bool topic::has_capacity() const noexcept {
     if (!unthinned_) {
         return true;
     }
     const auto newest = log_.last();
     const auto oldest_wanted = std::max(slowest_ + 1, log_.first());
-    return newest < room_until_ && log_.bytes(oldest_wanted, newest) < shared_.binding_bytes / 2;
+    return newest < fits_until_ && log_.bytes(oldest_wanted, newest) < shared_.binding_bytes / 2;
 }
 
 // The first update that a subscriber still needs.
@@ -205,13 +205,13 @@ std::uint64_t topic::first_needed() const noexcept {
 void topic::refresh() noexcept {
     unthinned_ = false;
     slowest_ = std::numeric_limits<std::uint64_t>::max();
-    room_until_ = slowest_;
+    fits_until_ = slowest_;
     max_keep_ = 0;
     for (const auto& b : bindings_) {
         if (b->terms_.every.count() == 0) {
             unthinned_ = true;
             slowest_ = std::min(slowest_, b->seen_);
-            room_until_ = std::min(room_until_, b->seen_ + b->terms_.keep);
+            fits_until_ = std::min(fits_until_, b->seen_ + b->terms_.keep);
             max_keep_ = std::max(max_keep_, b->terms_.keep);
         }
     }

@@ -135,14 +135,14 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     /// Records the positions after a binding was drained on its own.
     void refresh() noexcept;
     /// Whether one more update fits into the queue of every subscriber.
-    [[nodiscard]] bool has_room() const noexcept;
+    [[nodiscard]] bool has_capacity() const noexcept;
 
     struct waiter {
         std::string body;
         detail::pending_ptr operation;
         std::uint64_t ticket = 0; ///< for cancellation
     };
-    /// Updates to publish when there is room, oldest first.
+    /// Updates that wait for capacity, oldest first.
     std::deque<waiter>& waiters() noexcept { return waiters_; }
 
   private:
@@ -161,7 +161,7 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     std::vector<std::unique_ptr<binding>> bindings_;
     // Of the bindings that take every update:
     std::uint64_t slowest_ = 0;    // the last update that each has been sent
-    std::uint64_t room_until_ = 0; // the last number that fits into each one's `keep`
+    std::uint64_t fits_until_ = 0; // the last number that fits into each one's `keep`
     std::uint32_t max_keep_ = 0;
     std::deque<waiter> waiters_;
 };

@@ -135,7 +135,7 @@ void relays::join(std::string_view node, std::string_view path, std::string_view
         tell(nullptr, {}, {}, {.code = errc::busy, .message = "as many nouns are passed on as may be"});
         return;
     }
-    if (!node_.kept_values->has_room(1)) {
+    if (!node_.kept_values->has_capacity(1)) {
         tell(nullptr, {}, {}, no_memory(node_));
         return;
     }

@@ -115,7 +115,7 @@ void connection::on_lost(boost::system::error_code why) {
     end("the link was lost: " + why.message());
 }
 
-void connection::on_room() {
+void connection::on_writable() {
     const auto keep = shared_from_this();
     session_.serving().drain(host_->now());
     flush();
@@ -156,7 +156,7 @@ void connection::close() {
 bool connection::takes_updates() const {
     // If nothing is pending, one update is always accepted: no later event would ask for it again.
     const auto unsent = link_->unsent();
-    const bool takes = unsent < update_backpressure_limit && (unsent == 0 || memory_->has_room(unsent));
+    const bool takes = unsent < update_backpressure_limit && (unsent == 0 || memory_->has_capacity(unsent));
     updates_wait_ = updates_wait_ || !takes;
     return takes;
 }
@@ -186,7 +186,7 @@ void connection::flush() {
         host_->flush_scheduler().flush_soon(*this);
     }
     if (updates_wait_ && !host_->stopped() && link_->unsent() < update_backpressure_limit) {
-        // The link sent everything at once, so it will not call `on_room`.
+        // The link sent everything at once, so it will not call `on_writable`.
         updates_wait_ = false;
         session_.serving().drain(host_->now());
     }

@@ -62,7 +62,7 @@ class connection final : public link_events,
     void on_batch() override;
     void on_end() override;
     void on_lost(boost::system::error_code why) override;
-    void on_room() override;
+    void on_writable() override;
 
     // flushable
     void flush() override;

@@ -34,7 +34,7 @@ class connections::refused final : public link_events {
     void on_overlong(std::string_view) override {}
     void on_batch() override {}
     void on_end() override {}
-    void on_room() override {}
+    void on_writable() override {}
     void on_lost(boost::system::error_code) override {
         if (const auto host = host_.lock()) {
             host->connections().on_closed_gracefully(which_);
@@ -71,7 +71,7 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
         arrived->close();
         return;
     }
-    if (counted && !has_room(*arrived)) {
+    if (counted && !has_capacity(*arrived)) {
         reject(std::move(arrived));
         return;
     }
@@ -81,10 +81,10 @@ void connections::on_accepted(link_ptr arrived, bool counted) {
     adopt(std::move(arrived), counted ? connection::origin::accepted : connection::origin::local);
 }
 
-bool connections::has_room(const link& arrived) {
+bool connections::has_capacity(const link& arrived) {
     const auto most = host_.bounds().links;
     if (arrived.datagram() == 0) {
-        return admission_.make_room(address_of(arrived.peer()), host_.now());
+        return admission_.ensure_capacity(address_of(arrived.peer()), host_.now());
     }
     if (sources_ >= most) {
         drop_idle_sources();

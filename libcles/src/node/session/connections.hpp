@@ -71,7 +71,7 @@ class connections {
   private:
     class refused;
 
-    [[nodiscard]] bool has_room(const link& arrived);
+    [[nodiscard]] bool has_capacity(const link& arrived);
     void reject(link_ptr arrived);
     void drop_idle_sources();
 

@@ -140,16 +140,16 @@ bool reflection_limit::admit(std::string_view address, std::size_t bytes, time_p
         return false;
     }
     b->fill(now);
-    if (b->room < static_cast<double>(bytes)) {
+    if (b->tokens < static_cast<double>(bytes)) {
         return false;
     }
-    b->room -= static_cast<double>(bytes);
+    b->tokens -= static_cast<double>(bytes);
     return true;
 }
 
 void reflection_limit::bucket::fill(time_point now) noexcept {
     const auto passed = std::chrono::duration<double>{now - at}.count();
-    room = std::min(room + passed * static_cast<double>(bytes_per_second), static_cast<double>(at_once));
+    tokens = std::min(tokens + passed * static_cast<double>(bytes_per_second), static_cast<double>(at_once));
     at = now;
 }
 
@@ -175,7 +175,7 @@ void reflection_limit::forget_full(time_point now) {
     tidied_ = now;
     boost::unordered::erase_if(buckets_, [now](auto& each) {
         each.second.fill(now);
-        return each.second.room >= static_cast<double>(at_once);
+        return each.second.tokens >= static_cast<double>(at_once);
     });
 }
 

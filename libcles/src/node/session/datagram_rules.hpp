@@ -127,7 +127,7 @@ class reflection_limit {
 
   private:
     struct bucket {
-        double room = static_cast<double>(at_once);
+        double tokens = static_cast<double>(at_once);
         time_point at{};
 
         void fill(time_point now) noexcept;

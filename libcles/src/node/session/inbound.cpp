@@ -231,7 +231,7 @@ std::shared_ptr<call> inbound::make_call(const protocol::request_line& r, time_p
         replies_.fail(r, protocol::failure{.code = errc::unavailable, .message = {}});
         return nullptr;
     }
-    if (const auto why = no_room_to_run(*node_)) {
+    if (const auto why = no_capacity_to_run(*node_)) {
         replies_.fail(r, *why);
         return nullptr;
     }

@@ -52,7 +52,7 @@ class inbound final : private task_sink {
     [[nodiscard]] bool has_more() const noexcept { return ordered_.has_more(); }
     /// Serves some of them.
     void serve_more(time_point now);
-    /// Sends pending updates: the link has room again.
+    /// Sends pending updates: the link is writable again.
     void drain(time_point now) { bound_.drain(now); }
     [[nodiscard]] std::size_t in_flight() const noexcept { return calls_.size() + ordered_.size(); }
     /// Whether no state is kept for the peer: no running or waiting request, no binding, no remembered reply.

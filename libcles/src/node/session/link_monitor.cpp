@@ -63,7 +63,7 @@ void link_monitor::on_deadline(time_point now) {
 
 // -- all links -----------------------------------------------------------------------------------------------------
 
-bool link_admission::make_room(std::string_view address, time_point now) {
+bool link_admission::ensure_capacity(std::string_view address, time_point now) {
     if (links_.size() < bounds_.links) {
         return true;
     }

@@ -40,7 +40,7 @@ class link_monitor final : private deadline {
         virtual void on_silence() = 0;
         /// An empty line is due.
         virtual void on_probe() = 0;
-        /// Other links need the room: ends the link and calls `link_admission::leave`.
+        /// Other links need its place: ends the link and calls `link_admission::leave`.
         virtual void evict() = 0;
 
       protected:
@@ -92,7 +92,7 @@ class link_monitor final : private deadline {
 /// Decides which accepted links a node keeps when their number has reached the limit (docs/protocol.md, "Closing a
 /// link").
 ///
-/// Peers that do not use their links must not lock out new ones. To make room for a new link, the node closes the first
+/// Peers that do not use their links must not lock out new ones. To admit a new link, the node closes the first
 /// that exists of
 ///  1. the link that has been half-closed for longest;
 ///  2. the oldest link that has received no line within `first_line_grace`;
@@ -109,8 +109,8 @@ class link_admission {
 
     explicit link_admission(const limits& bounds) noexcept : bounds_(bounds) {}
 
-    /// Whether there is room for a link from that address; evicts another link if necessary and possible.
-    bool make_room(std::string_view address, time_point now);
+    /// Whether there is capacity for a link from that address; evicts another link if necessary and possible.
+    bool ensure_capacity(std::string_view address, time_point now);
     void enter(link_monitor& m, std::string_view address);
     /// \pre it has entered
     void leave(link_monitor& m);

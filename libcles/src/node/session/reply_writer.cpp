@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t max_escape = 6;     // "\u0000"
 constexpr std::size_t always_fits = 1024; // a failure in its place would take about as much
-constexpr std::size_t head_room = 24;     // times max_escape: the bytes around a failure's message
+constexpr std::size_t head_bytes = 24;    // times max_escape: the bytes around a failure's message
 
 // Truncates text without splitting a character.
 void cut(std::string& text, std::size_t longest) {
@@ -94,7 +94,7 @@ void reply_writer::fail(reply_target where, const protocol::failure& why) {
     if (out.size() - line > max_reply_) { // a handler's message may be long; the peer would close the link over it
         out.resize(body);
         told.answer.clear();
-        cut(told.message, max_reply_ / max_escape > head_room ? max_reply_ / max_escape - head_room : 0);
+        cut(told.message, max_reply_ / max_escape > head_bytes ? max_reply_ / max_escape - head_bytes : 0);
         protocol::append_failure(out, told);
     }
     out.push_back('\n');

@@ -117,7 +117,7 @@ protocol::failure overlong(const node_state& n, std::size_t datagram) {
             .message = n.name + ": a line has at most " + std::to_string(n.bounds.line) + " bytes"};
 }
 
-std::optional<protocol::failure> no_room_to_run(const node_state& n) {
+std::optional<protocol::failure> no_capacity_to_run(const node_state& n) {
     if (n.counts.handlers_running < n.bounds.running) {
         return std::nullopt;
     }

@@ -24,7 +24,7 @@ protocol::failure no_such_task(const node_state& n, const protocol::request_line
 /// A line over the limit. `datagram`: the maximum size of one, 0 for a stream.
 protocol::failure overlong(const node_state& n, std::size_t datagram);
 /// `busy` if the node runs as many handlers as it may, else nothing.
-std::optional<protocol::failure> no_room_to_run(const node_state& n);
+std::optional<protocol::failure> no_capacity_to_run(const node_state& n);
 /// The failure once the handler has run: `too_large` says so, since repeating the request would repeat its effect.
 protocol::failure after_run(protocol::failure why);
 

@@ -123,13 +123,13 @@ std::optional<protocol::failure> task_execution::refusal(const memory_account* m
     if (handler_ == nullptr) {
         return no_such_task(*node_, line_);
     }
-    if (memory != nullptr && !memory->has_room(1)) {
+    if (memory != nullptr && !memory->has_capacity(1)) {
         return no_memory(*node_);
     }
     if (line_.verb == verb::update && !node_->published.can_publish(publish_path())) {
         return busy(node_->name + ": '" + std::string{line_.noun.task} + "' has as many nouns as it may");
     }
-    return handler_->plain ? std::nullopt : no_room_to_run(*node_);
+    return handler_->plain ? std::nullopt : no_capacity_to_run(*node_);
 }
 
 void task_execution::write(json_writer& w) {

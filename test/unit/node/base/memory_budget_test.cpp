@@ -55,7 +55,7 @@ BOOST_AUTO_TEST_CASE(a_refused_reservation_does_not_change) {
     BOOST_TEST(budget.used() == 300U);
     BOOST_TEST(budget.refusals() == 2U);
     BOOST_TEST(r.try_resize(300)); // not more than before
-    r.resize(5000);                // memory in use counts, room or not
+    r.resize(5000);                // memory in use counts, even over the limit
     BOOST_TEST(budget.free() == 0U);
     BOOST_TEST(r.try_resize(4000)); // shrinking always succeeds
 }

@@ -80,7 +80,7 @@ BOOST_AUTO_TEST_CASE(beyond_its_bytes_the_oldest_are_dropped_but_never_the_newes
     BOOST_TEST(pop_all(queue) == "car1 3 [\"longer than all bytes allowed\"]");
 }
 
-BOOST_AUTO_TEST_CASE(fetching_makes_room) {
+BOOST_AUTO_TEST_CASE(fetching_frees_capacity) {
     cles::core::feed_queue queue{2, 1000};
     push_update(queue, 1);
     push_update(queue, 2);

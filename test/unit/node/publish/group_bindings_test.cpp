@@ -264,13 +264,13 @@ BOOST_AUTO_TEST_CASE(an_update_over_1200_bytes_is_not_sent_but_counted_and_logge
     BOOST_TEST(node.counts().updates_too_large == 1U);
 }
 
-BOOST_AUTO_TEST_CASE(updates_without_room_wait) {
+BOOST_AUTO_TEST_CASE(updates_wait_while_the_port_is_not_writable) {
     say(1, "BIND all:speed");
-    out.room = false;
+    out.writable = false;
     node.publish_now("speed", "{}");
     node.publish_now("speed", "{}");
     BOOST_TEST(out.take().empty());
-    out.room = true;
+    out.writable = true;
     bindings.drain(node.clock.now());
     BOOST_TEST((seqs() == std::vector<std::uint64_t>{1, 2}));
 }

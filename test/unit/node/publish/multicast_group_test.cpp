@@ -78,14 +78,14 @@ BOOST_AUTO_TEST_CASE(an_unpublished_noun_can_be_bound_on_each_interface) {
     BOOST_TEST(out_card.take().size() == 1U);
 }
 
-BOOST_AUTO_TEST_CASE(an_interface_without_room_does_not_delay_the_other) {
+BOOST_AUTO_TEST_CASE(an_interface_that_is_not_writable_does_not_delay_the_other) {
     hear(on_lo, car2[0], "BIND all:speed");
     hear(on_card, car2[1], "BIND all:speed");
-    out_card.room = false;
+    out_card.writable = false;
     node.publish_now("speed", "1");
     BOOST_TEST(out_lo.take().size() == 1U);
     BOOST_TEST(out_card.take().empty());
-    out_card.room = true;
+    out_card.writable = true;
     on_card.bindings().drain(node.clock.now());
     BOOST_TEST(out_card.take().size() == 1U);
 }

@@ -43,10 +43,10 @@ struct fixture {
             due.front()();
         }
     }
-    /// Publishes when there is room. Returns null if that was at once.
-    std::shared_ptr<outcome> when_room(std::string_view path, std::string_view body) {
+    /// Publishes at once, and returns null, or when there is capacity.
+    std::shared_ptr<outcome> publish_or_wait(std::string_view path, std::string_view body) {
         auto [operation, result] = cles::test::record();
-        return all.publish_when_room(path, body, operation) ? nullptr : result;
+        return all.publish_or_wait(path, body, operation) ? nullptr : result;
     }
 
     cles::test::manual_clock clock;
@@ -265,7 +265,7 @@ BOOST_AUTO_TEST_CASE(a_noun_that_returns_is_numbered_above_all_that_retired) {
 BOOST_AUTO_TEST_CASE(retiring_forgets_the_value_but_keeps_subscribers) {
     recording_subscriber b;
     bind(b, "job/1");
-    b.room = 0;
+    b.capacity = 0;
     all.publish_body("job/1", "[1]");
     all.publish_body("job/2", "[2]");
     BOOST_TEST(all.retire("job/1"));
@@ -275,7 +275,7 @@ BOOST_AUTO_TEST_CASE(retiring_forgets_the_value_but_keeps_subscribers) {
     BOOST_TEST(all.find("job/2") == nullptr);
     BOOST_TEST(all.find("job/1")->last_body().empty());
     BOOST_TEST(all.find("job/1")->last_line().empty());
-    b.room = 100;
+    b.capacity = 100;
     drain();
     BOOST_TEST(b.take().find("seq=1 ") != std::string::npos); // published before the retirement
     all.publish_body("job/1", "[3]");
@@ -354,33 +354,33 @@ BOOST_FIXTURE_TEST_CASE(a_value_for_which_nothing_can_go_is_busy_and_the_one_bef
 
 BOOST_FIXTURE_TEST_CASE(past_the_memory_a_slow_binder_misses_updates_before_a_publisher_is_refused, bounded) {
     recording_subscriber slow;
-    slow.room = 0;
+    slow.capacity = 0;
     all_->open("map").bind(slow, {.keep = 64});
     for (int i = 0; i < 50; ++i) {
         all_->publish_body("map", large(100'000));
         BOOST_TEST(memory.used() <= memory.limit() / 2 + 400'000);
     }
-    slow.room = 100;
+    slow.capacity = 100;
     cles::core::send_updates(unsent, *all_, clock.now());
     BOOST_TEST(counts.updates_shed > 0U);
     BOOST_TEST(slow.take().find(" seq=50 ") != std::string::npos);
 }
 
-BOOST_FIXTURE_TEST_CASE(what_waits_for_room_is_busy_rather_than_shed, bounded) {
+BOOST_FIXTURE_TEST_CASE(a_publication_that_waits_is_busy_rather_than_shed, bounded) {
     recording_subscriber slow;
-    slow.room = 0;
+    slow.capacity = 0;
     all_->open("map").bind(slow, {.keep = 64});
     bool refused = false;
     for (int i = 0; i < 50 && !refused; ++i) {
         auto [operation, result] = cles::test::record();
         try {
-            all_->publish_when_room("map", large(100'000), operation);
+            all_->publish_or_wait("map", large(100'000), operation);
         } catch (const cles::error& e) {
             refused = is_busy(e);
         }
     }
     BOOST_TEST(refused);
-    slow.room = 100;
+    slow.capacity = 100;
     cles::core::send_updates(unsent, *all_, clock.now());
     BOOST_TEST(counts.updates_shed == 0U);
 }
@@ -416,10 +416,10 @@ BOOST_AUTO_TEST_CASE(the_tasks_that_were_published_are_known) {
     BOOST_TEST(!all.knows("spee"));
 }
 
-BOOST_AUTO_TEST_SUITE(when_room)
+BOOST_AUTO_TEST_SUITE(publish_or_wait)
 
-BOOST_AUTO_TEST_CASE(it_publishes_at_once_if_there_is_room) {
-    BOOST_TEST(when_room("speed", "[1]") == nullptr);
+BOOST_AUTO_TEST_CASE(it_publishes_at_once_if_there_is_capacity) {
+    BOOST_TEST(publish_or_wait("speed", "[1]") == nullptr);
     BOOST_TEST(all.find("speed")->last_body() == "[1]");
 }
 
@@ -428,7 +428,7 @@ BOOST_AUTO_TEST_CASE(it_completes_through_the_completion_queue) {
     auto [operation, published] = cles::test::record();
     std::vector<std::string> seen;
     completions.call([&] { seen.push_back(published->ended ? "late" : "before"); });
-    BOOST_TEST(all.publish_when_room("speed", "[1]", operation));
+    BOOST_TEST(all.publish_or_wait("speed", "[1]", operation));
     completions.call([&] { seen.push_back(published->ended ? "behind" : "early"); });
     BOOST_TEST(!published->ended);
     BOOST_TEST(due.size() == 3U);
@@ -436,31 +436,31 @@ BOOST_AUTO_TEST_CASE(it_completes_through_the_completion_queue) {
     BOOST_TEST(seen == (std::vector<std::string>{"before", "behind"}), boost::test_tools::per_element());
     recording_subscriber slow;
     bind(slow, "speed", 1);
-    slow.room = 0;
-    when_room("speed", "[2]");
+    slow.capacity = 0;
+    publish_or_wait("speed", "[2]");
     drain();
     auto [waiting, withdrawn] = cles::test::record();
-    BOOST_TEST(!all.publish_when_room("speed", "[3]", waiting, 7));
+    BOOST_TEST(!all.publish_or_wait("speed", "[3]", waiting, 7));
     BOOST_TEST(all.cancel(7));
     BOOST_TEST(!withdrawn->ended);
     tell();
     BOOST_TEST((withdrawn->code == errc::cancelled));
 }
 
-BOOST_AUTO_TEST_CASE(it_waits_until_the_queue_of_every_subscriber_has_room) {
+BOOST_AUTO_TEST_CASE(it_waits_until_the_queue_of_every_subscriber_has_capacity) {
     recording_subscriber slow;
     recording_subscriber quick;
     bind(slow, "speed", 2);
     bind(quick, "speed", 2);
-    slow.room = 0;
-    BOOST_TEST(when_room("speed", "[1]") == nullptr);
-    BOOST_TEST(when_room("speed", "[2]") == nullptr);
+    slow.capacity = 0;
+    BOOST_TEST(publish_or_wait("speed", "[1]") == nullptr);
+    BOOST_TEST(publish_or_wait("speed", "[2]") == nullptr);
     drain();
-    const auto third = when_room("speed", "[3]");
+    const auto third = publish_or_wait("speed", "[3]");
     BOOST_REQUIRE(third != nullptr);
     BOOST_TEST(!third->ended);
     BOOST_TEST(all.find("speed")->seq() == 2U);
-    slow.room = 100;
+    slow.capacity = 100;
     drain(); // nothing is new, so nothing is drained
     all.find("speed")->drain(clock.now());
     all.admit(*all.find("speed"));
@@ -476,13 +476,13 @@ BOOST_AUTO_TEST_CASE(it_waits_until_the_queue_of_every_subscriber_has_room) {
 BOOST_AUTO_TEST_CASE(waiting_updates_are_published_in_order) {
     recording_subscriber slow;
     bind(slow, "speed", 1);
-    slow.room = 0;
-    when_room("speed", "[1]");
+    slow.capacity = 0;
+    publish_or_wait("speed", "[1]");
     drain();
-    const auto second = when_room("speed", "[2]");
-    const auto third = when_room("speed", "[3]");
+    const auto second = publish_or_wait("speed", "[2]");
+    const auto third = publish_or_wait("speed", "[3]");
     BOOST_REQUIRE((second && third));
-    slow.room = 100;
+    slow.capacity = 100;
     auto& noun = *all.find("speed");
     noun.drain(clock.now());
     all.admit(noun);
@@ -501,25 +501,25 @@ BOOST_AUTO_TEST_CASE(waiting_updates_are_published_in_order) {
 BOOST_AUTO_TEST_CASE(a_later_update_does_not_overtake) {
     recording_subscriber slow;
     bind(slow, "speed", 1);
-    slow.room = 0;
-    when_room("speed", "[1]");
+    slow.capacity = 0;
+    publish_or_wait("speed", "[1]");
     drain();
-    when_room("speed", "[2]");
-    slow.room = 100;
-    all.find("speed")->drain(clock.now()); // there is room, but the next has not been published yet
-    BOOST_TEST(when_room("speed", "[3]") != nullptr);
+    publish_or_wait("speed", "[2]");
+    slow.capacity = 100;
+    all.find("speed")->drain(clock.now()); // there is capacity, but the next has not been published yet
+    BOOST_TEST(publish_or_wait("speed", "[3]") != nullptr);
 }
 
 BOOST_AUTO_TEST_CASE(an_update_that_cannot_be_published_fails_in_its_turn) {
     fixture small{cles::limits{.line = 100}};
     recording_subscriber slow;
     small.bind(slow, "speed", 1);
-    slow.room = 0;
-    small.when_room("speed", "[1]");
+    slow.capacity = 0;
+    small.publish_or_wait("speed", "[1]");
     small.drain();
-    const auto large = small.when_room("speed", "[\"" + std::string(100, 'x') + "\"]");
-    const auto next = small.when_room("speed", "[3]");
-    slow.room = 100;
+    const auto large = small.publish_or_wait("speed", "[\"" + std::string(100, 'x') + "\"]");
+    const auto next = small.publish_or_wait("speed", "[3]");
+    slow.capacity = 100;
     auto& noun = *small.all.find("speed");
     noun.drain(small.clock.now());
     small.all.admit(noun);
@@ -532,10 +532,10 @@ BOOST_AUTO_TEST_CASE(an_update_that_cannot_be_published_fails_in_its_turn) {
 BOOST_AUTO_TEST_CASE(waiting_updates_can_be_removed_when_the_node_stops) {
     recording_subscriber slow;
     bind(slow, "speed", 1);
-    slow.room = 0;
-    when_room("speed", "[1]");
+    slow.capacity = 0;
+    publish_or_wait("speed", "[1]");
     drain();
-    const auto second = when_room("speed", "[2]");
+    const auto second = publish_or_wait("speed", "[2]");
     {
         auto taken = all.take_waiters();
         BOOST_TEST(taken.size() == 1U);

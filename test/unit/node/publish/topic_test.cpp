@@ -125,10 +125,10 @@ BOOST_AUTO_TEST_CASE(binding_again_replaces_the_binding) {
     publish(1, 1);
     drain();
     BOOST_TEST(numbers(b.take()) == "1"); // once
-    b.room = 0;
+    b.capacity = 0;
     publish(2, 6);
     drain();
-    b.room = 100;
+    b.capacity = 100;
     drain();
     BOOST_TEST(numbers(b.take()) == "5 6");
     BOOST_TEST(speed.unbind(b));
@@ -140,11 +140,11 @@ BOOST_AUTO_TEST_SUITE(slow_binders)
 BOOST_AUTO_TEST_CASE(a_slow_subscriber_gets_pending_updates_later) {
     recording_subscriber b;
     speed.bind(b, {});
-    b.room = 0;
+    b.capacity = 0;
     publish(1, 3);
     drain();
     BOOST_TEST(b.take().empty());
-    b.room = 100;
+    b.capacity = 100;
     speed.find(b)->drain(clock.now());
     BOOST_TEST(numbers(b.take()) == "1 2 3");
     BOOST_TEST(counts.updates_shed == 0U);
@@ -153,12 +153,12 @@ BOOST_AUTO_TEST_CASE(a_slow_subscriber_gets_pending_updates_later) {
 BOOST_AUTO_TEST_CASE(beyond_keep_the_oldest_is_dropped_and_the_newest_is_sent) {
     recording_subscriber b;
     speed.bind(b, {.keep = 3});
-    b.room = 0;
+    b.capacity = 0;
     for (std::uint64_t n = 1; n <= 10; ++n) {
         publish(n, n);
         drain();
     }
-    b.room = 100;
+    b.capacity = 100;
     drain();
     BOOST_TEST(numbers(b.take()) == "8 9 10");
     BOOST_TEST(counts.updates_shed == 7U);
@@ -168,10 +168,10 @@ BOOST_AUTO_TEST_CASE(beyond_keep_the_oldest_is_dropped_and_the_newest_is_sent) {
 BOOST_AUTO_TEST_CASE(keep_applies_to_bursts_too) {
     recording_subscriber b;
     speed.bind(b, {.keep = 3});
-    b.room = 0;
+    b.capacity = 0;
     publish(1, 10);
     drain();
-    b.room = 100;
+    b.capacity = 100;
     drain();
     BOOST_TEST(numbers(b.take()) == "8 9 10");
 }
@@ -179,10 +179,10 @@ BOOST_AUTO_TEST_CASE(keep_applies_to_bursts_too) {
 BOOST_AUTO_TEST_CASE(keep_is_64_by_default) {
     recording_subscriber b;
     speed.bind(b, {});
-    b.room = 0;
+    b.capacity = 0;
     publish(1, 65);
     drain();
-    b.room = 100;
+    b.capacity = 100;
     drain();
     const auto got = numbers(b.take());
     BOOST_TEST(got.starts_with("2 3 "), got);
@@ -192,11 +192,11 @@ BOOST_AUTO_TEST_CASE(keep_is_64_by_default) {
 BOOST_AUTO_TEST_CASE(a_keep_of_1_holds_only_the_newest) {
     recording_subscriber b;
     speed.bind(b, {.keep = 1});
-    b.room = 0;
+    b.capacity = 0;
     publish(1, 3);
     drain();
     publish(4, 4);
-    b.room = 1;
+    b.capacity = 1;
     drain();
     BOOST_TEST(numbers(b.take()) == "4");
 }
@@ -206,12 +206,12 @@ BOOST_AUTO_TEST_CASE(each_subscriber_has_its_own_keep) {
     recording_subscriber much;
     speed.bind(little, {.keep = 2});
     speed.bind(much, {.keep = 5});
-    little.room = much.room = 0;
+    little.capacity = much.capacity = 0;
     for (std::uint64_t n = 1; n <= 9; ++n) {
         publish(n, n);
         drain();
     }
-    little.room = much.room = 10;
+    little.capacity = much.capacity = 10;
     drain();
     BOOST_TEST(numbers(little.take()) == "8 9");
     BOOST_TEST(numbers(much.take()) == "5 6 7 8 9");
@@ -222,7 +222,7 @@ BOOST_AUTO_TEST_CASE(a_slow_subscriber_does_not_affect_others) {
     recording_subscriber quick;
     speed.bind(slow, {.keep = 2});
     speed.bind(quick, {.keep = 2});
-    slow.room = 0;
+    slow.capacity = 0;
     std::string got;
     for (std::uint64_t n = 1; n <= 9; ++n) {
         publish(n, n);
@@ -230,7 +230,7 @@ BOOST_AUTO_TEST_CASE(a_slow_subscriber_does_not_affect_others) {
         got += numbers(quick.take());
     }
     BOOST_TEST(got == "123456789");
-    slow.room = 1;
+    slow.capacity = 1;
     drain();
     BOOST_TEST(numbers(slow.take()) == "8 9");
 }
@@ -239,12 +239,12 @@ BOOST_AUTO_TEST_CASE(the_bytes_that_a_binding_queues_are_limited) {
     fixture small{2500};
     recording_subscriber b;
     small.speed.bind(b, {.keep = 65'536});
-    b.room = 0;
+    b.capacity = 0;
     for (int i = 0; i < 9; ++i) {
         small.publish(std::string(994, static_cast<char>('0' + i))); // 1000 bytes per line
         small.drain();
     }
-    b.room = 100;
+    b.capacity = 100;
     small.drain();
     const auto got = b.take();
     BOOST_TEST(got.size() == 2000U);
@@ -257,11 +257,11 @@ BOOST_AUTO_TEST_CASE(the_newest_is_sent_even_if_it_is_larger_than_the_queue) {
     fixture small{2500};
     recording_subscriber b;
     small.speed.bind(b, {});
-    b.room = 0;
+    b.capacity = 0;
     small.publish(1, 3);
     small.publish(std::string(5000, '4'));
     small.drain();
-    b.room = 100;
+    b.capacity = 100;
     small.drain();
     BOOST_TEST(b.take().size() == 5006U);
 }
@@ -269,16 +269,16 @@ BOOST_AUTO_TEST_CASE(the_newest_is_sent_even_if_it_is_larger_than_the_queue) {
 BOOST_AUTO_TEST_CASE(large_output_is_sent_in_pieces_so_that_a_subscriber_can_stop_it) {
     recording_subscriber b;
     speed.bind(b, {.keep = 1000});
-    b.room = 0;
+    b.capacity = 0;
     for (int i = 0; i < 400; ++i) {
         publish(std::string(1000, 'x'));
     }
-    b.room = 1;
+    b.capacity = 1;
     drain();
     const auto piece = b.take().size();
     BOOST_TEST(piece > 1000U);
     BOOST_TEST(piece <= 65'536U);
-    b.room = 1000;
+    b.capacity = 1000;
     drain();
     BOOST_TEST(piece + b.take().size() == 400U * 1006U);
 }
@@ -300,7 +300,7 @@ BOOST_AUTO_TEST_CASE(no_update_is_lost_or_repeated_while_its_number_is_within_ke
         }
         n += more;
         for (auto& b : binders) {
-            b.room = i % 4 == 3 ? 1000 : random() % 2; // catches up within 40 updates
+            b.capacity = i % 4 == 3 ? 1000 : random() % 2; // catches up within 40 updates
         }
         drain();
         for (std::size_t k = 0; k < binders.size(); ++k) {
@@ -358,12 +358,12 @@ BOOST_AUTO_TEST_CASE(the_interval_counts_from_the_last_update_that_was_sent) {
 BOOST_AUTO_TEST_CASE(a_slow_subscriber_gets_the_newest_when_it_takes_it) {
     recording_subscriber b;
     speed.bind(b, {.every = 100ms});
-    b.room = 0;
+    b.capacity = 0;
     publish(1, 5);
     drain();
     pass(1h);
     BOOST_TEST(b.take().empty());
-    b.room = 10;
+    b.capacity = 10;
     speed.find(b)->drain(clock.now());
     BOOST_TEST(numbers(b.take()) == "5");
 }
@@ -440,58 +440,58 @@ BOOST_AUTO_TEST_CASE(binding_again_with_every_takes_effect_at_once) {
 
 BOOST_AUTO_TEST_SUITE_END()
 
-BOOST_AUTO_TEST_SUITE(room)
+BOOST_AUTO_TEST_SUITE(capacity)
 
-BOOST_AUTO_TEST_CASE(there_is_room_if_no_subscriber_takes_every_update) {
-    BOOST_TEST(speed.has_room());
+BOOST_AUTO_TEST_CASE(there_is_capacity_if_no_subscriber_needs_every_update) {
+    BOOST_TEST(speed.has_capacity());
     recording_subscriber b;
-    b.room = 0;
+    b.capacity = 0;
     speed.bind(b, {.every = 100ms, .keep = 1});
     publish(1, 10);
     drain();
-    BOOST_TEST(speed.has_room());
+    BOOST_TEST(speed.has_capacity());
 }
 
-BOOST_AUTO_TEST_CASE(there_is_room_until_the_slowest_queue_is_full) {
+BOOST_AUTO_TEST_CASE(there_is_capacity_until_the_slowest_queue_is_full) {
     recording_subscriber quick;
     recording_subscriber slow;
     speed.bind(quick, {.keep = 100});
     speed.bind(slow, {.keep = 3});
-    slow.room = 0;
+    slow.capacity = 0;
     for (std::uint64_t n = 1; n <= 3; ++n) {
-        BOOST_TEST(speed.has_room());
+        BOOST_TEST(speed.has_capacity());
         publish(n, n);
         drain();
     }
-    BOOST_TEST(!speed.has_room());
-    slow.room = 10;
+    BOOST_TEST(!speed.has_capacity());
+    slow.capacity = 10;
     drain();
-    BOOST_TEST(speed.has_room());
+    BOOST_TEST(speed.has_capacity());
     BOOST_TEST(numbers(slow.take()) == "1 2 3");
 }
 
-BOOST_AUTO_TEST_CASE(there_is_no_room_if_the_bytes_do_not_fit) {
+BOOST_AUTO_TEST_CASE(there_is_no_capacity_if_the_bytes_do_not_fit) {
     fixture small{4000};
     recording_subscriber b;
     small.speed.bind(b, {.keep = 1000});
-    b.room = 0;
+    b.capacity = 0;
     small.publish(std::string(2000, 'x'));
     small.drain();
-    BOOST_TEST(!small.speed.has_room());
-    b.room = 10;
+    BOOST_TEST(!small.speed.has_capacity());
+    b.capacity = 10;
     small.drain();
-    BOOST_TEST(small.speed.has_room());
+    BOOST_TEST(small.speed.has_capacity());
 }
 
-BOOST_AUTO_TEST_CASE(unbinding_the_slow_subscriber_makes_room) {
+BOOST_AUTO_TEST_CASE(unbinding_the_slow_subscriber_frees_capacity) {
     recording_subscriber slow;
     speed.bind(slow, {.keep = 1});
-    slow.room = 0;
+    slow.capacity = 0;
     publish(1, 1);
     drain();
-    BOOST_TEST(!speed.has_room());
+    BOOST_TEST(!speed.has_capacity());
     speed.unbind(slow);
-    BOOST_TEST(speed.has_room());
+    BOOST_TEST(speed.has_capacity());
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -141,7 +141,7 @@ BOOST_AUTO_TEST_CASE(each_client_is_thinned_and_queued_separately) {
         drain();
     }
     BOOST_TEST(link.take_lines().size() == 5U);
-    slow.make_room();
+    slow.make_writable();
     const auto late = slow.take_lines();
     BOOST_REQUIRE_EQUAL(late.size(), 2U); // the newest two, and a gap in `seq` before them
     BOOST_TEST(late[0].find("seq=4 ") != std::string::npos);

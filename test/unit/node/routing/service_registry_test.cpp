@@ -157,7 +157,7 @@ BOOST_AUTO_TEST_CASE(many_names_at_a_closed_port_cause_few_queries) {
         fail_all();
     }
     BOOST_TEST(ways.count() <= 10U); // one at a time, after growing pauses
-    leave("fake0");                  // there is room again
+    leave("fake0");                  // there is capacity again
     offer("car2", task("PULL", "speed"));
     BOOST_TEST(offered_by(verb::pull, "speed") == "car2");
 }

@@ -219,12 +219,12 @@ BOOST_AUTO_TEST_CASE(no_thinned_update_follows_an_unbinds_reply) {
     BOOST_TEST(link.take().empty());
 }
 
-BOOST_AUTO_TEST_CASE(no_update_that_waited_for_room_follows_an_unbinds_reply) {
+BOOST_AUTO_TEST_CASE(no_update_that_waited_follows_an_unbinds_reply) {
     link.ask("BIND car1:pose");
     link.takes = false;
     node.publish_now("pose", "[1]");
     BOOST_TEST(link.ask("BIND car1:pose lease=0") == "{}\n");
-    link.make_room();
+    link.make_writable();
     BOOST_TEST(link.take().empty());
 }
 
@@ -250,7 +250,7 @@ BOOST_AUTO_TEST_CASE(the_oldest_is_dropped_and_the_seq_shows_the_gap) {
         node.publish_now("pose", body);
     }
     BOOST_TEST(link.take().empty());
-    link.make_room();
+    link.make_writable();
     BOOST_TEST(link.take() == update("pose", 4, "[4]") + update("pose", 5, "[5]"));
     BOOST_TEST(node.counts().updates_shed == 2U);
 }
@@ -286,10 +286,10 @@ BOOST_AUTO_TEST_CASE(a_waiting_publisher_continues_when_the_slow_subscriber_take
     link.takes = false;
     node.publish_now("pose", "[1]");
     auto [operation, result] = cles::test::record();
-    BOOST_TEST(!node.host->published.publish_when_room("pose", "[2]", operation));
+    BOOST_TEST(!node.host->published.publish_or_wait("pose", "[2]", operation));
     node.drain();
     BOOST_TEST(!result->ended);
-    link.make_room();
+    link.make_writable();
     node.drain();
     BOOST_TEST(result->ended);
     node.drain();
@@ -306,7 +306,7 @@ BOOST_AUTO_TEST_CASE(a_waiting_publisher_continues_when_the_slow_subscriber_leav
         slow.takes = false;
         waits.publish_now("pose", "[1]");
         auto [operation, result] = cles::test::record();
-        BOOST_TEST(!waits.host->published.publish_when_room("pose", "[2]", operation));
+        BOOST_TEST(!waits.host->published.publish_or_wait("pose", "[2]", operation));
         if (by_reset) {
             slow.reset();
         } else {

@@ -249,7 +249,7 @@ BOOST_AUTO_TEST_CASE(all_parts_add_up) {
             adds_up();
         }
     }
-    a->make_room();
+    a->make_writable();
     adds_up();
     node.pass(std::chrono::milliseconds{1000});
     adds_up();

@@ -39,7 +39,7 @@ struct fixture {
     /// Opens a link from that address; "busy" if it is refused.
     peer& open(const std::string& name, std::string_view address) {
         auto& made = peers.emplace_back(*this, name);
-        if (admission.make_room(address, clock.now())) {
+        if (admission.ensure_capacity(address, clock.now())) {
             admission.enter(made.watch, address);
         } else {
             made.name = "busy";
