@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Bindings in the group whose handler decides later.
+// Bindings in the group that are pending until their handler decides.
 #include <cles/error.hpp>
 
 #include "node/publish/multicast_group.hpp"

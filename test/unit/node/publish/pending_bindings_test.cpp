@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Bindings on a link whose handler decides later.
+// Bindings on a link that are pending until their handler decides.
 #include <cles/error.hpp>
 
 #include "support/session_fixture.hpp"
@@ -8,7 +8,7 @@
 
 #include <string>
 
-namespace bind_decision {
+namespace pending_bindings {
 namespace {
 
 using cles::verb;
@@ -22,9 +22,9 @@ struct fixture {
 };
 
 } // namespace
-} // namespace bind_decision
+} // namespace pending_bindings
 
-BOOST_FIXTURE_TEST_SUITE(bind_decision, fixture)
+BOOST_FIXTURE_TEST_SUITE(pending_bindings, fixture)
 
 BOOST_AUTO_TEST_CASE(it_is_bound_only_when_the_handler_accepts) {
     BOOST_TEST(link.ask("BIND car1:pose/fast id=7").empty());
