@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Where links come in while the process or the system has run out of something.
+// Incoming links while the process or the system has run out of a resource.
 
 #include "support/link_pair.hpp"
 #include "support/run_until.hpp"
@@ -25,7 +25,7 @@ std::atomic<int> attempts{0};
 
 } // namespace
 
-// In place of the C library's, for all of this program: fails where a test wants it to.
+// Replaces the C library's function in the whole program: fails when a test requires it.
 extern "C" int accept(int descriptor, sockaddr* address, socklen_t* length) {
     using function = int (*)(int, sockaddr*, socklen_t*);
     static const auto real = reinterpret_cast<function>(::dlsym(RTLD_NEXT, "accept"));
@@ -48,7 +48,7 @@ const auto shortages = boost::unit_test::data::make({EMFILE, ENFILE, ENOBUFS, EN
 
 } // namespace
 
-// The connection stays in the queue, so that the socket is readable all the time.
+// The connection stays in the queue, so the socket remains readable.
 BOOST_DATA_TEST_CASE(it_does_not_spin_and_goes_on_when_the_shortage_is_over, shortages, error) {
     link_pair pair{carrier::tcp4};
     attempts = 0;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a link keeps to that carries each line as a datagram.
+// The guarantees of a link that carries each line as a datagram.
 
 #include <cles/error.hpp>
 
@@ -31,7 +31,7 @@ using asio::ip::udp;
 
 namespace {
 
-/// A socket that is no link, to send what no link sends.
+/// A plain socket that sends what a link never sends.
 struct plain_socket {
     plain_socket(asio::io_context& io, const cles::url& where)
         : to{asio::ip::make_address(where.host), where.port}, socket{io, to.protocol()} {}
@@ -92,7 +92,7 @@ BOOST_DATA_TEST_CASE(several_lines_in_one_datagram_are_handed_over_as_they_came,
     pair.accept();
     pair.far.start();
     pair.until([&] { return pair.far.lines() == 1; });
-    BOOST_TEST(pair.far.events->lines[0] == "one\ntwo"); // the session's to refuse
+    BOOST_TEST(pair.far.events->lines[0] == "one\ntwo"); // the session refuses it
 }
 
 BOOST_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_nobody_comes_in_by_it, every_datagram, kind) {
@@ -150,7 +150,7 @@ BOOST_DATA_TEST_CASE(each_source_is_a_link_of_its_own, every_datagram, kind) {
     }
 }
 
-// A link that is started when its first datagram comes, as services do, must not read the next one over it.
+// A link that is started when its first datagram arrives, as services do, must not overwrite it with the next one.
 BOOST_AUTO_TEST_CASE(what_waits_behind_the_first_datagram_of_a_source_leaves_it_whole) {
     asio::io_context io;
     const auto where = cles::parse_url(fresh_address(carrier::udp4));
@@ -168,7 +168,7 @@ BOOST_AUTO_TEST_CASE(what_waits_behind_the_first_datagram_of_a_source_leaves_it_
 BOOST_DATA_TEST_CASE(a_link_that_was_dialled_hears_its_peer_alone, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
-    // What the port of the near end is, the far end knows.
+    // The port of the near end is known to the far end.
     const auto near = cles::parse_url(pair.far.link->peer().address);
     plain_socket stranger{pair.io, near};
     stranger.send("a stranger's word");
@@ -193,7 +193,7 @@ BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_datagram, kind) {
             asio::post(pair.io, [&] { seen_by_others = pair.far.events->lines.size(); });
         }
     };
-    pair.near.say(text); // as much as the kernel holds; the rest is lost
+    pair.near.say(text); // as much as the kernel buffers; the rest is lost
     pair.until([&] { return pair.far.lines() > 300; });
     BOOST_TEST(others_had_a_turn);
     BOOST_TEST(seen_by_others > 0U);
@@ -225,7 +225,7 @@ BOOST_DATA_TEST_CASE(nobody_listening_is_no_error_but_silence, every_datagram, k
     pair.until([&] { return made != nullptr; });
     pair.near.link = std::exchange(made, nullptr);
     pair.near.start();
-    for (int i = 0; i < 5; ++i) { // the network says that they are refused
+    for (int i = 0; i < 5; ++i) { // the network reports that they are refused
         pair.near.say("hello?\n");
         run_ready(pair.io);
     }
@@ -234,7 +234,7 @@ BOOST_DATA_TEST_CASE(nobody_listening_is_no_error_but_silence, every_datagram, k
     const auto back = pair.transport().listen(other.get_executor(), pair.address(), pair.bounds());
     cles::link_ptr arrived;
     back->start([&](cles::link_ptr link) { arrived = std::move(link); });
-    pair.near.say("hello again\n"); // and when somebody listens again, it goes on
+    pair.near.say("hello again\n"); // with a listener again, the link continues
     run_until(other, [&] { return arrived != nullptr; });
     arrived->close();
 }
@@ -271,7 +271,7 @@ BOOST_DATA_TEST_CASE(to_finish_is_to_send_what_is_left_and_to_be_lost, every_dat
     pair.until([&] { return pair.far.lines() == 1; });
     pair.far.link->output().append("bye\n");
     pair.far.link->finish();
-    BOOST_TEST(!pair.far.lost()); // never from inside the call
+    BOOST_TEST(!pair.far.lost()); // never inside the call
     pair.until([&] { return pair.far.lost() && pair.near.lines() == 1; });
     BOOST_TEST(pair.far.events->in_order());
 }
@@ -290,10 +290,10 @@ BOOST_DATA_TEST_CASE(an_owner_may_close_the_link_from_inside_its_line, every_dat
     BOOST_TEST(pair.far.events->calls == "l");
 }
 
-// Else whoever limits what leaves, and counts it when he flushes, would count it again or not at all.
+// Otherwise a caller that limits its output, and counts it on each flush, would count it again or not at all.
 BOOST_AUTO_TEST_CASE(flushed_output_is_consumed_even_if_the_socket_is_not_writable) {
     asio::io_context io;
-    std::array<int, 2> ends{}; // of a kind of datagram that waits for its reader
+    std::array<int, 2> ends{}; // datagrams of a kind that wait for their reader
     BOOST_REQUIRE(::socketpair(AF_UNIX, SOCK_DGRAM, 0, ends.data()) == 0);
     const auto port = std::make_shared<cles::transport::udp_port>(udp::socket{io, udp::v4(), ends[0]});
     const auto link = port->connect_link({asio::ip::address_v4::loopback(), 1},

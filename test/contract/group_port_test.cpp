@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a multicast group is heard and spoken to by. Over loopback, with a port of the test's own.
+// Receiving from and sending to a multicast group, over loopback, with a separate port for this test.
 #include "support/group_address.hpp"
 #include "support/run_until.hpp"
 #include "transport/group_port.hpp"
@@ -89,7 +89,7 @@ BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixtu
     BOOST_TEST(!two.said[1]);
 }
 
-// Each hears it in a function of its own.
+// Each receives it in a separate function.
 BOOST_FIXTURE_TEST_CASE(what_one_does_about_a_datagram_is_done_before_the_next_hears_it, fixture) {
     member one{io, where};
     member two{io, where};
@@ -117,7 +117,7 @@ BOOST_FIXTURE_TEST_CASE(who_is_alone_on_its_executor_does_not_hear_itself, fixtu
     run_ready(elsewhere);
     BOOST_TEST(one.heard[0] == "2\n");
     BOOST_TEST(two.heard.size() == 1U);
-    { // two of them share what they hear, and what one sends the other hears
+    { // two of them share what they receive, and each receives what the other sends
         member three{io, where};
         one.port->send("3\n");
         run_until(io, [&] { return three.heard.size() == 1; });
@@ -148,7 +148,7 @@ BOOST_FIXTURE_TEST_CASE(the_shared_port_serves_the_group_alone, fixture) {
 BOOST_FIXTURE_TEST_CASE(datagrams_keep_their_order_and_their_bounds, fixture) {
     member one{io, where};
     member two{io, where};
-    for (int i = 0; i < 300; ++i) { // more than a turn hands over
+    for (int i = 0; i < 300; ++i) { // more than one turn delivers
         one.port->send(std::to_string(i) + "\n");
     }
     run_until(io, [&] { return two.heard.size() == 300; });
@@ -174,7 +174,7 @@ BOOST_FIXTURE_TEST_CASE(lines_sent_together_are_a_datagram_each, fixture) {
 BOOST_FIXTURE_TEST_CASE(a_line_that_cannot_be_sent_is_lost_alone, fixture) {
     member one{io, where};
     member two{io, where};
-    const std::string lines = "1\n" + std::string(70'000, 'x') + "\n2\n"; // more than UDP carries
+    const std::string lines = "1\n" + std::string(70'000, 'x') + "\n2\n"; // exceeds the maximum of UDP
     BOOST_TEST(one.port->send(lines).bytes == lines.size());
     run_until(io, [&] { return two.heard.size() == 2; });
     BOOST_TEST(two.heard == (std::vector<std::string>{"1\n", "2\n"}), boost::test_tools::per_element());
@@ -189,7 +189,7 @@ BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_hears_hears_no_more, fixtu
     run_until(io, [&] { return one.heard.size() == 2; });
     run_ready(io);
     BOOST_TEST(two.heard.size() == 1U);
-    BOOST_TEST(two.port->send("into the void\n").bytes == 14U); // as good as lost on its way
+    BOOST_TEST(two.port->send("into the void\n").bytes == 14U); // treated as lost in the network
 }
 
 BOOST_FIXTURE_TEST_CASE(what_one_member_throws_keeps_nothing_from_the_others, fixture) {

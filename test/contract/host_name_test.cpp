@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A host that has a name: looked up beside the loop, which goes on meanwhile.
+// A host name is resolved in parallel with the event loop, which continues meanwhile.
 
 #include "support/link_pair.hpp"
 #include "support/run_until.hpp"
@@ -25,8 +25,8 @@
 
 namespace {
 
-/// The system's resolver as this test wants it: names that end in ".slow.test" wait until they are let go, others in
-/// ".test" are this host.
+/// Replaces the system's resolver: names that end in ".slow.test" wait until they are released; others in ".test"
+/// resolve to this host.
 class resolver_stand_in {
   public:
     static resolver_stand_in& get() {
@@ -55,7 +55,7 @@ class resolver_stand_in {
 
 } // namespace
 
-// In place of the C library's, for all of this program.
+// Replaces the C library's function in the whole program.
 extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo* hints, addrinfo** result) {
     using function = int (*)(const char*, const char*, const addrinfo*, addrinfo**);
     static const auto real = reinterpret_cast<function>(::dlsym(RTLD_NEXT, "getaddrinfo"));
@@ -81,7 +81,7 @@ std::ptrdiff_t threads() {
     return std::distance(std::filesystem::directory_iterator{"/proc/self/task"}, std::filesystem::directory_iterator{});
 }
 
-/// While it lives, slow names are slow.
+/// While it exists, slow names are slow.
 struct slowness {
     slowness() { resolver_stand_in::get().hold(); }
     ~slowness() { resolver_stand_in::get().let_go(); }
@@ -147,14 +147,14 @@ BOOST_DATA_TEST_CASE(a_lookup_that_is_given_up_says_nothing_any_more, schemes, s
     asio::io_context io;
     auto names = std::make_unique<slowness>();
     dialled one{io, scheme + "://car1.slow.test:4000"};
-    dialled next{io, scheme + "://car2.slow.test:4000"}; // which waits for the other's answer
+    dialled next{io, scheme + "://car2.slow.test:4000"}; // waits for the reply of the other lookup
     run_ready(io);
     one.give_up();
     next.give_up();
     run_ready(io);
     names.reset();
     io.restart();
-    io.run(); // until the system has answered
+    io.run(); // until the system has replied
     BOOST_TEST(one.calls == 0);
     BOOST_TEST(next.calls == 0);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// How a link ends, whatever carries it.
+// How a link ends, for every transport.
 
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
@@ -34,7 +34,7 @@ BOOST_DATA_TEST_CASE(finish_writes_what_is_left_and_both_ends_see_the_end, every
     pair.near.run([&] {
         pair.near.link->output().append(many_lines(3000));
         pair.near.link->finish();
-        pair.near.link->finish(); // twice is once
+        pair.near.link->finish(); // a second call has no effect
     });
     pair.until([&] { return pair.far.run([&] { return pair.far.events->has('e'); }); });
     BOOST_TEST(pair.far.lines() == 3000U);
@@ -43,7 +43,7 @@ BOOST_DATA_TEST_CASE(finish_writes_what_is_left_and_both_ends_see_the_end, every
     pair.until([&] { return pair.near.lost() && pair.far.lost(); });
     BOOST_TEST(pair.near.events->in_order());
     BOOST_TEST(pair.far.run([&] { return pair.far.events->in_order(); }));
-    BOOST_TEST(!pair.near.events->has('e')); // what comes after its own goodbye is of no interest
+    BOOST_TEST(!pair.near.events->has('e')); // events after its own end are not examined
 }
 
 BOOST_DATA_TEST_CASE(finish_at_both_ends_at_once_ends_the_link, every_carrier, kind) {
@@ -63,7 +63,7 @@ BOOST_DATA_TEST_CASE(finish_does_not_wait_for_a_peer_that_stays, every_carrier, 
 }
 
 BOOST_DATA_TEST_CASE(finish_discards_what_the_peer_still_sends, every_carrier, kind) {
-    link_pair pair{kind, {.discard = patience}}; // however slow this machine is
+    link_pair pair{kind, {.discard = patience}}; // even on a slow machine
     pair.open();
     pair.far.say(many_lines(200));
     pair.near.run([&] {
@@ -107,7 +107,7 @@ BOOST_DATA_TEST_CASE(after_the_peers_end_there_is_still_writing, every_carrier, 
     BOOST_TEST(pair.far.run([&] { return pair.far.link->sent(); }) == 10U);
 }
 
-// No read shows it any more.
+// Not detected by reading.
 BOOST_DATA_TEST_CASE(a_peer_that_vanishes_after_its_end_of_stream_is_noticed, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
@@ -119,10 +119,10 @@ BOOST_DATA_TEST_CASE(a_peer_that_vanishes_after_its_end_of_stream_is_noticed, ev
     pair.far.say("an update\n");
     BOOST_TEST(peer.line() == "an update");
     run_ready(pair.io);
-    BOOST_TEST(!pair.far.lost()); // it reads on
+    BOOST_TEST(!pair.far.lost()); // it still reads
 
     peer.close();
-    if (kind == carrier::tcp4 || kind == carrier::tcp6) { // of TCP only something that is sent there shows it
+    if (kind == carrier::tcp4 || kind == carrier::tcp6) { // with TCP, only sending detects it
         run_ready(pair.io);
         BOOST_TEST(!pair.far.lost());
         pair.far.say("\n");
@@ -197,7 +197,7 @@ BOOST_DATA_TEST_CASE(all_calls_on_a_closed_link_do_nothing, every_carrier, kind)
     BOOST_TEST(pair.far.lines() == 0U);
 }
 
-// Every callback but `on_writable` and `on_overlong`, which have cases of their own below.
+// Every callback except `on_writable` and `on_overlong`, which have separate cases below.
 BOOST_DATA_TEST_CASE(close_from_inside_a_callback_is_the_end,
                      every_carrier* boost::unit_test::data::make({'l', 'b', 'e', 'x'}), kind, at) {
     link_pair pair{kind};
@@ -269,7 +269,7 @@ BOOST_DATA_TEST_CASE(close_from_inside_on_writable_is_the_end, every_carrier, ki
     BOOST_TEST(pair.far.lines() == 8000U);
 }
 
-// Closes the link in the middle of a line and looks at that line again.
+// Closes the link in the middle of a line and accesses that line again.
 struct prying_owner final : cles::link_events {
     cles::link_ptr link{};
     bool finishing = false;
@@ -294,7 +294,7 @@ struct prying_owner final : cles::link_events {
     }
 };
 
-// A handler may stop its service and go on reading the request that it was given.
+// A handler may stop its service and continue to read its request.
 BOOST_DATA_TEST_CASE(a_line_stays_valid_for_its_call_even_if_the_link_is_closed_meanwhile,
                      every_carrier* boost::unit_test::data::make({false, true}) *
                          boost::unit_test::data::make({60, 101}),
@@ -363,7 +363,7 @@ BOOST_DATA_TEST_CASE(a_reset_is_a_loss, every_socket, kind) {
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
     pair.far.start();
-    pair.far.say("unread\n"); // a Unix socket is reset by closing it with something unread
+    pair.far.say("unread\n"); // closing a Unix socket with unread data resets it
     peer.send("one\n");
     pair.until([&] { return pair.far.lines() == 1; });
     peer.reset();
@@ -406,7 +406,7 @@ BOOST_DATA_TEST_CASE(a_write_to_a_peer_that_is_gone_is_a_loss_told_later, every_
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
     pair.far.start();
-    pair.far.link->pause(true); // so that the loss shows in writing
+    pair.far.link->pause(true); // so that writing detects the loss
     pair.far.say("unread\n");
     peer.reset();
     bool inside = false;
@@ -440,7 +440,7 @@ BOOST_DATA_TEST_CASE(links_may_go_with_everything_under_way, every_carrier, kind
         if (stage == 4) {
             pair.near.link->finish();
         }
-        if (stage == 5) { // without even closing
+        if (stage == 5) { // not even closed
             pair.near.link.reset();
             pair.far.run([&] { pair.far.link.reset(); });
             run_ready(pair.io);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What happens on a link, whatever carries it, when one end is slower than the other.
+// Flow control of a link when one end is slower than the other, for every transport.
 
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
@@ -40,7 +40,7 @@ BOOST_DATA_TEST_CASE(what_a_peer_does_not_read_waits_and_nothing_is_lost, every_
     run_ready(pair.io);
     BOOST_TEST(pair.near.link->unsent() > 0U);
     BOOST_TEST(!pair.near.events->has('r'));
-    pair.near.say("more\n"); // output that waits behind what waits already
+    pair.near.say("more\n"); // output queued behind pending output
     const auto unsent = pair.near.link->unsent();
     BOOST_TEST(unsent > 0U);
 
@@ -53,7 +53,7 @@ BOOST_DATA_TEST_CASE(what_a_peer_does_not_read_waits_and_nothing_is_lost, every_
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines.back(); }) == "more");
 }
 
-// As short lines and as long ones, of which one is on its way in any case.
+// As short lines and as long ones, one of which is always in transit.
 BOOST_DATA_TEST_CASE(what_is_urgent_passes_what_waits_and_breaks_no_line, every_socket* line_lengths, kind, length) {
     link_pair pair{kind};
     pair.open();
@@ -71,7 +71,7 @@ BOOST_DATA_TEST_CASE(what_is_urgent_passes_what_waits_and_breaks_no_line, every_
     pair.until([&] { return pair.far.lines() == count + 2; });
     auto lines = pair.far.run([&] { return pair.far.events->lines; });
     const auto first = std::find(lines.begin(), lines.end(), "first");
-    BOOST_REQUIRE((lines.end() - first > 2)); // some have been passed
+    BOOST_REQUIRE((lines.end() - first > 2)); // some have been delivered
     BOOST_TEST(*(first + 1) == "second");
     lines.erase(first, first + 2);
     for (std::size_t i = 0; i < count; ++i) {
@@ -120,7 +120,7 @@ BOOST_DATA_TEST_CASE(a_paused_link_hands_nothing_over_until_it_goes_on, every_ca
     run_ready(pair.io);
     BOOST_TEST(pair.far.lines() == 0U);
     pair.far.run([&] {
-        pair.far.link->pause(true); // twice is once
+        pair.far.link->pause(true); // a second call has no effect
         pair.far.link->pause(false);
     });
     pair.until([&] { return pair.far.lines() == 2; });
@@ -208,7 +208,7 @@ BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_socke
     pair.until([&] { return pair.far.lines() == 1; });
     pair.far.say(large);
     pair.until([&] { return pair.near.lines() == 1; });
-    // What is far too much goes at once, what may be needed again stays for a while.
+    // A very large buffer is freed at once; one that may be needed again is kept for a while.
     BOOST_TEST(buffered(pair.near) < 400'000U);
     BOOST_TEST(buffered(pair.far) < 400'000U);
     pair.near.run([&] { pair.near.link->shrink(); });
@@ -225,7 +225,7 @@ BOOST_DATA_TEST_CASE(nothing_is_lost_while_a_link_gives_back_memory, every_socke
     pair.open();
     for (std::size_t i = 0; i < 300; ++i) {
         const auto line = std::to_string(i) + std::string(i * 37, '.');
-        pair.near.say(line + "\n" + line.substr(0, line.size() / 2)); // the rest of it comes later
+        pair.near.say(line + "\n" + line.substr(0, line.size() / 2)); // the rest follows later
         pair.far.run([&] { pair.far.link->shrink(); });
         pair.near.say(line.substr(line.size() / 2) + "\n");
         pair.near.run([&] { pair.near.link->shrink(); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// How lines cross a link, whatever carries it.
+// How lines are delivered, for every transport.
 
 #include "support/link_pair.hpp"
 #include "support/scripted_peer.hpp"
@@ -25,7 +25,7 @@ std::vector<std::string> numbered_lines(std::size_t count, char mark) {
     return lines;
 }
 
-// Sends them some at a time, as handlers would.
+// Sends them in batches, as handlers do.
 void say_in_batches(link_end& from, const std::vector<std::string>& lines, std::size_t at_once) {
     std::string text;
     for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -89,7 +89,7 @@ BOOST_DATA_TEST_CASE(every_batch_ends_with_on_batch, every_carrier, kind) {
     BOOST_TEST(pair.far.run([&] { return pair.far.events->calls; }) == "lllblb");
 }
 
-// A link with thousands of lines to hand over must not keep others from their turn.
+// A link with thousands of lines to deliver must not delay other links.
 BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
@@ -182,7 +182,7 @@ BOOST_DATA_TEST_CASE(an_endless_line_is_told_as_soon_as_it_is_too_long, every_so
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();
     pair.far.start();
-    peer.send(std::string(5001, 'x')); // and no end of line
+    peer.send(std::string(5001, 'x')); // without an end of line
     pair.until([&] { return pair.far.events->has('o'); });
     BOOST_TEST(pair.far.lines() == 0U);
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Both ends of a TCP link notice a peer whose host is gone, within `limits::stall`: the system is told to look.
+// Both ends of a TCP link detect within `limits::stall` that the peer's host has failed: the system sends keepalive
+// probes.
 
 #include <cles/link.hpp>
 
@@ -26,7 +27,7 @@ using namespace std::chrono_literals;
 
 constexpr int descriptors = 1024;
 
-/// How the system looks whether the peer of a socket is there.
+/// How the system checks whether the peer of a socket is alive.
 struct watching {
     int keepalive = -1;
     int idle_s = -1;
@@ -48,7 +49,7 @@ int option(int fd, int level, int name) {
     return value;
 }
 
-/// Of each connected socket of this process that has this port on either side.
+/// For each connected socket of this process that has this port on either side.
 std::vector<watching> connected_at(std::uint16_t port) {
     std::vector<watching> found;
     for (int fd = 0; fd < descriptors; ++fd) {

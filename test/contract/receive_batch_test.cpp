@@ -20,7 +20,7 @@ using asio::ip::udp;
 
 struct fixture {
     void send(udp::socket& from, const std::string& text) { from.send_to(asio::buffer(text), here.local_endpoint()); }
-    /// All that is there, by as many fetches as it takes.
+    /// Everything that has arrived, in as many fetches as necessary.
     std::vector<std::string> take_all() {
         std::vector<std::string> texts;
         for (bool more = true; more;) {

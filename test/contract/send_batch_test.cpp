@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Lines become datagrams, however many go by one system call. Over loopback.
+// Each line becomes one datagram, even if several are sent by one system call. Over loopback.
 #include "transport/datagram_io.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -28,7 +28,7 @@ struct fixture {
         from.non_blocking(true);
         to.set_option(asio::socket_base::receive_buffer_size{1 << 20});
     }
-    /// How many calls it took.
+    /// The number of calls.
     int send_all(cles::transport::send_batch& burst, const std::vector<std::string>& lines) {
         std::string text;
         for (const auto& line : lines) {
@@ -49,7 +49,7 @@ struct fixture {
         cles::transport::send_batch burst{from};
         return send_all(burst, lines);
     }
-    /// How many datagrams came, and what is in them.
+    /// The number of datagrams that arrived, and their contents.
     std::vector<std::string> come() {
         std::vector<std::string> texts;
         for (bool more = true; more;) {
@@ -87,15 +87,15 @@ std::vector<std::string> lines_of(std::size_t count, std::size_t length) {
 BOOST_FIXTURE_TEST_SUITE(send_batch, fixture)
 
 BOOST_DATA_TEST_CASE(each_line_is_a_datagram_of_its_own, boost::unit_test::data::make({false, true}), together) {
-    if (together) { // as another socket of this library takes them; else as any program does
+    if (together) { // receives as another socket of this library does; otherwise as any program does
         cles::transport::receive_batch::prepare(to);
     }
     int taken_so = 0;
     socklen_t size = sizeof taken_so;
     const bool can = ::getsockopt(to.native_handle(), SOL_UDP, UDP_GRO, &taken_so, &size) == 0; // since Linux 5.0
     BOOST_TEST(taken_so == (can && together ? 1 : 0));
-    auto lines = lines_of(100, 80);                  // more than the system takes as one
-    for (const auto length : {70, 90, 90, 90, 80}) { // shorter, longer, alike, shorter again
+    auto lines = lines_of(100, 80);                  // more than the system accepts as one
+    for (const auto length : {70, 90, 90, 90, 80}) { // shorter, longer, equal, shorter again
         lines.push_back(lines_of(1, static_cast<std::size_t>(length)).front());
     }
     for (const auto& line : lines_of(70, 1200)) { // more bytes than one datagram may have
@@ -113,13 +113,13 @@ BOOST_DATA_TEST_CASE(each_line_is_a_datagram_of_its_own, boost::unit_test::data:
 }
 
 BOOST_AUTO_TEST_CASE(where_the_system_does_not_part_them_each_goes_alone) {
-    const int off = 1; // without checksums it cannot
+    const int off = 1; // without checksums it is not possible
     BOOST_REQUIRE(::setsockopt(from.native_handle(), SOL_SOCKET, SO_NO_CHECK, &off, sizeof off) == 0);
     cles::transport::receive_batch::prepare(to);
     cles::transport::send_batch burst{from};
     const auto lines = lines_of(40, 80);
     for (int i = 0; i < 2; ++i) {
-        BOOST_TEST(send_all(burst, lines) == 2); // the eight that one call leaves
+        BOOST_TEST(send_all(burst, lines) == 2); // the eight that remain after one call
         BOOST_TEST(come() == lines, boost::test_tools::per_element());
     }
 }
@@ -127,7 +127,7 @@ BOOST_AUTO_TEST_CASE(where_the_system_does_not_part_them_each_goes_alone) {
 BOOST_AUTO_TEST_CASE(one_that_cannot_be_sent_is_lost_alone) {
     auto lines = lines_of(3, 80);
     const auto sent = lines;
-    lines.insert(lines.begin() + 1, lines_of(1, 70'000).front()); // more than UDP carries
+    lines.insert(lines.begin() + 1, lines_of(1, 70'000).front()); // exceeds the maximum of UDP
     send_all(lines);
     BOOST_TEST(come() == sent, boost::test_tools::per_element());
 }

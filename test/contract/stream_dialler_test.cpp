@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A host of several addresses: each is tried, in their order.
+// A host with several addresses: they are tried in order.
 
 #include "support/run_until.hpp"
 #include "transport/stream_endpoint.hpp"
@@ -24,7 +24,7 @@ using cles::transport::stream_socket;
 const auto loopback = boost::asio::ip::address_v4::loopback();
 
 struct fixture {
-    // Dials, and tells how that ended: "link to 4711", or the failure's words.
+    // Dials, and returns the result: "link to 4711", or the message of the failure.
     std::string dial(std::vector<tcp::endpoint> where) {
         std::string ended;
         const auto identify = [](stream_socket& s) {

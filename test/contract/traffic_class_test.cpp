@@ -46,7 +46,7 @@ std::vector<int> classes_at(std::uint16_t port) {
     return found;
 }
 
-/// Links to a listener, both with a DSCP of their own.
+/// Links to a listener, both with their own DSCP.
 std::vector<int> classes_of(const std::string& scheme, const std::string& listening, const std::string& dialled) {
     asio::io_context io;
     auto* carrier = cles::find_transport(scheme);
@@ -82,7 +82,7 @@ BOOST_AUTO_TEST_CASE(each_end_of_a_tcp_link_marks_what_it_sends) {
     BOOST_TEST(classes_of("tcp", "", "?dscp=46") == (std::vector<int>{0, 0, expedited << 2}),
                boost::test_tools::per_element());
     BOOST_TEST(classes_of("tcp", "?dscp=8", "?dscp=46") == (std::vector<int>{0, 8 << 2, expedited << 2}),
-               boost::test_tools::per_element()); // the one that listens sends nothing
+               boost::test_tools::per_element()); // the listener sends nothing
 }
 
 BOOST_AUTO_TEST_CASE(each_end_of_a_udp_link_marks_what_it_sends) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// How links are made: listening, dialling, and who is at the other end.
+// How links are made: listening, dialling, and the identity of the peer.
 
 #include <cles/error.hpp>
 
@@ -81,7 +81,7 @@ BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, every_door, kind) {
     BOOST_TEST(far.address.starts_with(pair.address().scheme + "://"));
     BOOST_TEST(near.local);
     BOOST_TEST(far.local);
-    BOOST_TEST(near.name.empty()); // none of these proves names
+    BOOST_TEST(near.name.empty()); // no transport authenticates names here
     BOOST_TEST(far.name.empty());
     if (pair.address().scheme == "unix") {
         BOOST_REQUIRE(far.uid.has_value());
@@ -165,7 +165,7 @@ BOOST_DATA_TEST_CASE(giving_up_after_the_dial_ended_does_nothing, every_carrier,
 BOOST_AUTO_TEST_CASE(a_connection_that_does_not_come_about_has_timed_out) {
     asio::io_context io;
     const scripted_listener full{io, "tcp://127.0.0.1:0", 0};
-    // The kernel takes a few that nobody accepts, and then leaves the next ones waiting.
+    // The kernel completes a few connections that are not accepted; further ones wait.
     std::vector<std::unique_ptr<dial_result>> dials;
     const auto where = cles::parse_url(full.url());
     const cles::limits bounds{.connect = 200ms};
@@ -177,7 +177,7 @@ BOOST_AUTO_TEST_CASE(a_connection_that_does_not_come_about_has_timed_out) {
     BOOST_TEST(dials.back()->code == asio::error::timed_out);
 }
 
-// The kernel takes no more for a Unix socket whose listener is behind, and says so at once.
+// The kernel rejects further connections to a Unix socket whose queue is full at once.
 BOOST_AUTO_TEST_CASE(a_unix_socket_whose_queue_is_full_is_an_error_and_no_link) {
     asio::io_context io;
     const auto where = cles::parse_url(fresh_address(carrier::unix_abstract));
@@ -197,7 +197,7 @@ BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, every_door, kind) {
     link_pair pair{kind};
     asio::io_context other;
     BOOST_TEST(listen_failure(other, pair.address()) == asio::error::address_in_use);
-    pair.open(); // and the first one has not suffered
+    pair.open(); // and the first one is not affected
 }
 
 BOOST_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_gone, every_carrier, kind) {
@@ -212,12 +212,12 @@ BOOST_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_gone, every_
 BOOST_DATA_TEST_CASE(nothing_comes_in_after_an_acceptor_was_closed, every_carrier, kind) {
     link_pair pair{kind};
     dial_result result;
-    pair.far.run([&] { // in one go, so that nobody comes in meanwhile
+    pair.far.run([&] { // in one step, so that no connection arrives meanwhile
         pair.transport().dial(pair.io.get_executor(), pair.address(), pair.bounds(), result.callback());
         pair.stop_listening();
     });
     pair.until([&] { return result.calls == 1; });
-    if (result.made) { // the kernel, or the door, had taken it already: then it ends at once
+    if (result.made) { // the kernel, or the listener, had accepted it already: then it ends at once
         pair.near.link = std::move(result.made);
         pair.near.start();
         pair.until([&] { return pair.near.over(); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A link of the `cles` command that is logged (`-vv`) does all that the link inside it does.
+// A link of the `cles` command that is logged (`-vv`) behaves exactly as the link that it wraps.
 
 #include <cles/link.hpp>
 
@@ -23,7 +23,7 @@ namespace {
 
 using namespace cles::test;
 
-/// Writes down what is asked of it.
+/// Records the calls that it receives.
 struct told_link final : cles::link {
     void start(std::shared_ptr<cles::link_events> owner) override {
         asked.emplace_back("start");
@@ -95,7 +95,7 @@ BOOST_FIXTURE_TEST_CASE(what_it_holds_itself_counts_and_is_given_back, fixture) 
     outside->output().append(std::string(100'000, 'x') + "\n");
     BOOST_TEST(outside->buffered() > 150'000U);
     outside->shrink();
-    BOOST_TEST(outside->buffered() > 150'000U); // nothing of it has gone out
+    BOOST_TEST(outside->buffered() > 150'000U); // nothing of it has been sent
     outside->flush();
     outside->shrink();
     BOOST_TEST(outside->buffered() < 51'000U);

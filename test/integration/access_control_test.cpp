@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Who may come in, where a service may listen, and what it may be called.
+// Which peers are admitted, where a service may listen, and which names are valid.
 
 #include <cles/service.hpp>
 
@@ -183,7 +183,7 @@ BOOST_AUTO_TEST_CASE(addresses_that_are_none_are_refused) {
          {"", "127.0.0.1:80", "tcp://", "tcp://:80", "tcp://127.0.0.1:65536", "tcp://127.0.0.1:x", "tcp://127.0.0.1/x",
           "tcp://::1", "tcp://[::1", "unix://relative", "unix://", "unix:///", "inproc://", "://x"}) {
         BOOST_TEST(refusal_of({.name = "car1", .listen = {where}}).code.failed(), where);
-        if (std::string{where} != "" && std::string{where} != "unix:///") { // forgets a peer; a folder
+        if (std::string{where} != "" && std::string{where} != "unix:///") { // removes the peer; is a folder
             const auto refused = refusal_of({.name = "car1", .peers = {{"car2", where}}});
             BOOST_TEST(refused.code == errc::invalid_url, where);
             BOOST_TEST(refused.words.find(where) != std::string::npos, refused.words);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Peers that are slow, or that never read, and others that are too many.
+// Peers that read slowly or not at all, and more peers than the limits allow.
 
 #include <cles/service.hpp>
 
@@ -31,7 +31,7 @@ using cles::feed_event;
 
 constexpr std::array carriers{carrier::tcp4, carrier::unix_file, carrier::inproc};
 
-// Publishes one after another, each when the one before has been taken.
+// Publishes one update after another, each when the previous one has been accepted.
 struct steady_publisher {
     cles::service& from;
     int count;
@@ -114,7 +114,7 @@ BOOST_DATA_TEST_CASE(async_update_ends_with_its_service_and_goes_on_without_a_lo
     BOOST_TEST(second.code == errc::stopped);
 }
 
-// Many at once go on in one turn.
+// Many waiting publications continue in one turn.
 BOOST_AUTO_TEST_CASE(who_publishes_holds_up_nobody_who_publishes_too) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", carrier::inproc)};
@@ -146,13 +146,13 @@ BOOST_AUTO_TEST_CASE(a_publisher_that_throws_ends_the_turn_and_no_other_publishe
             }
         });
     }
-    BOOST_TEST(ends == 0); // never from inside the call
+    BOOST_TEST(ends == 0); // never inside the call
     BOOST_CHECK_THROW(run_until(io, [&] { return ends == 3; }), std::runtime_error);
     BOOST_TEST(ends == 2);
     run_until(io, [&] { return ends == 3; });
 }
 
-// Both wait, and go on as long as they can.
+// Both wait, and continue as soon as they can.
 BOOST_DATA_TEST_CASE(a_lost_binder_sets_no_two_publishers_on_each_other, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
@@ -296,7 +296,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_never_reads_its_replies_is_not_read_and_then_cl
         }
         return closed || !said.empty();
     });
-    run_until(io, [&] { return !said.empty(); }); // told after the link was closed
+    run_until(io, [&] { return !said.empty(); }); // called after the link was closed
     BOOST_TEST(ran < 2000);
     BOOST_REQUIRE(said.size() == 1U);
     BOOST_TEST(said.front().find("takes nothing") != std::string::npos, said.front());
@@ -318,7 +318,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_reads_slowly_gets_everything, every_socket, kin
     }
 }
 
-// The limits that hold a link back must let it go on again, whatever carries it.
+// A link that is paused at a limit must resume, with every transport.
 BOOST_DATA_TEST_CASE(small_limits_hold_back_and_let_go, carriers, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind, {.unread = 100, .waiting = 100})};
@@ -352,7 +352,7 @@ BOOST_DATA_TEST_CASE(past_the_limit_of_links_the_next_is_told_busy_and_closed, e
     eager.send("PULL self:cles\n");
     BOOST_TEST(eager.rest().starts_with(R"({"error":"busy","message":)"));
 
-    BOOST_TEST(peers.front().ask("PULL self:cles").starts_with("{\"node\"")); // those who are in stay in
+    BOOST_TEST(peers.front().ask("PULL self:cles").starts_with("{\"node\"")); // existing links stay open
     peers.front().close();
     run_until(io, [&] {
         scripted_peer next{io, car.endpoints().front()};
@@ -400,7 +400,7 @@ BOOST_AUTO_TEST_CASE(past_the_limits_of_handlers_bindings_and_nouns_the_next_is_
     run_until(io, [&] { return kept.size() == 1; });
 }
 
-// One link that floods must not keep another from being served.
+// A link that floods must not keep the node from serving others.
 BOOST_DATA_TEST_CASE(a_flood_on_one_link_leaves_others_their_turn, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Every operation honours its cancellation slot, of whatever type, until it completes; never from inside the emission,
-// and not any more from its handler on.
+// Every operation honours its cancellation slot, of any type, until it completes; it never completes inside the
+// emission, and the slot has no effect from its handler on.
 
 #include <cles/service.hpp>
 
@@ -55,7 +55,7 @@ struct fixture {
         tower.on_bind("full");
     }
 
-    /// Takes whatever an operation brings.
+    /// Accepts any result of an operation.
     struct taker {
         fixture* in;
         template <class T>
@@ -69,11 +69,11 @@ struct fixture {
             ++in->calls;
             in->code = failed;
             in->slot_is_free = !in->signal.slot().has_handler();
-            in->signal.emit(type::all); // from inside its handler: none of its business any more
+            in->signal.emit(type::all); // inside its handler: has no effect any more
         }
     };
 
-    /// Begins the operation; it waits, or ends soon.
+    /// Starts the operation; it waits, or ends soon.
     void begin(operation what, bool waits) {
         auto handler = asio::bind_cancellation_slot(signal.slot(), taker{this});
         const std::string node = waits ? "car1" : "car2";
@@ -104,7 +104,7 @@ struct fixture {
         });
         run_until(io, [&] { return bound.is_open(); });
     }
-    // A binder that reads nothing.
+    // A subscriber that reads nothing.
     void fill() {
         slow.emplace(io, tower.endpoints().front(), buffers::small);
         slow->ask("BIND self:full keep=1");
@@ -156,11 +156,11 @@ BOOST_DATA_TEST_CASE_F(fixture, while_it_waits_it_is_withdrawn, data::make(every
     run_ready(io);
     BOOST_TEST(calls == 0);
     signal.emit(how.value);
-    BOOST_TEST(calls == 0); // never from inside the emission
+    BOOST_TEST(calls == 0); // never inside the emission
     signal.emit(how.value);
     wait();
     BOOST_TEST(code == errc::cancelled);
-    if (what == operation::next) { // the feed is as it was
+    if (what == operation::next) { // the feed is unchanged
         BOOST_TEST(bound.is_open());
     }
 }
@@ -185,7 +185,7 @@ BOOST_DATA_TEST_CASE_F(fixture, afterwards_it_means_nothing, data::make(every_op
     begin(what, false);
     wait();
     BOOST_TEST(!code, code.message());
-    // Another operation of the same kind waits, whose slot is another's; and what was made stays.
+    // Another operation of the same kind waits with a different slot, and must not be affected.
     if (!bound.is_open()) {
         bind();
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A feed that is not open gives an error, and none of its operations ends inside a call.
+// A feed that is not open returns an error, and none of its operations completes inside a call.
 
 #include <cles/service.hpp>
 
@@ -118,7 +118,7 @@ BOOST_DATA_TEST_CASE(so_does_a_future, data::make(every_how), h) {
     BOOST_CHECK_THROW(result.get(), cles::error);
 }
 
-// Where it had a service, its handler runs there.
+// If it had a service, its handler runs there.
 BOOST_AUTO_TEST_CASE(a_handler_without_an_executor_runs_on_the_services) {
     auto one = bind("car1:place");
     one.close();

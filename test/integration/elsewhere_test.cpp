@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Operations and feeds in the hands of handlers that run on another executor than the service's.
+// Operations and feeds whose handlers run on another executor than the service's.
 
 #include <cles/service.hpp>
 
@@ -34,7 +34,7 @@ using namespace std::chrono_literals;
 using cles::errc;
 namespace asio = boost::asio;
 
-/// A publisher and a service on a thread of their own; the test's thread runs another context.
+/// A publisher and a service on a separate thread; the test's thread runs another context.
 struct fixture {
     fixture() {
         there.run([this] {
@@ -52,7 +52,7 @@ struct fixture {
             car.reset();
         });
     }
-    // Publishes from the other thread, all the time.
+    // Publishes continuously from the other thread.
     void publish() {
         asio::post(there.io(), [this] {
             if (publishing) {
@@ -84,7 +84,7 @@ asio::awaitable<int> bind_and_fetch(fixture& f, int rounds) {
         }
         const int speed = co_await f.tower->async_pull<int>("car1:speed");
         BOOST_TEST(speed == 42);
-    } // where the feed is destroyed
+    } // here the feed is destroyed
     co_return fetched;
 }
 
@@ -157,7 +157,7 @@ BOOST_FIXTURE_TEST_CASE(a_wait_for_an_event_may_be_withdrawn_there_and_begun_aga
 
 // -- a pool --------------------------------------------------------------------------------------------------------
 
-// Without a word of strands.
+// Without explicit strands.
 asio::awaitable<int> ask_often(cles::service& by, int times) {
     int answered = 0;
     auto places = co_await by.async_bind<int>("car1:place");
@@ -175,14 +175,14 @@ asio::awaitable<int> ask_often(cles::service& by, int times) {
 BOOST_AUTO_TEST_CASE(of_a_pool_operations_are_begun_on_any_thread) {
     asio::thread_pool pool{4};
     cles::service car{pool, listening("car1")};
-    car.on_pull("speed", [] { return 42; }); // from here, while the pool runs
+    car.on_pull("speed", [] { return 42; }); // from this thread, while the pool runs
     car.on_bind("place");
     car.update("place", 0);
     cles::service tower{pool, knowing("tower", car)};
     tower.set_peer("car2", car.endpoints().front());
     std::vector<std::future<int>> all;
 #ifdef __SANITIZE_THREAD__
-    constexpr int times = 30; // some hundred times slower, with the publisher on a core of its own
+    constexpr int times = 30; // some hundred times slower, with the publisher on a separate core
 #else
     constexpr int times = 200;
 #endif

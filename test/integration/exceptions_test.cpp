@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Whatever way a token is spelled that throws: what is thrown is a `cles::error` with the peer's words.
+// Every token that reports errors by exceptions throws a `cles::error` with the peer's message.
 
 #include <cles/service.hpp>
 
@@ -54,7 +54,7 @@ struct nodes {
     cles::service tower{io, knowing("tower", car)};
 };
 
-// What the coroutine throws: "code: the peer's words", or what else it is.
+// What the coroutine throws: "code: the peer's message", or another description.
 std::string thrown_by(asio::io_context& io, asio::awaitable<void> work) {
     bool ended = false;
     std::string text = "nothing";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-// Scenarios, replayed with a failure at the first step of their input and output, then at the second, and so on until
-// one passes without meeting its failure. Whatever fails where: every operation ends exactly once, nothing hangs,
-// nothing is left behind, and afterwards everything works again.
+// Scenarios that are replayed with a failure at the first step of their input and output, then at the second, and so on
+// until one passes without a failure. Wherever it fails: every operation completes exactly once, nothing hangs, nothing
+// leaks, and afterwards everything works again.
 
 #include <cles/service.hpp>
 
@@ -51,7 +51,7 @@ struct nodes {
     cles::service tower{io, {.name = "tower", .peers = {{"car1", "fault://car1"}}}};
 };
 
-// A peer to whom the link seems to end withdraws what is in flight, and may still be able to say so.
+// A peer that receives an end of the link withdraws what is in flight, and may still be able to send that.
 bool is_a_loss(const boost::system::error_code& code) {
     return code == errc::unavailable || code == boost::asio::error::connection_refused ||
            (code == errc::cancelled && fault_plan::instance().how() == fault::ended);
@@ -116,7 +116,7 @@ BOOST_DATA_TEST_CASE(all_verbs_at_once, every_fault, how) {
         check_ended_once(pull);
         check_ended_once(push);
         check_ended_once(drive);
-        BOOST_TEST(n.pushed <= 1); // never asked again by itself
+        BOOST_TEST(n.pushed <= 1); // never repeated automatically
         BOOST_TEST((push.code || n.pushed == 1));
         BOOST_TEST((drive.code || (drive.value == 7 && reported == 0.5)));
     });
@@ -149,7 +149,7 @@ BOOST_DATA_TEST_CASE(a_withdrawal, every_fault, how) {
         run_until(n.io, [&] { return a.done(); });
         BOOST_TEST(a.calls == 1);
         BOOST_TEST((a.code == errc::cancelled || is_a_loss(a.code)), a.code.message());
-        // The handler hears of it, be it by the withdrawal or by the loss of the link.
+        // The handler is notified, by the withdrawal or by the loss of the link.
         run_until(n.io, [&] { return kept.empty() || kept.front().stopped(); });
         run_ready(n.io);
         BOOST_TEST(a.calls == 1);
@@ -199,7 +199,7 @@ BOOST_DATA_TEST_CASE(two_feeds_and_a_close, every_fault, how) {
     });
 }
 
-// Requests go by the link that the feed is on.
+// Requests use the link that the feed is on.
 BOOST_DATA_TEST_CASE(requests_beside_a_feed, every_fault, how) {
     replay(how, [](nodes& n) {
         feed_log feed;
@@ -214,7 +214,7 @@ BOOST_DATA_TEST_CASE(requests_beside_a_feed, every_fault, how) {
     });
 }
 
-// Ends in the middle of everything, wherever that is.
+// Destroys everything in the middle of any operation.
 BOOST_DATA_TEST_CASE(a_stop, every_fault, how) {
     replay(how, [](nodes& n) {
         answer<int> pull;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Bindings between services: what a feed tells, through losses and restarts.
+// Bindings between services: what a feed reports, through losses and restarts.
 
 #include <cles/service.hpp>
 
@@ -27,7 +27,7 @@ using cles::errc;
 using cles::feed_event;
 
 constexpr std::array carriers{carrier::tcp4, carrier::unix_file, carrier::inproc};
-constexpr std::array two_carriers{carrier::tcp4, carrier::inproc}; // for what takes its time
+constexpr std::array two_carriers{carrier::tcp4, carrier::inproc}; // for cases that take long
 
 struct nodes {
     explicit nodes(carrier kind) : car(std::make_unique<cles::service>(io, listening("car1", kind))) {
@@ -39,7 +39,7 @@ struct nodes {
         run_until(io, [&] { return feed.binds != 0; });
         BOOST_REQUIRE_MESSAGE(feed.bound, feed.code.message() << ": " << feed.words);
     }
-    // A publisher of the same name at the same place, as after a crash.
+    // A publisher with the same name and address, as after a crash.
     void restart() {
         const auto where = car->endpoints().front();
         car.reset();
@@ -99,7 +99,7 @@ BOOST_DATA_TEST_CASE(several_feeds_on_one_noun_each_get_everything, carriers, ki
     n.car->update("place", 2);
     run_until(n.io,
               [&] { return std::all_of(all.begin(), all.end(), [](const auto& f) { return f->items.size() == 2; }); });
-    all[1].reset(); // the others go on
+    all[1].reset(); // the others continue
     n.car->update("place", 3);
     run_until(n.io,
               [&] { return all[0]->items.size() == 3 && all[2]->items.size() == 3 && all[3]->items.size() == 3; });
@@ -128,11 +128,11 @@ BOOST_AUTO_TEST_CASE(feeds_of_one_noun_and_the_same_terms_share_a_link_and_a_bin
         return std::all_of(all.begin(), all.end(), [count](const auto& f) { return f->bodies().size() == count; });
     };
     run_until(n.io, [&] { return all_have(1); });
-    all.erase(all.begin(), all.begin() + 19); // the one that made it among them
+    all.erase(all.begin(), all.begin() + 19); // including the one that made it
     run_ready(n.io);
     n.car->update("place", 3);
     run_until(n.io, [&] { return all_have(2); });
-    feed_log thinned; // what it is to be sent is not the same
+    feed_log thinned; // its terms differ
     n.until_bound(thinned, "car1:place", cles::bind_options{}.every(10ms));
     BOOST_TEST(links() == 2);
     all.clear();
@@ -242,10 +242,10 @@ BOOST_DATA_TEST_CASE(a_publisher_that_is_lost_and_comes_back_is_bound_again, car
     n.car->update("place", 7);
     run_until(n.io, [&] { return feed.items.back().value.text == value(7); });
     BOOST_TEST(feed.items.back().seq == 1U);
-    BOOST_TEST(feed.count(feed_event::gap) == 0U); // the first update of a new life is none
+    BOOST_TEST(feed.count(feed_event::gap) == 0U); // the first update of a new incarnation is not a gap
     BOOST_TEST(feed.count(feed_event::lost) == 1U);
 
-    n.restart(); // and once more
+    n.restart(); // and again
     run_until(n.io, [&] { return feed.count(feed_event::rebound) == 2; });
     BOOST_TEST(feed.count(feed_event::lost) == 2U);
 }
@@ -257,7 +257,7 @@ BOOST_DATA_TEST_CASE(a_feed_keeps_trying_while_the_publisher_is_away, two_carrie
     const auto where = n.car->endpoints().front();
     n.car.reset();
     run_until(n.io, [&] { return feed.count(feed_event::lost) == 1; });
-    // Long enough for some tries to be refused.
+    // Long enough for some attempts to be refused.
     run_until(n.io,
               [end = std::chrono::steady_clock::now() + 350ms] { return std::chrono::steady_clock::now() > end; });
     BOOST_TEST(feed.items.size() == 1U);
@@ -286,7 +286,7 @@ BOOST_DATA_TEST_CASE(stopping_the_binders_service_ends_its_feeds, carriers, kind
     nodes n{kind};
     feed_log waiting;
     n.until_bound(waiting);
-    feed_log binding; // its answer is still on its way
+    feed_log binding; // its reply is still in transit
     binding.bind(*n.tower, "car1:place/fast");
     n.tower->stop();
     run_until(n.io, [&] { return waiting.is_over() && binding.binds == 1; });
@@ -363,7 +363,7 @@ BOOST_AUTO_TEST_CASE(cancelling_a_bind_withdraws_it) {
 
 // -- against a scripted publisher ----------------------------------------------------------------------------------
 
-// Answers the BIND that comes next; returns it.
+// Replies to the next BIND; returns it.
 std::string answer_bind(scripted_peer& publisher, std::string_view last = "{}") {
     const auto asked = publisher.line();
     const auto at = asked.find("id=");
@@ -382,7 +382,7 @@ std::string id_of(const std::string& request) {
     return request.substr(at, request.find(' ', at) - at);
 }
 
-// A feed that is bound, and one that joins it, at a publisher that says which features it has.
+// A bound feed, and one that joins it, at a publisher that lists its features.
 struct joined {
     explicit joined(std::string_view features, const cles::bind_options& options = {}) {
         one.bind(tower, "car1:place");
@@ -406,7 +406,7 @@ struct joined {
     std::string asked_again;
 };
 
-// What is queued for the link is older than the value that the second BIND is answered with.
+// What is queued for the link is older than the value in the reply to the second BIND.
 BOOST_AUTO_TEST_CASE(a_feed_that_joins_gets_nothing_older_than_its_current_value) {
     joined at{R"(["mark"])"};
     BOOST_TEST(at.asked_again.find(" mark=yes") != std::string::npos, at.asked_again);
@@ -417,7 +417,7 @@ BOOST_AUTO_TEST_CASE(a_feed_that_joins_gets_nothing_older_than_its_current_value
     BOOST_TEST(at.two.items.front().value.text == value(10));
     BOOST_TEST(at.two.bodies().front() == value(11));
     BOOST_TEST(at.two.missed() == 0U);
-    feed_log third; // the publisher is asked once what it can do
+    feed_log third; // the publisher is asked once for its features
     third.bind(at.tower, "car1:place");
     const auto asked = answer_bind(*at.publisher);
     BOOST_TEST(asked.starts_with("BIND car1:place id="), asked);
@@ -439,7 +439,7 @@ BOOST_AUTO_TEST_CASE(a_feed_that_joins_and_is_refused_leaves_the_other_bound) {
 
 BOOST_AUTO_TEST_CASE(a_feed_that_is_refused_unbinds_what_another_has_left_to_it) {
     joined at{"[]"};
-    at.one.close(); // the binding stays for the other
+    at.one.close(); // the binding remains for the other
     run_ready(at.io);
     at.publisher->send(id_of(at.asked_again) + R"( {"error":"busy","message":"no"})" + "\n");
     run_until(at.io, [&] { return at.two.binds == 1; });
@@ -540,13 +540,13 @@ BOOST_AUTO_TEST_CASE(tries_to_bind_again_back_off) {
             answer_bind(publisher);
             run_until(io, [&] { return feed.bound; });
         } else {
-            publisher.line(); // and hangs up on it
+            publisher.line(); // and disconnects
         }
     }
     for (std::size_t i = 1; i < tries.size(); ++i) { // 100, 200, 400, 800 ms, each shortened by up to a quarter
         BOOST_TEST((tries[i] - tries[i - 1]).count() >= (75'000'000LL << (i - 1)));
     }
-    BOOST_TEST(feed.count(feed_event::lost) == 1U); // said once
+    BOOST_TEST(feed.count(feed_event::lost) == 1U); // reported once
 }
 
 BOOST_AUTO_TEST_CASE(a_bind_whose_answer_does_not_come_is_withdrawn_at_the_publisher) {
@@ -559,7 +559,7 @@ BOOST_AUTO_TEST_CASE(a_bind_whose_answer_does_not_come_is_withdrawn_at_the_publi
     publisher.line();
     run_until(io, [&] { return feed.binds == 1; });
     BOOST_TEST(feed.code == errc::deadline);
-    const auto next = publisher.line(); // else it might send updates for ever
+    const auto next = publisher.line(); // otherwise it might send updates for ever
     BOOST_TEST(next.find("lease=0") != std::string::npos, next);
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// When what a service says is written: in the call that says it where that is alone, else together, a turn later.
+// When the output of a service is written: inside the call if it is the only output, otherwise together, a turn later.
 
 #include <cles/service.hpp>
 
@@ -24,7 +24,7 @@
 
 namespace {
 
-// A value that does something while it is written, and then fails if it is told to.
+// A value that performs an action while it is written, and then fails if requested.
 struct acting {
     std::function<void()> act;
     bool fails = false;
@@ -55,7 +55,7 @@ struct publishing {
             BOOST_TEST(peer.ask(std::string{"BIND self:"} + noun) == "{\"value\":0}");
         }
     }
-    // What the peer's socket holds, with nothing run.
+    // What the peer's socket has received, without running anything.
     std::string come() {
         peer.ended();
         auto text = peer.unread();
@@ -131,7 +131,7 @@ BOOST_AUTO_TEST_CASE(a_publication_that_waits_for_capacity_is_written_in_its_cal
     publishing p;
     auto done = p.car.async_update("speed", 1, asio::use_future);
     BOOST_TEST(p.come().ends_with("{\"value\":1}\n"));
-    BOOST_TEST((done.wait_for(std::chrono::seconds{0}) == std::future_status::timeout)); // told by the loop alone
+    BOOST_TEST((done.wait_for(std::chrono::seconds{0}) == std::future_status::timeout)); // called by the loop only
     run_until(p.io, [&] { return done.wait_for(std::chrono::seconds{0}) == std::future_status::ready; });
     done.get();
 }
@@ -168,7 +168,7 @@ struct asking {
     void ask() {
         tower.async_pull<int>("car1:speed", [this](boost::system::error_code, int value) { values.push_back(value); });
     }
-    // Answers the next request.
+    // Replies to the next request.
     void answer() {
         const auto request = peer().line();
         const auto id = request.substr(request.find("id="));

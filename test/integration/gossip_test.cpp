@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Services that find each other by seeds, over TCP on loopback, without multicast.
+// Services that discover each other by seeds, over TCP on loopback, without multicast.
 
 #include <cles/service.hpp>
 
@@ -25,7 +25,7 @@ using cles::errc;
 namespace {
 
 struct fixture {
-    /// A service of its own; those of one context would find each other without any URL.
+    /// A service with its own context; those of one context would find each other without any URL.
     std::unique_ptr<cles::service> make(const std::string& name, std::vector<std::string> seeds, bool gossip = true) {
         contexts.push_back(std::make_unique<asio::io_context>());
         cles::service_options options{.name = name, .listen = {"tcp://127.0.0.1:0"}};
@@ -92,7 +92,7 @@ BOOST_FIXTURE_TEST_CASE(a_node_that_leaves_is_forgotten_at_once, fixture) {
     const auto begun = std::chrono::steady_clock::now();
     car2->stop();
     until([&] { return !knows(*car1, "car2") && !knows(*seed, "car2"); });
-    BOOST_TEST((std::chrono::steady_clock::now() - begun < 10s)); // 15 intervals are more
+    BOOST_TEST((std::chrono::steady_clock::now() - begun < 10s)); // 15 intervals are longer
 }
 
 BOOST_FIXTURE_TEST_CASE(a_node_that_leaves_is_forgotten_and_answers_until_it_stops, fixture) {
@@ -125,7 +125,7 @@ BOOST_FIXTURE_TEST_CASE(a_node_that_knows_nothing_of_gossip_takes_part, fixture)
     car2->async_pull("plain:who", got.options(), got.take());
     until([&] { return got.done(); });
     BOOST_TEST(!got.code);
-    BOOST_TEST(plain->peers().empty()); // nobody told it in its own language
+    BOOST_TEST(plain->peers().empty()); // it does not take part in gossip
 }
 
 BOOST_FIXTURE_TEST_CASE(a_plain_table_is_answered_with_and_without_since, fixture) {

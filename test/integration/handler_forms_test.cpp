@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a handler may be: a coroutine with a responder, an object that only moves, types of the standard library; and
-// what becomes of text that is not UTF-8.
+// The forms of handlers: coroutines with a responder, move-only objects, types of the standard library; and the
+// treatment of text that is not UTF-8.
 
 #include <cles/service.hpp>
 
@@ -55,7 +55,7 @@ struct nodes {
         run_until(io, [&] { return got.done(); });
         return got;
     }
-    // "code: words"
+    // "code: message"
     template <class B>
     std::string failure(const std::string& noun, const B& body) {
         const auto got = delegate<cles::json_text>(noun, body);
@@ -138,7 +138,7 @@ BOOST_AUTO_TEST_CASE(it_is_cancelled_with_its_request) {
     BOOST_TEST((got.code == asio::error::operation_aborted));
 }
 
-// -- objects that only move ----------------------------------------------------------------------------------------
+// -- move-only objects ---------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(handlers_that_only_move_serve_every_verb) {
     nodes n;
@@ -194,7 +194,7 @@ BOOST_AUTO_TEST_CASE(a_result_that_is_not_utf8_is_failed_at_the_sender) {
     n.car.on_delegate("coroutine", [](cles::request) -> asio::awaitable<std::string> { co_return bad; });
     n.car.on_delegate("responder", [](const cles::request&, cles::responder r) { r.done(bad); });
     n.car.on_delegate("later", [&](const cles::request&, cles::responder r) {
-        asio::post(n.io, [r = std::move(r)] { r.done(note{bad}); }); // where nobody would catch it
+        asio::post(n.io, [r = std::move(r)] { r.done(note{bad}); }); // where an exception would not be caught
     });
     const std::string failed = make_error_code(errc::failed).message();
     BOOST_TEST(n.failure("plain", cles::json_text{}) == failed + ": car1: text that is not UTF-8");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Handlers that fail, that never end, and that use the service which calls them.
+// Handlers that fail, that never complete, and that use the service which calls them.
 
 #include <cles/service.hpp>
 
@@ -144,7 +144,7 @@ BOOST_DATA_TEST_CASE(a_handler_that_never_ends_is_answered_at_its_deadline_and_t
     BOOST_TEST(by_responder.code == errc::deadline);
     BOOST_TEST(by_coroutine.code == errc::deadline);
     run_until(n.io, [&] { return kept.at(0).stopped(); });
-    n.car.reset(); // goes with both still running
+    n.car.reset(); // destroyed while both still run
     kept.front().done();
     run_ready(n.io);
 }
@@ -155,7 +155,7 @@ BOOST_AUTO_TEST_CASE(the_peer_is_told_that_the_deadline_has_passed) {
     auto peer = n.peer();
     const auto reply = peer.ask("DELEGATE self:coroutine id=3 deadline=30");
     BOOST_TEST(reply == R"(id=3 {"error":"deadline","message":"car1 did not finish in time"})");
-    peer.send("DELEGATE self:coroutine deadline=30\nPULL self:cles deadline=10000\n"); // the next one gets its turn
+    peer.send("DELEGATE self:coroutine deadline=30\nPULL self:cles deadline=10000\n"); // the next one is served
     BOOST_TEST(peer.line().starts_with(R"({"error":"deadline")"));
     BOOST_TEST(peer.line().starts_with(R"({"node")"));
 }
@@ -177,7 +177,7 @@ BOOST_DATA_TEST_CASE(a_service_goes_while_its_handlers_still_run, carriers, kind
     BOOST_TEST(kept.front().stopped());
     bool told = false;
     kept.front().on_stop([&] { told = true; });
-    BOOST_TEST(told); // at once, where it has happened
+    BOOST_TEST(told); // at once, where it occurred
     kept.front().fail(errc::failed, "nobody hears this");
 }
 
@@ -216,7 +216,7 @@ BOOST_DATA_TEST_CASE(a_plain_handler_asks_back_on_the_same_link, carriers, kind)
     n.tower.on_pull("name", [] { return "tower"; });
     answer<std::string> asked_back;
     n.car->on_push("hello", [&](const cles::request&) {
-        n.car->set_peer("tower", n.car->endpoints().front()); // any way will do: `self` is whoever reads it
+        n.car->set_peer("tower", n.car->endpoints().front()); // any URL will do: `self` is the node that reads it
         n.car->async_pull<std::string>("self:name", cles::call_options{}, asked_back.take());
         return 1;
     });
@@ -264,7 +264,7 @@ BOOST_DATA_TEST_CASE(a_plain_handler_may_stop_its_service, carriers, kind) {
     n.tower.async_push("car1:stop/now", cles::json_text{R"({"why":"again"})"}, second.take());
     run_until(n.io, [&] { return first.done() && second.done(); });
     BOOST_TEST(seen == R"({"why":"to see what happens"}stopnow)");
-    BOOST_TEST(first.code == errc::unavailable); // its service was gone before it answered
+    BOOST_TEST(first.code == errc::unavailable); // its service was destroyed before it replied
     BOOST_TEST(second.code == errc::unavailable);
 }
 
@@ -292,7 +292,7 @@ BOOST_AUTO_TEST_CASE(a_plain_handler_may_stop_the_service_that_asks_itself) {
     BOOST_TEST(seen == R"({"why":"to see what happens"})");
 }
 
-// A completion handler is called from inside the service: it may end it.
+// A completion handler is called from inside the service: it may destroy it.
 BOOST_DATA_TEST_CASE(a_completion_may_destroy_the_service_that_calls_it, carriers, kind) {
     nodes n{kind};
     n.car->on_pull("speed", [] { return 42; });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Requests and bindings by datagram, over a network that loses, doubles, delays and reorders them.
+// Requests and bindings by datagram, over a network that loses, duplicates, delays and reorders them.
 
 #include <cles/service.hpp>
 
@@ -66,7 +66,7 @@ struct networks {
     }
 
     asio::io_context io;
-    std::vector<std::unique_ptr<network>> each; // one per seed, in their order
+    std::vector<std::unique_ptr<network>> each; // one per seed, in order
 };
 
 using answers = std::vector<std::unique_ptr<answer<>>>;
@@ -94,8 +94,8 @@ BOOST_AUTO_TEST_CASE(all_requests_end_and_have_their_effect_at_most_once) {
     for (std::size_t which = 0; which < seeds.size(); ++which) {
         BOOST_TEST_CONTEXT("seed " << seeds[which]) {
             auto& n = *all.each[which];
-            // Each copy and its reply may be lost: now and then all of a request's are, and then it ends with its
-            // deadline.
+            // Each copy and its reply may be lost: sometimes all copies of a request are, and then its deadline ends
+            // it.
             int answered = 0;
             for (int i = 0; i < 3 * count; ++i) {
                 const auto& a = *asked[which][static_cast<std::size_t>(i)];
@@ -111,7 +111,7 @@ BOOST_AUTO_TEST_CASE(all_requests_end_and_have_their_effect_at_most_once) {
             for (const auto& [what, times] : n.effects) {
                 BOOST_TEST(times <= 1, what << " ran " << times << " times");
             }
-            // The network did what it was to do.
+            // The network impaired datagrams as configured.
             BOOST_TEST(n.path.lost() > 20U);
             BOOST_TEST(n.path.doubled() > 20U);
             BOOST_TEST(n.path.to_node() > 3U * count);
@@ -131,11 +131,11 @@ BOOST_AUTO_TEST_CASE(a_network_that_loses_everything_ends_requests_with_their_de
     for (const auto& a : asked) {
         BOOST_TEST(a->code == errc::deadline);
     }
-    BOOST_TEST(n.path.to_node() == 40U); // the first copies, and each once more: after 200 ms, and not after 600
+    BOOST_TEST(n.path.to_node() == 40U); // the first copies, and one retry of each: after 200 ms, and not after 600
     BOOST_TEST(n.effects.empty());
 }
 
-// The reply is lost, and so the request comes again.
+// The reply is lost, so the request is repeated.
 BOOST_AUTO_TEST_CASE(a_lost_reply_does_not_repeat_the_effect) {
     asio::io_context io;
     network n{io, {}, 1};
@@ -165,7 +165,7 @@ BOOST_AUTO_TEST_CASE(copies_are_byte_by_byte_the_same) {
     BOOST_REQUIRE(seen.size() >= 3U);
     BOOST_TEST(seen[1] == seen[0]);
     BOOST_TEST(seen[2] == seen[0]);
-    // What is left of the 4 s when it is written.
+    // What remains of the 4 s when it is written.
     constexpr std::string_view adverb = " deadline=";
     const auto at = seen[0].find(adverb);
     BOOST_REQUIRE(at != std::string::npos);
@@ -189,13 +189,13 @@ BOOST_DATA_TEST_CASE(feeds_report_what_was_lost_as_gaps, seeds, seed) {
         run_until(n.io, [&, so_far = n.path.to_clients()] { return n.path.to_clients() > so_far; });
     }
     n.path.set({});
-    n.car.update("place", count + 1); // and the last one shows what is missing before it
-    run_until(n.io, [&] {             // the gap before it bears its number too
+    n.car.update("place", count + 1); // and the last one reveals what is missing before it
+    run_until(n.io, [&] {             // the gap before it has its number too
         return feed.items.back().kind == feed_event::update && feed.items.back().seq == count + 2;
     });
     BOOST_TEST(feed.count(feed_event::gap) > 10U);
     BOOST_TEST(feed.missed() > 50U);
-    BOOST_TEST(feed.count(feed_event::update) + feed.missed() == count + 2U); // none twice, none unaccounted for
+    BOOST_TEST(feed.count(feed_event::update) + feed.missed() == count + 2U); // no duplicates, all accounted for
 }
 
 BOOST_DATA_TEST_CASE(updates_that_overtake_others_are_in_order_or_gaps, seeds, seed) {
@@ -210,7 +210,7 @@ BOOST_DATA_TEST_CASE(updates_that_overtake_others_are_in_order_or_gaps, seeds, s
     run_until(n.io, [&] { return n.path.to_clients() >= 201; });
     n.path.set({});
     run_until(n.io, [&] { return !feed.items.empty(); });
-    for (int i = 0; i < 30; ++i) { // until what was under way has come
+    for (int i = 0; i < 30; ++i) { // until everything in transit has arrived
         run_ready(n.io);
     }
     n.car.update("place", 201);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// How a service lives with its executor: other people's loops, pools of threads, and going in the middle of everything.
+// The lifetime of a service and its executor: foreign event loops, thread pools, and destruction during operations.
 
 #include <cles/service.hpp>
 
@@ -58,7 +58,7 @@ BOOST_DATA_TEST_CASE(a_foreign_loop_polls, carriers, kind) {
         while (!holds()) {
             BOOST_REQUIRE((std::chrono::steady_clock::now() < end));
             io.restart();
-            io.poll(); // and here the host would do its own work
+            io.poll(); // here the host program would do its own work
         }
     };
     turn_until([&] { return a.done() && feed.bound; });
@@ -124,7 +124,7 @@ BOOST_AUTO_TEST_CASE(a_service_that_is_closed_waits_for_its_handlers_no_longer_t
     until([&] { return closed.done() && twice.done() && first.done() && second.done(); });
     BOOST_TEST(!closed.code);
     BOOST_TEST((twice.code == errc::stopped));
-    BOOST_TEST((first.code == errc::unavailable)); // it had begun
+    BOOST_TEST((first.code == errc::unavailable)); // it had started
     BOOST_TEST(stopped);
     BOOST_TEST((second.code == errc::busy)); // it had not
     BOOST_TEST(begun == 1);
@@ -152,7 +152,7 @@ BOOST_AUTO_TEST_CASE(a_service_that_is_stopped_while_it_closes_says_so) {
 BOOST_AUTO_TEST_CASE(a_service_that_only_asks_leaves_its_context_without_work) {
     asio::io_context io;
     const cles::service tower{io, {.name = "tower"}};
-    io.run(); // comes back
+    io.run(); // runs to completion
     BOOST_TEST(io.stopped());
 }
 
@@ -170,7 +170,7 @@ BOOST_DATA_TEST_CASE(a_stopped_service_leaves_its_context_without_work, carriers
     io.restart();
     io.run_for(patience);
     BOOST_TEST(io.stopped());
-    BOOST_CHECK_NO_THROW(car.update("place", 1)); // nobody hears it
+    BOOST_CHECK_NO_THROW(car.update("place", 1)); // without subscribers
 }
 
 BOOST_DATA_TEST_CASE(a_service_on_a_pool_takes_a_strand, carriers, kind) {
@@ -178,7 +178,7 @@ BOOST_DATA_TEST_CASE(a_service_on_a_pool_takes_a_strand, carriers, kind) {
     cles::service car{pool, listening("car1", kind)};
     cles::service tower{pool, knowing("tower", car)};
     constexpr int count = 500;
-    int inside = 0; // unguarded on purpose: the strand does it
+    int inside = 0; // deliberately unguarded: the strand serialises access
     int served = 0;
     int answered = 0;
     int failed = 0;
@@ -204,7 +204,7 @@ BOOST_DATA_TEST_CASE(a_service_on_a_pool_takes_a_strand, carriers, kind) {
         }
     });
     BOOST_REQUIRE((all.get_future().wait_for(patience) == std::future_status::ready));
-    run_on(car.get_executor(), [] {}); // what came before is seen from here on
+    run_on(car.get_executor(), [] {}); // everything before is visible from here on
     BOOST_TEST(failed == 0);
     BOOST_TEST(most == 1);
     auto later = asio::post(tower.get_executor(),
@@ -249,13 +249,13 @@ BOOST_DATA_TEST_CASE(services_of_two_threads_talk, carriers, kind) {
         BOOST_REQUIRE((replies[i].wait_for(patience) == std::future_status::ready));
         BOOST_REQUIRE(replies[i].get().text == "[" + std::to_string(i) + "]");
     }
-    there.run([&] { car.reset(); }); // in the middle of the link's life
+    there.run([&] { car.reset(); }); // during the lifetime of the link
     auto refused = here.run([&] { return tower->async_push("car1:echo", cles::json_text{}, asio::use_future); });
     BOOST_CHECK_THROW(refused.get(), cles::error);
     here.run([&] { tower.reset(); });
 }
 
-// A service on a thread of its own, with feeds from another one.
+// A service on a separate thread, with feeds from another one.
 struct remote_node {
     remote_node(const std::string& name, carrier kind) {
         thread.run([&] {
@@ -304,7 +304,7 @@ BOOST_DATA_TEST_CASE(services_of_two_threads_bind_to_each_other_at_the_same_time
     one.thread.run([&] { one.node->stop(); });
 }
 
-// Two services with something of every kind under way.
+// Two services with operations of every kind in progress.
 struct busy_nodes {
     explicit busy_nodes(asio::io_context& context, carrier kind)
         : io(context), car(std::make_unique<cles::service>(io, listening("car1", kind))),
@@ -331,7 +331,7 @@ struct busy_nodes {
 
     asio::awaitable<void> watch() {
         if (!tower) {
-            co_return; // gone before this began
+            co_return; // cancelled before this started
         }
         auto places = co_await tower->async_bind("car1:place");
         for (;;) {
@@ -400,13 +400,13 @@ BOOST_DATA_TEST_CASE(a_context_may_go_with_everything_in_flight, carriers, kind)
         for (int i = 0; i < turns; ++i) {
             io->poll_one();
         }
-        n.reset(); // what it has to say still waits in the context
+        n.reset(); // its remaining completions still wait in the context
         io.reset();
     }
     BOOST_TEST(true);
 }
 
-// Of two services that talk, the one whose context is somebody else's may go with that context, at any moment.
+// Of two connected services, the one whose context belongs to the host program may be destroyed with it at any moment.
 BOOST_DATA_TEST_CASE(a_peers_context_may_go_first, carriers, kind) {
     for (int turns = 0; turns < 12; ++turns) {
         asio::io_context io;
@@ -470,7 +470,7 @@ BOOST_DATA_TEST_CASE(stopping_twice_and_asking_a_stopped_service_fails_with_stop
     BOOST_TEST(publish.code == errc::stopped);
 }
 
-// Answers that were given are sent before the end, where the peer takes them at once.
+// Replies are sent before the end if the peer accepts them at once.
 BOOST_DATA_TEST_CASE(a_stop_sends_what_was_answered, every_socket, kind) {
     asio::io_context io;
     cles::service car{io, listening("car1", kind)};

@@ -43,7 +43,7 @@ struct node {
     }
     scripted_peer peer() { return {io, car.endpoints().front()}; }
     std::uint64_t metric(const std::string& name) { return cles::test::metric(car, name); }
-    /// Links that others opened, as far as this shows it: the node's own to itself is one.
+    /// Links that others opened, as far as this counter shows: the node's own link to itself is one.
     std::uint64_t open() { return metric("links_open") - own; }
 
     asio::io_context io;
@@ -56,7 +56,7 @@ bool is_busy(const std::string& line) { return line.starts_with(R"({"error":"bus
 
 // -- peers that vanish ---------------------------------------------------------------------------------------------
 
-// The system hands such a connection over all the same, and cannot say any more whose it was.
+// The system still accepts such a connection, but can no longer tell the peer's address.
 BOOST_DATA_TEST_CASE(a_peer_that_is_gone_before_it_is_accepted_harms_nobody, tcp_and_unix, kind) {
     node n{kind};
     n.own = n.metric("links_open");
@@ -77,7 +77,7 @@ BOOST_DATA_TEST_CASE(links_that_close_free_capacity_and_end_their_bindings, tcp_
         BOOST_REQUIRE_EQUAL(peer.ask("BIND self:notice"), "{}");
     }
     run_until(n.io, [&] { return n.open() == 0; });
-    // Each bound a noun of its own, and none is left bound.
+    // Each bound a different noun, and none remains bound.
     for (int round = 0; round < 2; ++round) {
         std::vector<scripted_peer> peers;
         for (int i = 0; i < 49; ++i) {
@@ -161,7 +161,7 @@ BOOST_DATA_TEST_CASE(at_the_limit_the_oldest_half_closed_link_is_evicted, tcp_an
     BOOST_TEST(n.metric("links_evicted") == 1U);
 }
 
-// -- peers that say nothing ----------------------------------------------------------------------------------------
+// -- silent peers --------------------------------------------------------------------------------------------------
 
 BOOST_DATA_TEST_CASE(a_link_that_brings_no_whole_line_in_time_is_closed, tcp_and_unix, kind) {
     node n{kind, {.links = 3, .first_line = 50ms}};
@@ -212,7 +212,7 @@ BOOST_AUTO_TEST_CASE(an_address_beyond_its_share_gives_way_to_another) {
     asio::async_read_until(other, asio::dynamic_buffer(said), '\n', [](boost::system::error_code, std::size_t) {});
     run_until(n.io, [&] { return said.ends_with('\n'); });
     BOOST_TEST(said == "{\"value\":42}\n");
-    BOOST_TEST(greedy[3].rest().empty()); // the last that came
+    BOOST_TEST(greedy[3].rest().empty()); // the last to connect
     n.car.update("notice", 1);
     for (int i = 0; i < 3; ++i) {
         BOOST_TEST(greedy[static_cast<std::size_t>(i)].line().starts_with("UPDATE "));
@@ -238,7 +238,7 @@ BOOST_DATA_TEST_CASE(a_request_to_a_node_at_its_limit_of_links_is_busy, tcp_and_
     node n{kind, {.links = 1}};
     auto inside = n.peer();
     BOOST_TEST(inside.ask("BIND self:notice") == "{}");
-    asio::io_context there; // reached by a socket only
+    asio::io_context there; // reached only by a socket
     cles::service tower{there, knowing("tower", n.car)};
     const auto until = [&](auto&& holds) {
         run_until(n.io, [&] {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Nodes that find each other in a multicast group on loopback, and requests by name that nobody told the way.
+// Nodes that discover each other in a multicast group on loopback, and requests by name without a configured URL.
 
 #include <cles/service.hpp>
 
@@ -33,7 +33,7 @@ using cles::peer_state;
 
 namespace {
 
-/// Who sends to the group by hand.
+/// Sends to the group from a plain socket.
 class speaker {
   public:
     speaker(asio::io_context& io, const cles::multicast_options& where)
@@ -63,7 +63,7 @@ struct fixture {
         };
         return options;
     }
-    /// On a context of its own, so that it is found by its announcements and by nothing else.
+    /// On a separate context, so that it is discovered only by its announcements.
     std::unique_ptr<cles::service> serving(const std::string& name, const std::string& at = "tcp://127.0.0.1:0") {
         auto options = in_group(name);
         options.listen = {at};
@@ -71,7 +71,7 @@ struct fixture {
         made->on_pull("who", [name] { return name; });
         return made;
     }
-    /// Runs both contexts until it holds.
+    /// Runs both contexts until the condition holds.
     template <class Condition>
     void until(Condition&& holds) {
         run_until(here, [&] {
@@ -127,7 +127,7 @@ BOOST_FIXTURE_TEST_CASE(a_name_is_found_by_the_first_request, fixture) {
     const auto car1 = serving("car1");
     cles::service asker{here, in_group("asker")};
     const auto begun = std::chrono::steady_clock::now();
-    const auto answer = pulled(asker, "car1:who"); // nothing was heard when it was asked
+    const auto answer = pulled(asker, "car1:who"); // nothing had been received when it was asked
     BOOST_TEST(!answer.code);
     BOOST_TEST(answer.text == R"({"value":"car1"})");
     BOOST_TEST((std::chrono::steady_clock::now() - begun < patience));
@@ -167,7 +167,7 @@ BOOST_FIXTURE_TEST_CASE(a_feed_is_bound_by_name_and_again_where_the_node_has_gon
     until([&] { return log.bound; });
     const auto before = car1->endpoints().front();
     car1->stop();
-    car1 = serving("car1"); // another run, at another port
+    car1 = serving("car1"); // another incarnation, at another port
     BOOST_TEST(car1->endpoints().front() != before);
     car1->update("position", 2);
     until([&] { return log.count(cles::feed_event::rebound) == 1; });
@@ -182,7 +182,7 @@ BOOST_FIXTURE_TEST_CASE(after_the_first_round_an_unknown_name_is_refused_at_once
     here.restart();
     here.poll();
     here.poll();
-    BOOST_TEST(second->ended); // without any waiting
+    BOOST_TEST(second->ended); // without waiting
     BOOST_TEST((second->code == errc::no_target));
 }
 
@@ -209,7 +209,7 @@ BOOST_FIXTURE_TEST_CASE(what_was_configured_goes_before_what_is_announced, fixtu
     options.peers.emplace("car1", other->endpoints().front());
     cles::service asker{here, std::move(options)};
     until([&] { return knows(asker, "car1"); });
-    BOOST_TEST((pulled(asker, "car1:who").code == errc::no_target)); // the other says that it is not car1
+    BOOST_TEST((pulled(asker, "car1:who").code == errc::no_target)); // the other reports that it is not car1
     asker.set_peer("car1", "");
     BOOST_TEST(pulled(asker, "car1:who").text == R"({"value":"car1"})");
 }
@@ -241,7 +241,7 @@ BOOST_FIXTURE_TEST_CASE(nodes_know_each_other_and_say_whom_they_know, fixture) {
     const auto car1 = serving("car1");
     const auto car2 = serving("car2", "udp://127.0.0.1:0");
     until([&] { return knows(*car1, "car2") && knows(*car2, "car1"); });
-    BOOST_TEST(car1->peers().size() == 1U); // itself not
+    BOOST_TEST(car1->peers().size() == 1U); // without itself
     const auto p = car1->peers().front();
     BOOST_TEST(p.endpoints == car2->endpoints(), boost::test_tools::per_element());
     BOOST_TEST((p.state == peer_state::live));
@@ -290,7 +290,7 @@ BOOST_FIXTURE_TEST_CASE(a_stopped_node_is_known_no_more, fixture) {
     BOOST_TEST(!pulled(asker, "car1:who").code);
     pulled(asker, "car9:who"); // the first round is over
     car1->stop();
-    until([&] { return !knows(asker, "car1"); }); // long before its silence would tell
+    until([&] { return !knows(asker, "car1"); }); // long before silence would reveal it
     BOOST_TEST((pulled(asker, "car1:who").code == errc::no_target));
 }
 
@@ -312,7 +312,7 @@ BOOST_FIXTURE_TEST_CASE(one_that_leaves_is_known_no_more_and_still_answers_and_a
     BOOST_TEST(answer == R"({"value":"car1"})");
     BOOST_TEST(onward->text == R"({"value":"asker"})");
 
-    // However it is asked, it does not say that it is there.
+    // No request makes it reveal its presence.
     const auto before = announcements_sent(*car1);
     speaker somebody{here, where};
     somebody.say("BIND car1:cles");
@@ -341,7 +341,7 @@ BOOST_FIXTURE_TEST_CASE(a_silent_node_is_suspect_and_then_gone, fixture) {
 BOOST_FIXTURE_TEST_CASE(one_who_is_killed_and_starts_again_elsewhere_is_found_again, fixture) {
     cles::service asker{here, in_group("asker")};
     {
-        speaker dead{here, where}; // says no farewell
+        speaker dead{here, where}; // sends no farewell
         dead.announce("car1", R"({"interval_ms":250,"endpoints":["tcp://127.0.0.1:9"]})");
         until([&] { return knows(asker, "car1"); });
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What peers make a node hold stays within its budget, and is told.
+// Memory that peers cause a node to use stays within its budget, and is reported.
 
 #include <cles/service.hpp>
 
@@ -54,7 +54,7 @@ BOOST_DATA_TEST_CASE(many_large_results_that_nobody_reads_stay_within_it, every_
     run_until(io, [&] { return asked.size() == links * of_each; });
     const std::string picture(mebi - 1000, 'x');
     std::uint64_t most = 0;
-    for (std::size_t n = 0; n < of_each; ++n) { // one of each link in turn, else the first ones get all that there is
+    for (std::size_t n = 0; n < of_each; ++n) { // one of each link in turn, otherwise the first ones get all of it
         for (std::size_t i = 0; i < links; ++i) {
             asked[i * of_each + n].done(picture);
             most = std::max(most, memory(car, "used"));
@@ -66,7 +66,7 @@ BOOST_DATA_TEST_CASE(many_large_results_that_nobody_reads_stay_within_it, every_
     BOOST_TEST(memory(car, "limit") == budget);
     BOOST_TEST(memory(car, "refused") > 0U);
 
-    // Others are served meanwhile, and so is what is asked about the node on the very links that are full.
+    // Others are served meanwhile, and so are requests about the node itself on the full links.
     scripted_peer other{io, car.endpoints().front()};
     BOOST_TEST(other.ask("PULL self:speed") == R"({"value":7})");
     for (const auto& each : greedy) {
@@ -89,7 +89,7 @@ BOOST_DATA_TEST_CASE(many_large_results_that_nobody_reads_stay_within_it, every_
     run_until(io, [&] { return memory(car, "used") == 0; });
 }
 
-// A node that was stopped: its host takes connections for it, and nothing that is sent there is ever read.
+// A suspended node: its host accepts connections for it, and nothing that is sent there is ever read.
 struct stopped_node {
     explicit stopped_node(boost::asio::io_context& io) : door{io} {
         const boost::asio::ip::tcp::endpoint anywhere{boost::asio::ip::address_v4::loopback(), 0};
@@ -132,7 +132,7 @@ BOOST_AUTO_TEST_CASE(many_large_requests_to_a_stopped_node_stay_within_its_forwa
     BOOST_TEST(most >= budget / 3);
     const auto refused = std::count_if(all.begin(), all.end(), [](const auto& a) { return a->code == errc::busy; });
     const auto late = std::count_if(all.begin(), all.end(), [](const auto& a) { return a->code == errc::deadline; });
-    // Where the machine is slow, the hub meanwhile gives up the link on which nothing was taken for `stall`.
+    // On a slow machine, the hub meanwhile gives up the link on which nothing was accepted for `stall`.
     const auto lost = std::count_if(all.begin(), all.end(), [](const auto& a) { return a->code == errc::unavailable; });
     BOOST_TEST(refused + late + lost == 60);
     BOOST_TEST(refused > 0);
@@ -196,7 +196,7 @@ BOOST_AUTO_TEST_CASE(one_value_for_many_who_do_not_read_stays_within_it) {
         most = std::max(most, memory(car, "used"));
     }
     BOOST_TEST(most <= budget);
-    for (const auto& each : slow) { // the newest gets through
+    for (const auto& each : slow) { // the newest one succeeds
         while (each->line().find("\"19xxx") == std::string::npos) {
         }
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Bindings by multicast, over loopback; test/cli/multicast_test.py does it between hosts.
+// Bindings by multicast, over loopback; test/cli/multicast_test.py tests them between hosts.
 
 #include <cles/convert.hpp>
 #include <cles/service.hpp>
@@ -30,7 +30,7 @@ struct place {
 };
 BOOST_DESCRIBE_STRUCT(place, (), (x))
 
-/// Can be moved, and not copied.
+/// Movable, not copyable.
 struct leg {
     leg() = default;
     leg(leg&&) = default;
@@ -73,7 +73,7 @@ using cles::feed_event;
 
 namespace {
 
-/// Somebody in the group who is no node: hears all, and says what a test wants.
+/// A member of the group that is not a node: receives everything, and sends what a test specifies.
 struct stranger final : cles::core::group_listener {
     stranger(boost::asio::io_context& io, const cles::multicast_options& where)
         : port(std::make_shared<cles::transport::group_port>(io.get_executor(),
@@ -210,15 +210,15 @@ BOOST_FIXTURE_TEST_CASE(a_type_reads_a_datagram_once_for_all_its_feeds, network)
     BOOST_TEST(heard == (std::vector<int>{7, 7, 7}), boost::test_tools::per_element());
     BOOST_TEST(counted::reads == 1);
     heard.clear();
-    publish(counted{{8}}, 2); // what was read before is forgotten
+    publish(counted{{8}}, 2); // the previously read value is forgotten
     BOOST_TEST(heard == (std::vector<int>{8, 8, 8}), boost::test_tools::per_element());
     BOOST_TEST(text.items[1].value.text == R"({"x":8})");
     heard.clear();
-    publish(std::string{"eight"}, 3); // and what cannot be read is refused by each
+    publish(std::string{"eight"}, 3); // and each refuses what cannot be read
     BOOST_TEST(refused == 3);
 }
 
-// What a copy might share, or what cannot be copied, each feed reads for itself.
+// What copies might share, or what cannot be copied, is read by each feed separately.
 BOOST_FIXTURE_TEST_CASE(other_types_are_read_by_each_feed, network) {
     const auto car = node("car1");
     const auto tower1 = node("tower1");
@@ -320,7 +320,7 @@ BOOST_FIXTURE_TEST_CASE(closing_the_last_feed_and_stopping_say_goodbye, network)
     BOOST_TEST(sniffer.count("BIND all:place lease=0") == 0U);
     two.close();
     run_until(io, [&] { return metric(*car, "group_leases") == 0; });
-    run_ready(io); // each hears it by itself
+    run_ready(io); // each receives it separately
     BOOST_TEST(sniffer.count("BIND all:place lease=0") == 1U);
     feed_log three;
     until_bound(three, *tower, "all:speed");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Every option of the public structs at its smallest, at its largest and beyond both: it works, or it is refused with
-// an error that names it.
+// Every option of the public structs at its minimum, at its maximum and beyond both: it works, or it is refused with an
+// error that names it.
 
 #include <cles/limit_ranges.hpp>
 #include <cles/run.hpp>
@@ -35,7 +35,7 @@ using std::chrono::milliseconds;
 constexpr auto forever = milliseconds::max();
 constexpr auto never = milliseconds::min();
 
-// What making a service says of its limits; empty where it is made.
+// The error about limits when a service is made; empty if it is made.
 std::string refusal_of(const cles::limits& bounds) {
     boost::asio::io_context io;
     try {
@@ -91,12 +91,12 @@ cles::limits all_at(extreme e) {
     for (const auto& range : cles::time_ranges) {
         bounds.*range.member = e == extreme::least ? range.least : range.most;
     }
-    bounds.connect = std::max(bounds.connect, 5000ms); // within a millisecond is a matter of luck
+    bounds.connect = std::max(bounds.connect, 5000ms); // whether it succeeds within a millisecond is not deterministic
     bounds.stall = std::max(bounds.stall, 5000ms);
     return bounds;
 }
 
-// Many turns, so that what is renewed, timed and queued comes to its bounds too.
+// Many turns, so that what is renewed, timed and queued reaches its limits too.
 BOOST_DATA_TEST_CASE(with_all_limits_at_an_end_of_their_ranges_nodes_talk,
                      boost::unit_test::data::make({extreme::least, extreme::most}) *
                          boost::unit_test::data::make({carrier::tcp4, carrier::udp4, carrier::inproc}),
@@ -152,7 +152,7 @@ BOOST_FIXTURE_TEST_CASE(a_deadline_may_be_anything_from_nothing_on, nodes) {
             if (limit < 0ms) {
                 BOOST_TEST((got.code == errc::invalid_option), got.code.message());
                 BOOST_TEST(got.words.starts_with("call_options::deadline is "), got.words);
-            } else if (limit == 1ms) { // it may well be too short
+            } else if (limit == 1ms) { // it may be too short
                 BOOST_TEST((!got.code || got.code == errc::deadline), got.words);
             } else {
                 BOOST_TEST(!got.code, limit.count() << " ms: " << got.words);
@@ -163,7 +163,7 @@ BOOST_FIXTURE_TEST_CASE(a_deadline_may_be_anything_from_nothing_on, nodes) {
 
 struct bind_case {
     cles::bind_options options;
-    std::string_view refused{}; ///< the option; empty: it is taken
+    std::string_view refused{}; ///< the option; empty: it is accepted
 };
 
 BOOST_FIXTURE_TEST_CASE(a_bindings_options_work_or_are_refused_by_name, nodes) {
@@ -216,7 +216,7 @@ std::string refusal_of(const cles::run_options& how) {
         BOOST_TEST(ran == 0);
         return e.message();
     } catch (const std::system_error& e) {
-        return e.what(); // of the system, which may not allow the priority
+        return e.what(); // from the system, which may not allow the priority
     }
     BOOST_TEST(ran == 1);
     return {};
@@ -234,7 +234,7 @@ BOOST_AUTO_TEST_CASE(run_takes_any_time_from_nothing_and_the_priorities_there_ar
         BOOST_TEST(
             refusal_of(cles::run_options{.fifo_priority = priority}).starts_with("run_options::fifo_priority is "));
     }
-    for (const int priority : {1, 99}) { // the system's word counts, not ours
+    for (const int priority : {1, 99}) { // the system's error counts, not ours
         BOOST_TEST(!refusal_of(cles::run_options{.fifo_priority = priority}).starts_with("run_options"));
     }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A person with netcat, and others who are less polite: what a service says to a plain socket.
+// Clients such as netcat, well-behaved or not: what a service sends to a plain socket.
 
 #include <cles/service.hpp>
 
@@ -134,7 +134,7 @@ BOOST_DATA_TEST_CASE(a_bind_lives_on_after_a_half_close_until_a_write_fails, eve
     BOOST_TEST(!peer.ended());
 }
 
-// -- malformed, one after another: each gets its error, and the link stays -----------------------------------------
+// -- malformed lines in sequence: each gets its error, and the link stays open -------------------------------------
 
 BOOST_DATA_TEST_CASE(what_is_malformed_is_told_and_harms_nobody, every_socket, kind) {
     node n{kind};
@@ -199,7 +199,7 @@ BOOST_DATA_TEST_CASE(a_number_that_does_not_fit_is_told_with_its_place, every_so
     const auto nested = peer.ask(R"(PUSH self:many [{"utc":1,"lat":2,"lon":3},{"utc":1,"lat":true,"lon":3}])");
     BOOST_TEST(nested.find("[1].lat: expected a number") != std::string::npos, nested);
     const auto parameter = peer.ask("PULL self:speed/99999999999999999999");
-    BOOST_TEST(parameter == R"({"value":42})"); // its handler does not look at it
+    BOOST_TEST(parameter == R"({"value":42})"); // its handler does not read it
 }
 
 BOOST_DATA_TEST_CASE(a_malformed_line_is_answered_with_its_id, every_socket, kind) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a node sends by datagram to those who may not be who they say.
+// What a node sends by datagram to unverified source addresses.
 
 #include <cles/link.hpp>
 #include <cles/service.hpp>
@@ -22,7 +22,7 @@ namespace asio = boost::asio;
 
 namespace {
 
-/// A link from another host, which no test has.
+/// A link from another host, which tests do not have.
 class far_link final : public cles::link {
   public:
     explicit far_link(std::string address) {
@@ -132,7 +132,7 @@ BOOST_FIXTURE_TEST_CASE(updates_count_too, fixture) {
     for (int i = 0; i < 200; ++i) {
         car->update("much", std::string(1000, 'x'));
     }
-    run_ready(io); // all at once, so that time adds little
+    run_ready(io); // all at once, so that little time passes
     BOOST_TEST(one->bytes > 10000U);
     BOOST_TEST(one->bytes < 65536U);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// One service asks another, over each transport.
+// Requests from one service to another, over each transport.
 
 #include <cles/service.hpp>
 
@@ -121,7 +121,7 @@ BOOST_DATA_TEST_CASE(delegate_reports_progress_and_gives_the_result, carriers, k
     run_until(n.io, [&] { return n.job.has_value(); });
     BOOST_TEST(n.job->progress(0.25));
     BOOST_TEST(n.job->progress(0.5, cles::json_text{R"({"at":"bridge"})"}));
-    BOOST_TEST(n.job->progress(0.125)); // never falls
+    BOOST_TEST(n.job->progress(0.125)); // never decreases
     run_until(n.io, [&] { return reports.size() == 3; });
     BOOST_TEST(!result.done());
     n.job->done(localization{7, 8, 9});
@@ -226,7 +226,7 @@ BOOST_DATA_TEST_CASE(a_cancellation_slot_withdraws_at_the_peer, carriers, kind) 
     n.wait_for(withdrawn);
     BOOST_TEST(withdrawn.code == errc::cancelled);
     run_until(n.io, [&] { return stopped; });
-    BOOST_TEST(!n.job->progress(0.5)); // nobody listens
+    BOOST_TEST(!n.job->progress(0.5)); // without a listener
     signal.emit(boost::asio::cancellation_type::terminal);
     run_ready(n.io);
     BOOST_TEST(withdrawn.calls == 1);
@@ -279,11 +279,11 @@ BOOST_AUTO_TEST_CASE(a_name_that_nobody_knows_is_no_target) {
     for (const auto* noun : {"nobody:speed", "any:speed", "all:speed"}) {
         answer<> a;
         tower.async_pull(noun, a.options(), a.take());
-        BOOST_TEST(!a.done()); // never from inside the call
+        BOOST_TEST(!a.done()); // never inside the call
         run_until(io, [&] { return a.done(); });
         BOOST_TEST(a.code == errc::no_target, noun << ": " << a.code.message());
         BOOST_TEST(!a.words.empty());
-        BOOST_TEST(a.words.find("://") == std::string::npos, a.words); // an inner address is nobody's business
+        BOOST_TEST(a.words.find("://") == std::string::npos, a.words); // internal addresses must not be revealed
     }
 }
 
@@ -329,7 +329,7 @@ BOOST_AUTO_TEST_CASE(set_peer_says_where_a_node_is_now) {
     };
     const auto unknown = make_error_code(errc::no_target).message();
     BOOST_TEST(who() == unknown);
-    // It answers by the name `friend` only where it bears it, and says so.
+    // A node replies to requests for the name `friend` only if that is its name, and reports otherwise.
     tower.set_peer("friend", one.endpoints().front());
     BOOST_TEST(who() == unknown);
     cles::service bearer{io, listening("friend")};
@@ -341,11 +341,11 @@ BOOST_AUTO_TEST_CASE(set_peer_says_where_a_node_is_now) {
     BOOST_TEST(who() == "3");
     tower.set_peer("friend", two.endpoints().front());
     BOOST_TEST(who() == unknown);
-    tower.set_peer("friend", ""); // forgotten; but one of that name is on this context
+    tower.set_peer("friend", ""); // forgotten; but a node of that name is on this context
     BOOST_TEST(who() == "3");
 }
 
-// As with Asio's own operations: what a handler throws comes out of the context's run, and nothing else suffers.
+// As with Asio's own operations: an exception from a handler leaves the context's run, and affects nothing else.
 BOOST_DATA_TEST_CASE(a_completion_handler_that_throws_harms_no_other, carriers, kind) {
     two_nodes n{kind};
     struct thrown_by_test {};

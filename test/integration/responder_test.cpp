@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Jobs that ask others while they are asked themselves.
+// Jobs that send requests while they serve one.
 
 #include <cles/service.hpp>
 
@@ -29,7 +29,7 @@ using namespace cles::test;
 using namespace std::chrono_literals;
 using cles::errc;
 
-// The user asks the car, whose job asks the tower.
+// The user sends a request to the car, whose job sends one to the tower.
 struct nodes {
     nodes() {
         tower->on_delegate("plan", [this](const cles::request& asked, const cles::responder& answer) {
@@ -52,7 +52,7 @@ struct nodes {
     void until(F f) {
         run_until(io, std::move(f));
     }
-    // What the job was told.
+    // What was reported to the job.
     cles::answer_callback heard() {
         return [this](boost::system::error_code code, std::string_view json, std::string_view words) {
             ++answers;
@@ -135,9 +135,9 @@ BOOST_AUTO_TEST_CASE(what_it_asked_is_withdrawn_when_it_is_itself) {
     until([&] { return plans_stopped == 2 && answers == 2; });
     BOOST_TEST(heard_code == cles::make_error_code(errc::cancelled));
     BOOST_TEST(told_before == 1);
-    // Afterwards it may not ask any more.
+    // Afterwards it may not send any more requests.
     job->delegate("PULL tower:wind", heard());
-    BOOST_TEST(answers == 2); // it is told so later, never from inside the call
+    BOOST_TEST(answers == 2); // reported later, never inside the call
     until([&] { return answers == 3; });
     BOOST_TEST(heard_code == cles::make_error_code(errc::cancelled));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Services that act for their clients: a client of one reaches all that this one knows.
+// Services that route for their clients: a client of one reaches every node that it knows.
 
 #include <cles/service.hpp>
 
@@ -29,8 +29,8 @@ using cles::errc;
 
 namespace {
 
-/// A hub that routes, and a client that knows nobody else. The others run on a context of their own, so that they are
-/// reached by links.
+/// A hub that routes, and a client that knows no other node. The others run on a separate context, so they are reached
+/// by links.
 struct fixture {
     std::unique_ptr<cles::service> serving(const std::string& name, bool in_group = true,
                                            cles::service_options options = {}) {
@@ -43,7 +43,7 @@ struct fixture {
         made->on_pull("who", [name] { return name; });
         return made;
     }
-    /// The hub, from now on.
+    /// The hub, from this call on.
     cles::service& start_hub(bool in_group = true) {
         cles::service_options options{.name = "hub"};
         options.listen = {"tcp://127.0.0.1:0"};
@@ -91,7 +91,7 @@ struct fixture {
         until([&] { return result->ended; });
         return *result;
     }
-    /// Until the hub knows what so many others offer.
+    /// Until the hub knows the tasks of this many nodes.
     void until_all_answer(std::size_t others, const std::string& command) {
         until([&] {
             const auto answer = asked(command);
@@ -122,7 +122,7 @@ BOOST_FIXTURE_TEST_CASE(a_client_of_the_hub_reaches_a_node_that_only_the_hub_kno
     BOOST_TEST((none.code == errc::no_task));
     BOOST_TEST(none.why == "car1 has no PULL 'nothing'");
     BOOST_TEST((asked("PULL car9:who").code == errc::no_target));
-    BOOST_TEST((asked("PULL any:who").code == errc::no_target)); // nobody has announced itself
+    BOOST_TEST((asked("PULL any:who").code == errc::no_target)); // no node has announced itself
 }
 
 BOOST_FIXTURE_TEST_CASE(progress_and_cancellation_pass_the_hub, fixture) {
@@ -224,7 +224,7 @@ BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_full_node_refuses_the_link
     first->on_bind("place");
     scripted_peer inside{there, first->endpoints().front()};
     BOOST_TEST(inside.ask("BIND self:place") == "{}");
-    // It offers what car2 does, so that it need not be asked for that first.
+    // It offers the same as car2, so it need not be asked for its tasks first.
     std::string metrics;
     until([&] {
         const auto answer = asked("PULL any:who");
@@ -233,7 +233,7 @@ BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_full_node_refuses_the_link
         metrics = inside.ask("PULL self:cles/metrics");
         return metrics.find("\"links_refused\":0,") == std::string::npos;
     });
-    // By its name it is busy, as car1 says.
+    // By its name it is busy, as car1 reports.
     const auto named = asked("PULL car1:who");
     BOOST_TEST((named.code == errc::busy), named.why);
     BOOST_TEST(named.why == "car1 has as many links as it may");
@@ -315,7 +315,7 @@ BOOST_FIXTURE_TEST_CASE(what_was_published_before_the_node_was_bound_again_reach
     BOOST_TEST(feed.bodies().back() == "{\"value\":\"again\"}");
     BOOST_TEST(feed.items.back().seq == 1U);
     BOOST_TEST(feed.count(cles::feed_event::gap) == 0U);
-    // Who binds now is told which update that was.
+    // A client that binds now learns which update that was.
     scripted_peer raw{here, hub->endpoints().front()};
     raw.send("BIND car1:pose id=5 mark=yes\n");
     std::string reply;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// cles::run, which owns how a thread waits for work.
+// cles::run, which determines how a thread waits for work.
 
 #include <cles/run.hpp>
 #include <cles/service.hpp>
@@ -43,7 +43,7 @@ BOOST_DATA_TEST_CASE(ends_when_the_context_is_out_of_work, bounds, bound) {
 BOOST_DATA_TEST_CASE(ends_when_the_context_is_stopped, bounds, bound) {
     asio::io_context io;
     const auto busy = asio::make_work_guard(io);
-    asio::steady_timer timer{io, 20ms}; // longer than it looks for work
+    asio::steady_timer timer{io, 20ms}; // longer than it polls for work
     timer.async_wait([&](boost::system::error_code) { io.stop(); });
     cles::run(io, {.busy_poll = bound});
     BOOST_TEST(io.stopped());

@@ -47,7 +47,7 @@ struct nodes {
     cles::service tower{io, knowing("tower", car)};
 };
 
-// Runs the coroutine to its end, and throws on what it throws.
+// Runs the coroutine to its end, and rethrows its exception.
 void run_to_end(asio::io_context& io, asio::awaitable<void> work) {
     bool ended = false;
     std::exception_ptr thrown;
@@ -167,7 +167,7 @@ BOOST_AUTO_TEST_CASE(a_future_gives_the_result_to_another_thread) {
     side_thread home;
     std::unique_ptr<nodes> n;
     home.run([&] { n = std::make_unique<nodes>(); });
-    // The services live on a context of their own, which this thread does not run: it is run by hand over there.
+    // The services use a separate context, which this thread does not run.
     auto result = home.run([&] {
         auto future = n->tower.async_pull<localization>("car1:localization", asio::use_future);
         auto failed = n->tower.async_pull("car1:altitude", asio::use_future);

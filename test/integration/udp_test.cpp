@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Requests and bindings by datagram, over networks that treat them well.
+// Requests and bindings by datagram, over networks without impairments.
 
 #include <cles/service.hpp>
 
@@ -59,7 +59,7 @@ class plain_client {
         send(datagram);
         return receive();
     }
-    /// Nothing comes.
+    /// Nothing arrives.
     bool silent() {
         run_ready(io_);
         return socket_.available() == 0;
@@ -262,7 +262,7 @@ BOOST_AUTO_TEST_CASE(a_feed_renews_and_its_binding_stays) {
         n.car->update("place", ++published);
         run_until(n.io, [&] { return feed.items.size() == static_cast<std::size_t>(published); });
     }
-    BOOST_TEST(feed.count(feed_event::update) == feed.items.size()); // no loss, no return, no gap
+    BOOST_TEST(feed.count(feed_event::update) == feed.items.size()); // no loss, no rebinding, no gap
     BOOST_TEST(metric(*n.car, "leases_expired") == 0U);
 }
 
@@ -314,7 +314,7 @@ BOOST_AUTO_TEST_CASE(a_lost_publisher_is_reported_when_the_lease_is_over_and_bou
     path.set({.loss = 1});
     const auto dark = std::chrono::steady_clock::now();
     run_until(n.io, [&] { return feed.count(feed_event::lost) == 1; });
-    BOOST_TEST((std::chrono::steady_clock::now() - dark >= 100ms)); // what was left of the lease, at least
+    BOOST_TEST((std::chrono::steady_clock::now() - dark >= 100ms)); // at least what remained of the lease
     n.car->update("place", 2);
     path.set({});
     run_until(n.io, [&] { return feed.count(feed_event::rebound) == 1 && feed.count(feed_event::current) == 2; });

@@ -52,7 +52,7 @@ void ask(cles::service& by, asking how, const std::string& node, int which, cons
     }
 }
 
-/// Begins three requests, of which the second acts, and has them end there. Whoever is asked is silent, or answers.
+/// Starts three requests, the second of which acts, and completes them there. The peer is silent, or replies.
 /// `reports`: of the second.
 template <class Act>
 void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>& calls,
@@ -87,7 +87,7 @@ void end_three(world& w, asking how, place where, Act acting, std::array<int, 3>
     } else if (where == place::stop) {
         w.tower->stop();
     }
-    BOOST_TEST(calls[1] == 0); // never from inside the call
+    BOOST_TEST(calls[1] == 0); // never inside the call
     BOOST_TEST(w.acted == 0);
 }
 
@@ -109,7 +109,7 @@ BOOST_DATA_TEST_CASE(a_completion_handler_may_do_anything, data::make(every_aski
 
 BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_asking) * every_place * every_deed, how,
                      where, does) {
-    if (does == deed::throws) { // no destructor does
+    if (does == deed::throws) { // destructors do not throw
         return;
     }
     world w;
@@ -121,10 +121,10 @@ BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_
     check_that_three_are_called(w, does, calls);
 }
 
-// A function for progress goes with its request.
+// A progress function is destroyed with its request.
 BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
                      does) {
-    if (does == deed::throws) { // no destructor does
+    if (does == deed::throws) { // destructors do not throw
         return;
     }
     world w;

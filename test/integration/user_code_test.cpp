@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Every kind of code of the user's that the library calls, what it may do, and where it may be called: nobody else is
-// harmed (CONTRIBUTING.md, "User code"). Completion handlers of requests: user_code_completions_test.cpp.
+// Every kind of user code that the library calls, what it may do, and where it may be called: nothing else is harmed
+// (CONTRIBUTING.md, "User code"). Completion handlers of requests: user_code_completions_test.cpp.
 
 #include <cles/service.hpp>
 
@@ -53,7 +53,7 @@ void offer_acting(world& w, deed does, int& quick) {
 
 constexpr std::array acting{"plain", "later", "awaited"};
 
-/// The requests 1, of one that acted, and 2, of "quick", have been answered, where anybody is left to answer.
+/// The requests 1, which acted, and 2, of "quick", have been replied to, if the service still exists.
 void check_answers(world& w, scripted_peer& peer, deed does, int quick) {
     w.run_what_is_ready();
     BOOST_TEST(w.thrown == 0);
@@ -68,7 +68,7 @@ void check_answers(world& w, scripted_peer& peer, deed does, int quick) {
     w.check_that_it_lives(does);
 }
 
-/// Begins three operations, each with a handler and a cancellation slot of its own: the second handler acts.
+/// Starts three operations, each with a separate handler and cancellation slot: the second handler acts.
 template <class Begin>
 void begin_three(world& w, deed does, std::array<int, 3>& calls, Begin begin) {
     const std::array<asio::cancellation_signal*, 3> signals{&w.first, &w.second, &w.third};
@@ -184,10 +184,10 @@ BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_dee
     BOOST_TEST(b.calls == 1);
 }
 
-// It goes with its operation, or behind it; never inside a call of the library.
+// It is destroyed with its operation, or after it; never inside a call of the library.
 BOOST_DATA_TEST_CASE(what_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
                      does) {
-    if (does == deed::throws) { // no destructor does
+    if (does == deed::throws) { // destructors do not throw
         return;
     }
     for (const bool sent : {false, true}) { // or it waits for its link
@@ -272,7 +272,7 @@ BOOST_DATA_TEST_CASE(who_is_told_to_stop_may_do_anything, data::make(every_deed)
     }
 }
 
-// What a handler throws is its answer; the lines behind it are served.
+// An exception from a handler becomes its reply; the lines after it are served.
 BOOST_DATA_TEST_CASE(a_handler_for_requests_may_do_anything, data::make(every_deed), does) {
     for (const auto* task : acting) {
         BOOST_TEST_CONTEXT(task) {
@@ -287,7 +287,7 @@ BOOST_DATA_TEST_CASE(a_handler_for_requests_may_do_anything, data::make(every_de
     }
 }
 
-// As one of those that `any` or `all` mean.
+// As one of the nodes that `any` or `all` select.
 BOOST_DATA_TEST_CASE(a_handler_that_is_chosen_may_do_anything, data::make({"any", "all"}) * every_deed, target, does) {
     for (const auto* task : acting) {
         BOOST_TEST_CONTEXT(task) {
@@ -304,7 +304,7 @@ BOOST_DATA_TEST_CASE(a_handler_that_is_chosen_may_do_anything, data::make({"any"
     }
 }
 
-// It begins in a turn of its link, wherever the request before it ends: there the library may go through a list that
+// It starts in a turn of its link, wherever the request before it ends: there the library may iterate over a list that
 // the handler changes.
 BOOST_DATA_TEST_CASE(a_handler_whose_request_has_waited_may_do_anything,
                      data::make({place::reply, place::deadline}) * every_deed, where, does) {
@@ -320,11 +320,11 @@ BOOST_DATA_TEST_CASE(a_handler_whose_request_has_waited_may_do_anything,
             peer.send("DELEGATE self:job deadline=" + std::string{where == place::deadline ? "30" : "20000"} +
                       "\nPULL self:" + task + "\nPULL self:quick id=2\n");
             w.until([&] { return begun.size() == 1; });
-            w.until([&] { return quick == 1; }); // all that has come has been read
+            w.until([&] { return quick == 1; }); // everything that has arrived has been read
             BOOST_TEST(peer.line().starts_with("id=2 "));
             if (where == place::reply) {
                 begun[0].done(1);
-                BOOST_TEST(w.acted == 0); // not from inside the call
+                BOOST_TEST(w.acted == 0); // not inside the call
             }
             w.until([&] { return w.acted == 1; });
             w.run_what_is_ready();
@@ -339,7 +339,7 @@ BOOST_DATA_TEST_CASE(a_handler_whose_request_has_waited_may_do_anything,
     }
 }
 
-// By the program, when it is asked for its load: nothing is begun for a service that is gone.
+// By the program, when it is asked for its load: nothing is started for a destroyed service.
 BOOST_DATA_TEST_CASE(a_service_that_is_stopped_while_it_chooses_begins_nothing,
                      data::make({deed::stops_service, deed::destroys_service}), does) {
     for (const auto* task : acting) {
@@ -369,7 +369,7 @@ BOOST_DATA_TEST_CASE(a_service_that_is_stopped_while_it_chooses_begins_nothing,
     }
 }
 
-// The functions that give the library something back.
+// The functions that return something to the library.
 BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(every_deed), does) {
     for (const std::string which : {"authorise", "load", "metrics", "log"}) {
         BOOST_TEST_CONTEXT(which) {
@@ -418,7 +418,7 @@ BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(ev
             BOOST_TEST(w.thrown == 0);
             const bool ended = does == deed::stops_service || does == deed::destroys_service;
             if (ended) {
-                BOOST_TEST(served == 1); // nothing is begun that was allowed by a service that is gone
+                BOOST_TEST(served == 1); // nothing is started that was allowed by a destroyed service
             } else if (which == "log") {
                 BOOST_TEST(peer.rest().empty());
             } else {
@@ -438,7 +438,7 @@ BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(ev
     }
 }
 
-// Links that are closed at one time, each with an entry of the log.
+// Links that are closed at the same time, each with an entry of the log.
 BOOST_DATA_TEST_CASE(the_log_of_a_deadline_may_do_anything, data::make(every_deed), does) {
     for (const bool stalled : {false, true}) {
         BOOST_TEST_CONTEXT((stalled ? "stalled" : "silent")) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The bound of the time that cores take to wake, which the kernel keeps for the whole host.
+// The limit on the wake-up latency of cores, which the kernel keeps for the whole host.
 
 #include <cles/wake_bound.hpp>
 
@@ -23,7 +23,7 @@ using namespace std::chrono_literals;
 
 constexpr const char* device_path = "/dev/cpu_dma_latency";
 
-// In microseconds: the least that any program asks for.
+// In microseconds: the minimum that any program requests.
 std::optional<std::int32_t> allowed_to_take() {
     std::ifstream device{device_path, std::ios::binary};
     std::array<char, sizeof(std::int32_t)> bytes{};
@@ -36,17 +36,17 @@ std::optional<std::int32_t> allowed_to_take() {
 bool holds_open(const std::filesystem::path& file) {
     const std::filesystem::directory_iterator all{"/proc/self/fd"};
     return std::any_of(begin(all), end(all), [&](const auto& each) {
-        std::error_code gone; // that of the folder itself
+        std::error_code gone; // for the descriptor of the folder itself
         return std::filesystem::read_symlink(each, gone) == file;
     });
 }
 
-// Where the host does not let us, there is nothing to see but how that is told.
+// If the host does not permit it, only the report of that can be tested.
 bool is_kept_by_the_host(std::chrono::microseconds asked, std::int32_t expected) {
     try {
         const cles::wake_bound bound{asked};
         const auto during = allowed_to_take();
-        return holds_open(device_path) && during && *during <= expected; // another program may ask for less
+        return holds_open(device_path) && during && *during <= expected; // another program may request less
     } catch (const std::system_error& refused) {
         return std::string{refused.what()}.find(device_path) != std::string::npos;
     }
