@@ -76,7 +76,7 @@ class cluster final : public node_hosts {
         int ends = 0;
         bool succeeded = false;
         errc code{};
-        int ran = 0; ///< how many times, anywhere
+        int ran = 0; ///< the number of executions, on any node
     };
 
     // -- nodes -----------------------------------------------------------------------------------------------------
@@ -126,7 +126,7 @@ class cluster final : public node_hosts {
         n.crash();
     }
 
-    // -- trouble ---------------------------------------------------------------------------------------------------
+    // -- faults ----------------------------------------------------------------------------------------------------
 
     void go_wrong() {
         const auto host = chance_.chance(150) ? hub_host : any_worker();
@@ -158,7 +158,7 @@ class cluster final : public node_hosts {
 
     unsigned any_worker() { return workers[chance_.below(static_cast<unsigned>(workers.size()))]; }
 
-    // -- asking ----------------------------------------------------------------------------------------------------
+    // -- requests --------------------------------------------------------------------------------------------------
 
     void ask(bool vital) {
         static constexpr std::array<std::pair<verb, std::string_view>, 4> kinds{{{verb::delegate, "any:once"},
@@ -195,7 +195,7 @@ class cluster final : public node_hosts {
         return a;
     }
 
-    // -- judging ---------------------------------------------------------------------------------------------------
+    // -- checks ----------------------------------------------------------------------------------------------------
 
     void complain(rule which, const asked& a, const std::string& what) {
         watcher_.broken(which, "request " + std::to_string(a.op) + " " + what);

@@ -11,7 +11,7 @@
 
 namespace cles::simulation {
 
-/// What came of a cluster's life.
+/// The result of a simulated cluster.
 struct cluster_report {
     std::vector<violation> violations;
     std::size_t succeeded = 0; ///< of the client's requests
@@ -19,9 +19,10 @@ struct cluster_report {
     std::size_t refused = 0; ///< of those that failed
 };
 
-/// The life of a cluster in virtual time: one node that routes, three that work for it as daemons do, and a client that
-/// asks for `any` and `all`. Workers and the router crash, stop and begin again, their clocks jump, and links and ways
-/// are cut, in one direction too. After the trouble comes calm, in which requests have to succeed, then silence.
+/// Simulates a cluster in virtual time: one node that routes, three workers that serve as daemons do, and a client that
+/// sends requests to `any` and `all`. Workers and the router crash, are suspended and restart, their clocks jump, links
+/// are lost, and networks are partitioned, also in one direction. After the faults comes a period in which requests
+/// have to succeed, then one without activity.
 cluster_report simulate_cluster(std::uint64_t seed, std::chrono::seconds trouble, planted fault = planted::none);
 
 } // namespace cles::simulation

@@ -18,15 +18,15 @@ namespace cles::simulation {
 namespace {
 
 constexpr std::size_t headers = 52;      // of IP and TCP, with time stamps
-constexpr std::size_t segment = 1448;    // what a packet carries besides
-constexpr std::size_t request_head = 64; // "PULL self:cles/peers id=... deadline=2000 since=", and alike
+constexpr std::size_t segment = 1448;    // the payload of a packet
+constexpr std::size_t request_head = 64; // "PULL self:cles/peers id=... deadline=2000 since=", and similar
 constexpr std::size_t reply_head = 12;   // "id=... "
 constexpr std::size_t most_known = 2'000;
-constexpr std::chrono::seconds settles{20}; // after a pause, until it is judged again
+constexpr std::chrono::seconds settles{20}; // after a pause, until it is checked again
 
 std::size_t on_the_wire(std::size_t bytes) { return bytes + headers * (1 + bytes / segment); }
 
-// Epochs are random: those of a run of numbers would fall into order.
+// Epochs are random: consecutive numbers would be ordered.
 std::uint32_t scattered(std::uint32_t n) { return n * 2654435761U; }
 
 } // namespace
@@ -35,14 +35,14 @@ struct gossip_network::message {
     enum class kind : std::uint8_t { ask, table, push, failure };
     kind what = kind::ask;
     std::size_t from = 0;
-    std::uint32_t to_run = 0; // of the receiver, for what answers; 0: whichever
+    std::uint32_t to_run = 0; // of the receiver, for replies; 0: any
     std::uint32_t from_run = 0;
     std::uint64_t ticket = 0;
     std::string text{};
     std::string describe{};
 };
 
-/// One node, from its start to its end.
+/// One incarnation of a node.
 class gossip_network::member final : public place,
                                      public core::announcer::sender,
                                      public core::gossip::client,
@@ -63,7 +63,7 @@ class gossip_network::member final : public place,
 
     void begin() {
         mouth.start(now());
-        deadlines.expire(now()); // it speaks before it asks
+        deadlines.expire(now()); // it announces itself before it sends requests
         gossip.set_seeds(net.seeds_, now());
         gossip.start(now());
     }
@@ -80,11 +80,11 @@ class gossip_network::member final : public place,
                   .ticket = ticket,
                   .text = std::string{since},
                   .describe = std::string{describe}});
-        // Where no answer comes, the link's own machine tells so when the time is up.
+        // If no reply arrives, the link's own code reports that at the deadline.
         net.deliver(net.time_.now() + core::gossip::limit, host(),
                     {.what = message::kind::failure, .to_run = run_number, .ticket = ticket});
     }
-    void ask_description(std::uint64_t, std::string_view) override {} // all here know `since`
+    void ask_description(std::uint64_t, std::string_view) override {} // all nodes here know `since`
     void push(std::string_view at, std::string_view table) override {
         post(at, {.what = message::kind::push, .text = std::string{table}});
     }
@@ -164,7 +164,7 @@ std::size_t gossip_network::start(std::size_t count, milliseconds within, std::s
 
 // -- time ----------------------------------------------------------------------------------------------------------
 
-// Has its timers run when the next one is due.
+// Runs its timers when the next one is due.
 void gossip_network::wake(member& m) {
     const auto next = m.deadlines.next();
     if (!m.alive || !next) {
@@ -218,7 +218,7 @@ void gossip_network::send(std::size_t from, std::size_t to, message what) {
     }
     const auto way = weather_.quickest + dice_.within(weather_.slowest - weather_.quickest) +
                      delay_by_loss(1 + what.text.size() / segment);
-    if (!members_[to]->alive) { // there is nobody: the system there says so
+    if (!members_[to]->alive) { // no node runs there: the system rejects it
         if (what.what == message::kind::ask && (!passes_ || passes_(to, from))) {
             deliver(time_.now() + way * 2, from,
                     {.what = message::kind::failure, .to_run = what.from_run, .ticket = what.ticket});
@@ -242,7 +242,8 @@ void gossip_network::deliver(time_point when, std::size_t to, message what) {
     });
 }
 
-// Streams and requests by datagram alike send again what is lost, first after 200 ms, then at doubling pauses.
+// Lost data is sent again on streams and for requests by datagram alike, first after 200 ms, then at doubling
+// intervals.
 std::chrono::microseconds gossip_network::delay_by_loss(std::size_t packets) {
     std::chrono::microseconds delay{0};
     bool lost = false;
@@ -283,7 +284,7 @@ void gossip_network::handle(member& m, message& what) {
     }
 }
 
-// -- what happens to nodes -----------------------------------------------------------------------------------------
+// -- faults of nodes -----------------------------------------------------------------------------------------------
 
 void gossip_network::kill(std::size_t node) { members_[node]->alive = false; }
 
@@ -314,7 +315,7 @@ void gossip_network::pause(std::size_t node, std::chrono::microseconds span) {
 
 void gossip_network::jump(std::size_t node, milliseconds ahead) { members_[node]->jump(ahead); }
 
-// Pauses are as long, and as far apart, as makes up their share of time.
+// Durations and intervals of pauses are chosen to make up their share of time.
 void gossip_network::plan_pause(std::size_t node, time_point after) {
     if (weather_.paused == 0) {
         return;
@@ -330,7 +331,7 @@ void gossip_network::plan_pause(std::size_t node, time_point after) {
     });
 }
 
-// -- what came of it -----------------------------------------------------------------------------------------------
+// -- results -------------------------------------------------------------------------------------------------------
 
 std::size_t gossip_network::living() const {
     return static_cast<std::size_t>(

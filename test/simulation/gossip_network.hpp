@@ -16,9 +16,9 @@
 
 namespace cles::simulation {
 
-/// What the network between nodes that gossip is like.
+/// The properties of the network between nodes that gossip.
 struct gossip_weather {
-    unsigned loss = 0; ///< of packets, per mille: what they carry comes later
+    unsigned loss = 0; ///< of packets, per mille: their contents arrive later
     std::chrono::microseconds quickest{200};
     std::chrono::microseconds slowest{5'000};
     unsigned paused = 0; ///< of each node's time, per mille
@@ -26,9 +26,8 @@ struct gossip_weather {
     std::chrono::milliseconds max_pause{10'000};
 };
 
-/// Nodes by the hundred or thousand that find each other by seeds and gossip, in virtual time. What decides is the
-/// library's own: presence, announcer, gossip, and the tables as text. What is simulated is the links, and what goes
-/// wrong.
+/// Hundreds or thousands of nodes that discover each other by seeds and gossip, in virtual time. The decisions are made
+/// by the library's own classes: membership, announcer, gossip, and the tables as text. Links and faults are simulated.
 class gossip_network {
   public:
     using milliseconds = std::chrono::milliseconds;
@@ -38,42 +37,43 @@ class gossip_network {
     gossip_network& operator=(const gossip_network&) = delete;
     ~gossip_network();
 
-    /// Starts nodes within so long, of which the first few are the seeds of all; returns the first one's number.
+    /// Starts nodes within this time, the first few of which are the seeds of all; returns the first one's number.
     std::size_t start(std::size_t count, milliseconds within, std::size_t seeds = 3);
-    /// Lets time go by.
+    /// Advances the time.
     void pass(milliseconds span) { time_.run_until(time_.now() + span); }
-    /// Until it holds, looked at every half second, or the limit; how long it took.
+    /// Runs until the condition holds, checked every half second, or to the limit; returns the time that it took.
     milliseconds pass_until(const std::function<bool()>& holds, milliseconds limit);
 
     void kill(std::size_t node);
     void leave(std::size_t node);
-    /// Begins again: another epoch, the same name and address.
+    /// Starts another incarnation: another epoch, the same name and address.
     void restart(std::size_t node);
-    /// Its process stands still for so long.
+    /// Suspends its process for this time.
     void pause(std::size_t node, std::chrono::microseconds span);
-    /// Its clock goes ahead at once.
+    /// Its clock jumps ahead.
     void jump(std::size_t node, milliseconds ahead);
-    /// What one node sends to another passes only where this allows it; empty: always.
+    /// Messages between two nodes are delivered only if this allows it; empty: always.
     void allow(std::function<bool(std::size_t, std::size_t)> passes) { passes_ = std::move(passes); }
     void set_weather(gossip_weather weather) { weather_ = weather; }
 
-    /// Every node that lives, and has not been paused lately, holds every other such for live, in its current run.
+    /// Every running node that has not been paused lately considers every other such node live, in its current
+    /// incarnation.
     [[nodiscard]] bool whole() const { return missing() == 0; }
-    /// Of all pairs of living nodes that have not been paused lately, those of which the first does not hold the second
-    /// for live.
+    /// The number of pairs of running nodes that have not been paused lately of which the first does not consider the
+    /// second live.
     [[nodiscard]] std::size_t missing() const;
-    /// How many hold a node for live.
+    /// How many nodes consider this one live.
     [[nodiscard]] std::size_t holding(std::size_t node) const { return listing(node, false); }
-    /// And for suspect.
+    /// How many nodes consider it suspect.
     [[nodiscard]] std::size_t suspecting(std::size_t node) const { return listing(node, true); }
     [[nodiscard]] std::size_t clashes() const noexcept { return clashes_; }
-    /// Live nodes that somebody took for gone, or for suspect.
+    /// Live nodes that another node considered gone, or suspect.
     [[nodiscard]] std::size_t false_deaths() const noexcept { return false_deaths_; }
     [[nodiscard]] std::size_t false_suspicions() const noexcept { return false_suspicions_; }
     void forget_verdicts() noexcept { false_deaths_ = false_suspicions_ = clashes_ = 0; }
 
-    /// Bytes that nodes received since this was asked last, IP and TCP headers counted: of all on average, and the
-    /// most.
+    /// Bytes that nodes received since the last call, including IP and TCP headers: the average of all nodes, and the
+    /// maximum.
     struct received {
         double average = 0;
         double most = 0;
@@ -81,7 +81,7 @@ class gossip_network {
     received take_received(milliseconds within);
 
     [[nodiscard]] std::size_t living() const;
-    /// The most that waited anywhere to be read.
+    /// The longest queue of unread messages.
     [[nodiscard]] std::size_t deepest_queue() const noexcept { return deepest_queue_; }
 
   private:

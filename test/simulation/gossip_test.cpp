@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Nodes by the dozen, and once more than a hundred, that find each other without multicast, in virtual time.
-// `scripts/simulate gossip` does the same with a thousand, for half an hour.
+// Dozens of nodes, and once more than a hundred, that discover each other without multicast, in virtual time.
+// `scripts/simulate gossip` simulates a thousand, for half an hour.
 #include "simulation/gossip_network.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -18,7 +18,7 @@ using cles::simulation::planted;
 namespace {
 
 constexpr bool is_slow = CLES_SIMULATION_IS_SLOW;
-constexpr std::size_t some = 36; // enough that nobody asks everybody
+constexpr std::size_t some = 36; // enough that no node asks all others
 constexpr gossip_weather rough{.loss = 50, .paused = 20};
 
 } // namespace
@@ -57,7 +57,7 @@ BOOST_AUTO_TEST_CASE(a_network_that_was_cut_in_two_is_whole_within_15_s) {
     BOOST_TEST(net.whole());
     net.allow([](std::size_t from, std::size_t to) { return from % 2 == to % 2; });
     net.pass(30s);
-    BOOST_TEST(net.missing() == some * (some / 2)); // each half has let the other one go
+    BOOST_TEST(net.missing() == some * (some / 2)); // each half has removed the other one
     net.allow({});
     BOOST_TEST((net.pass_until([&] { return net.whole(); }, 15s) < 15s));
     BOOST_TEST(net.clashes() == 0U);
@@ -78,7 +78,7 @@ BOOST_AUTO_TEST_CASE(nobody_is_lost_where_messages_pass_one_way_only) {
     net.start(some, 1s);
     net.pass(10s);
     net.forget_verdicts();
-    // A third hears the others, and is not heard by them; then the other way round.
+    // One third receives from the others, but they do not receive from it; then the other way round.
     net.allow([](std::size_t from, std::size_t to) { return from % 3 != 0 || to % 3 == 0; });
     net.pass(5s);
     net.allow([](std::size_t from, std::size_t to) { return from % 3 == 0 || to % 3 != 0; });
@@ -97,7 +97,7 @@ BOOST_AUTO_TEST_CASE(a_silent_death_is_noticed_everywhere_within_3_5_intervals) 
     BOOST_TEST(net.holding(20) == 0U);
     BOOST_TEST(net.suspecting(20) == some - 1);
     net.pass(12s);
-    BOOST_TEST(net.suspecting(20) == 0U); // gone, after 15 of them
+    BOOST_TEST(net.suspecting(20) == 0U); // gone, after 15 intervals
 }
 
 BOOST_AUTO_TEST_CASE(in_a_small_network_it_is_noticed_as_soon) {
@@ -120,7 +120,7 @@ BOOST_AUTO_TEST_CASE(a_node_that_leaves_is_known_by_nobody_after_a_second) {
     BOOST_TEST(net.holding(7) == 0U);
     BOOST_TEST(net.suspecting(7) == 0U);
     net.pass(30s);
-    BOOST_TEST(net.holding(7) == 0U); // and no old news brings it back
+    BOOST_TEST(net.holding(7) == 0U); // and no outdated entry brings it back
 }
 
 BOOST_AUTO_TEST_CASE(nodes_that_crash_and_begin_again_are_found_without_a_clash) {
@@ -128,7 +128,7 @@ BOOST_AUTO_TEST_CASE(nodes_that_crash_and_begin_again_are_found_without_a_clash)
     net.start(some, 1s);
     net.pass(10s);
     for (std::size_t i = 0; i < some; i += 3) {
-        net.restart(i); // seeds too
+        net.restart(i); // including seeds
         net.pass(100ms);
     }
     net.pass(15s);
@@ -185,11 +185,11 @@ BOOST_AUTO_TEST_CASE(what_waits_to_be_read_is_bounded) {
     net.pass(10s);
     net.pause(3, 30s);
     net.pass(40s);
-    // Each of those who ask gives up, and asks another one.
+    // Each node that asks it gives up, and asks another one.
     BOOST_TEST(net.deepest_queue() < some * 8);
 }
 
-// That what is looked at above can be seen to fail.
+// The checks above can detect failures.
 
 BOOST_AUTO_TEST_CASE(a_jump_that_is_not_noticed_is_found) {
     gossip_network net{11, {}, planted::excuse_forgotten};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Networks of hundreds of nodes that announce themselves, in virtual time, over a group that loses some of it.
+// Networks of hundreds of nodes that announce themselves, in virtual time, over a group that loses some datagrams.
 
 #include "node/membership/discovery.hpp"
 #include "node/membership/membership.hpp"
@@ -132,7 +132,7 @@ BOOST_AUTO_TEST_CASE(what_a_node_hears_stays_level_as_the_network_grows) {
             BOOST_TEST(m->count(cles::peer_state::live) == each->living().size() - 1);
         }
     }
-    // A second of interval, or 3 s; each up to a quarter less.
+    // An interval of 1 s, or 3 s; each up to a quarter shorter.
     const auto of_small = small.announced_within(12s);
     BOOST_TEST(of_small >= 600U);
     BOOST_TEST(of_small <= 800U);
@@ -164,7 +164,7 @@ BOOST_AUTO_TEST_CASE(where_a_tenth_of_it_is_lost_nobody_is_taken_for_gone) {
             silent += m->count(cles::peer_state::suspect);
         }
     }
-    BOOST_TEST(silent < 99'000U / 200); // of 99,000 looks at a neighbour
+    BOOST_TEST(silent < 99'000U / 200); // of 99,000 checks of a neighbour
 }
 
 BOOST_AUTO_TEST_CASE(the_dead_are_suspect_then_gone_and_those_who_leave_are_gone_at_once) {
@@ -176,13 +176,13 @@ BOOST_AUTO_TEST_CASE(the_dead_are_suspect_then_gone_and_those_who_leave_are_gone
         net.stop(*all[50 + i]);
     }
     for (const auto* m : net.living()) {
-        BOOST_TEST(m->others_known.size() == 99U); // 49 and the 50 that said nothing
+        BOOST_TEST(m->others_known.size() == 99U); // 49, and the 50 that sent nothing
     }
     net.pass(5250ms); // 3.5 intervals of 1.5 s
     for (const auto* m : net.living()) {
         BOOST_TEST(m->count(cles::peer_state::suspect) == 50U);
     }
-    net.pass(17'250ms); // 15 of them
+    net.pass(17'250ms); // 15 intervals
     for (const auto* m : net.living()) {
         BOOST_TEST(m->others_known.size() == 49U);
         BOOST_TEST(m->count(cles::peer_state::live) == 49U);
@@ -203,7 +203,7 @@ BOOST_AUTO_TEST_CASE(all_killed_and_started_again_are_found_anew_without_a_clash
         BOOST_TEST(m->others_known.size() == 59U);
         BOOST_TEST(m->count(cles::peer_state::live) == 59U);
         for (const auto& p : m->others_known.list(time_point{})) {
-            BOOST_TEST(p.epoch > "0000003c"); // of the second runs
+            BOOST_TEST(p.epoch > "0000003c"); // of the second incarnations
         }
     }
 }

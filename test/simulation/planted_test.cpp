@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// That the simulation sees what it is there to see: a fault is planted in the harness for each rule, and has to be
-// found in few seeds, as a breach of that rule and of no other.
+// The simulation detects what it checks for: for each rule, a fault is planted in the harness, and has to be found
+// within few seeds, as a violation of that rule and of no other.
 #include "simulation/network/planted.hpp"
 #include "simulation/seeds.hpp"
 #include "simulation/world/simulate.hpp"
@@ -15,7 +15,7 @@ namespace sim = cles::simulation;
 namespace planted {
 namespace {
 
-/// That this fault breaks that rule, and no other, in one of few seeds, which is well without it.
+/// This fault violates that rule, and no other, in one of few seeds, which passes without the fault.
 void finds(sim::planted fault, sim::rule broken) {
     const auto seed = sim::first_to_break(broken, sim::seeds_for_planted, [&](std::uint64_t s) {
         const auto p = sim::make_plan(s, sim::steps_of_a_seed);

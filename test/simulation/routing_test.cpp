@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// A node that routes for a client, among others that work, and crash, stop and lose their links, in virtual time.
+// A node that routes for a client, and workers, all of which crash, are suspended and lose their links, in virtual
+// time.
 #include "simulation/cluster.hpp"
 #include "simulation/seeds.hpp"
 
@@ -19,7 +20,7 @@ namespace {
 constexpr std::uint64_t lives = CLES_SIMULATION_IS_SLOW ? 5 : 60;
 constexpr auto trouble = 60s;
 
-/// That this fault breaks that rule, and no other, in one of a few lives.
+/// This fault violates that rule, and no other, in one of a few runs.
 void finds(planted fault, rule broken) {
     const auto seed =
         first_to_break(broken, 10, [&](std::uint64_t s) { return simulate_cluster(s, trouble, fault).violations; });
@@ -44,7 +45,7 @@ BOOST_AUTO_TEST_CASE(whatever_happens_each_request_ends_once_in_its_time_and_non
     }
     BOOST_TEST_MESSAGE(std::to_string(succeeded) + " succeeded, " + std::to_string(failed) + " failed, " +
                        std::to_string(refused) + " of them refused");
-    BOOST_TEST(succeeded > failed); // most, though there was trouble all the time
+    BOOST_TEST(succeeded > failed); // most, despite continuous faults
     BOOST_TEST(failed > refused);
     BOOST_TEST(refused > 0U); // queues were full
 }

@@ -32,7 +32,7 @@ void check_seeds(std::uint64_t first, std::uint64_t count, unsigned steps) {
         requests += r.requests;
         updates += r.updates;
     }
-    BOOST_TEST(requests > count * 50); // something did happen
+    BOOST_TEST(requests > count * 50); // there was activity
     BOOST_TEST(updates > count);
 }
 

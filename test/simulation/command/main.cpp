@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Simulates seeds, or plans that lie in files, and tells what was broken; or measures gossip among many nodes
+// Simulates seeds, or plans that are read from files, and reports violations; or measures gossip among many nodes
 // (README.md of the folder above).
 #include "simulation/gossip_network.hpp"
 #include "simulation/world/simulate.hpp"
@@ -39,7 +39,7 @@ struct options {
     std::vector<std::string> files{};
 };
 
-/// Whether it went well.
+/// Whether there was no violation.
 bool live_through(const plan& p, const std::string& name, const options& o, report& sum) {
     if (o.print) {
         std::cout << to_text(p);
@@ -123,8 +123,8 @@ void cold_start_and_calm(const gossip_options& o) {
     const auto bytes = net.take_received(60s);
     tell("received per node, steady: on average", bytes.average / 1000, 20, "kB/s");
     tell("  of the node that received the most", bytes.most / 1000, 40, "kB/s");
-    // A suspicion passes with the next word and costs little: the node is still asked by name. Most are of the start,
-    // when all know few and so expect to hear often.
+    // A suspicion ends with the next message and costs little: requests to the node by name are still sent. Most occur
+    // at the start, when nodes know few others and so expect messages often.
     const auto pairs = static_cast<double>(o.nodes * (o.nodes - 1));
     tell("  live nodes suspected since the start, of 10,000 pairs",
          static_cast<double>(net.false_suspicions()) * 1e4 / pairs, 1, "");

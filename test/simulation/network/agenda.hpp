@@ -13,8 +13,8 @@
 
 namespace cles::simulation {
 
-/// Virtual time, and what is to happen in it: in the order of time, and at one time in the order in which it was
-/// entered.
+/// Virtual time, and the events that are scheduled: in the order of time, and at the same time in the order in which
+/// they were added.
 class agenda final : public core::clock {
   public:
     using action = std::function<void()>;
@@ -25,7 +25,7 @@ class agenda final : public core::clock {
             entries_.emplace(std::max(when, now_), std::move(what)); // after those of the same time
         }
     }
-    /// Lets time go by up to then.
+    /// Advances the time to this point.
     void run_until(time_point end) {
         while (!entries_.empty() && entries_.begin()->first <= end) {
             const auto next = entries_.extract(entries_.begin());
@@ -38,10 +38,10 @@ class agenda final : public core::clock {
         }
         now_ = std::max(now_, end);
     }
-    /// Something that is looked at now and then.
+    /// A check that runs periodically.
     void watch(action every) { every_ = std::move(every); }
     [[nodiscard]] std::uint64_t steps() const noexcept { return steps_; }
-    /// Nothing happens any more.
+    /// No further events run.
     void clear() {
         over_ = true;
         every_ = nullptr;

@@ -38,7 +38,7 @@ void datagram_port::hand_over(const endpoint& from, const std::string& datagram)
     found->deliver(datagram);
 }
 
-// An empty line comes again and again.
+// Repeatedly delivers an empty line from this source.
 void datagram_port::keep(const endpoint& source) {
     constexpr std::chrono::seconds often{20};
     if (const auto home = home_.lock()) {

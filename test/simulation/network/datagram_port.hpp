@@ -17,13 +17,13 @@ namespace cles::simulation {
 
 class datagram_link;
 
-/// A socket for datagrams: one link for each source, as transport/udp.hpp has them.
+/// A socket for datagrams: one link for each source, as in transport/udp.hpp.
 class datagram_port final : public std::enable_shared_from_this<datagram_port> {
   public:
     datagram_port(network& net, const std::shared_ptr<place>& home, endpoint local, bool strangers)
         : net_(net), home_(home), local_(local), strangers_(strangers) {}
 
-    /// To be called first: from now on it receives.
+    /// Call this first: the port receives from now on.
     void open() { net_.open(local_, shared_from_this()); }
     void accept(std::function<void(link_ptr)> on_link) { on_link_ = std::move(on_link); }
     link_ptr connect(const endpoint& peer);
@@ -43,7 +43,7 @@ class datagram_port final : public std::enable_shared_from_this<datagram_port> {
     std::map<endpoint, std::weak_ptr<datagram_link>> links_;
 };
 
-/// What goes to one source and comes from it.
+/// The link to one source.
 class datagram_link final : public link, public std::enable_shared_from_this<datagram_link> {
   public:
     datagram_link(std::shared_ptr<datagram_port> port, const endpoint& peer, bool stranger);
@@ -63,7 +63,7 @@ class datagram_link final : public link, public std::enable_shared_from_this<dat
     void deliver(std::string_view datagram);
 
   private:
-    std::shared_ptr<datagram_port> port_; // none once it is closed
+    std::shared_ptr<datagram_port> port_; // null once it is closed
     endpoint peer_;
     identity who_;
     std::shared_ptr<link_events> owner_;

@@ -6,7 +6,7 @@
 
 namespace cles::simulation {
 
-/// Chance that a seed decides, the same on every machine: splitmix64 (Steele, Lea, Flood 2014).
+/// Random numbers from a seed, the same on every machine: splitmix64 (Steele, Lea, Flood 2014).
 class dice {
   public:
     explicit dice(std::uint64_t seed) noexcept : state_(seed) {}
@@ -18,9 +18,9 @@ class dice {
         z = (z ^ (z >> 27U)) * 0x94d049bb133111ebU;
         return z ^ (z >> 31U);
     }
-    /// From 0 on, less than `most`.
+    /// At least 0, less than `most`.
     unsigned below(unsigned most) noexcept { return static_cast<unsigned>(next() % most); }
-    /// Both included.
+    /// Both bounds inclusive.
     unsigned between(unsigned least, unsigned most) noexcept { return least + below(most - least + 1); }
     bool chance(unsigned per_mille) noexcept { return below(1000) < per_mille; }
     std::chrono::microseconds within(std::chrono::microseconds span) noexcept {

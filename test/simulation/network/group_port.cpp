@@ -28,7 +28,7 @@ core::group_source source_of(const endpoint& where) noexcept {
 
 } // namespace
 
-// One run in two sends from where the one before it did.
+// Every other incarnation sends from the same port as the one before.
 group_port::group_port(network& net, node_run& process)
     : net_(net),
       process_(std::static_pointer_cast<node_run>(process.shared_from_this())), local_{process.host(),
@@ -79,7 +79,7 @@ bool group_port::is_swallowed(std::string_view line) {
     }
 }
 
-// False where as much waits as may.
+// False if the limit on pending output is reached.
 bool group_port::put(std::string_view line) {
     if (silent_ || is_swallowed(line)) {
         return true;

@@ -16,7 +16,8 @@ namespace cles::simulation {
 
 class node_run;
 
-/// A node's place in the simulated multicast group. The system takes a number of datagrams at once; the rest waits.
+/// A node's port in the simulated multicast group. The system accepts a limited number of datagrams at once; the rest
+/// waits.
 class group_port final : public core::group_port, public std::enable_shared_from_this<group_port> {
   public:
     group_port(network& net, node_run& process);
@@ -30,7 +31,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     [[nodiscard]] const endpoint& local() const noexcept { return local_; }
     /// A datagram has arrived at the host.
     void receive(const endpoint& from, const std::string& datagram);
-    /// Loses all that is sent from now on.
+    /// Loses everything that is sent from now on.
     void fall_silent() noexcept { silent_ = true; }
 
     static constexpr std::size_t max_waiting = 1U << 16U;
@@ -52,7 +53,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     unsigned in_system_ = 0;
     bool silent_ = false;
     std::uint64_t announcements_ = 0;          // for planted faults
-    std::set<std::string, std::less<>> bound_; // likewise
+    std::set<std::string, std::less<>> bound_; // for planted faults
 };
 
 } // namespace cles::simulation

@@ -15,7 +15,7 @@ namespace cles::simulation {
 namespace {
 
 constexpr std::chrono::microseconds much_later{400'000};
-constexpr unsigned group_lane = 1U << 16U; // so that what the group carries changes nothing of what else is carried
+constexpr unsigned group_lane = 1U << 16U; // separate, so that traffic in the group does not affect other traffic
 
 } // namespace
 
@@ -34,7 +34,7 @@ endpoint endpoint_of(const url& where) {
     return {read.address - address_of(0), read.port};
 }
 
-// -- the weather ---------------------------------------------------------------------------------------------------
+// -- conditions ----------------------------------------------------------------------------------------------------
 
 void network::part(unsigned a, unsigned b, time_point until) {
     mute(a, b, until);
@@ -79,13 +79,13 @@ time_point network::arrival(unsigned from, unsigned to) {
         }
         leaves = held->second + chance.within(std::chrono::milliseconds{300}); // sent again then
     } else if (chance.chance(weather_.lost)) {
-        leaves += std::chrono::milliseconds{200}; // likewise
+        leaves += std::chrono::milliseconds{200}; // sent again then
     }
     return leaves + way;
 }
 
 unsigned network::free_port(unsigned host) {
-    for (unsigned port = 1000;; ++port) { // those of a run that is over are given again
+    for (unsigned port = 1000;; ++port) { // ports of an ended incarnation are assigned again
         const auto held = ports_.find({host, port});
         if (held == ports_.end() || held->second.expired()) {
             return port;

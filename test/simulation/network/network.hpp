@@ -39,30 +39,30 @@ std::string to_string(const endpoint& where);
 /// A host's IPv4 address.
 constexpr std::uint32_t address_of(unsigned host) noexcept { return 0x0A000001U + host; }
 
-inline constexpr unsigned stream_door = 1;   ///< where nodes listen
-inline constexpr unsigned datagram_door = 2; ///< likewise
+inline constexpr unsigned stream_door = 1;   ///< the port on which nodes listen
+inline constexpr unsigned datagram_door = 2; ///< the same for datagrams
 
 /// How a request travels.
 enum class carrier : std::uint8_t {
     stream,
     datagram,
-    urgent, ///< by a stream of its own
-    name,   ///< wherever the node of that name announces itself
+    urgent, ///< by a separate stream
+    name,   ///< to the address that the node of that name announces
 };
-/// Where the node of a host listens.
+/// The URL on which the node of a host listens.
 std::string url_of(unsigned host, carrier by);
 endpoint endpoint_of(const url& where);
 
-/// What the network does to what crosses it. Of a thousand datagrams so many.
+/// The conditions of the network, per mille of datagrams.
 struct weather {
     unsigned lost = 0;
     unsigned doubled = 0;
-    unsigned late = 0; ///< much later than others, and so overtaken
+    unsigned late = 0; ///< much later than others, and so reordered
     std::chrono::microseconds least{100};
     std::chrono::microseconds spread{200};
 };
 
-/// The network between the hosts: carries streams and datagrams, each in its own way, and is cut and mended.
+/// The network between the hosts: carries streams and datagrams separately, and can be partitioned.
 class network {
   public:
     network(agenda& time, witness& watcher, std::uint64_t seed, planted fault)
@@ -74,31 +74,31 @@ class network {
         weather_ = now;
         stormy_ = true;
     }
-    /// Two hosts do not reach each other: datagrams are lost, streams wait.
+    /// Two hosts cannot reach each other: datagrams are lost, streams wait.
     void part(unsigned a, unsigned b, time_point until);
-    /// Nothing that one sends reaches the other one, which is heard well.
+    /// Nothing that one host sends reaches the other; the opposite direction works.
     void mute(unsigned from, unsigned to, time_point until);
-    /// Nothing is in the way any more.
+    /// All faults end.
     void calm();
     [[nodiscard]] bool reaches(unsigned from, unsigned to) const;
-    /// Whether everybody has reached everybody in good time since then.
+    /// Whether all hosts have reached each other without delay since then.
     [[nodiscard]] bool undisturbed_since(time_point when) const noexcept { return !stormy_ && disturbed_ <= when; }
-    /// When bytes of a stream that leave now are there, if nothing went before them.
+    /// When stream data that is sent now arrives, unless earlier data delays it.
     time_point arrival(unsigned from, unsigned to);
-    /// Each direction has a chance of its own, so that less of what happens is changed by what else happens.
+    /// Each direction has separate random numbers, so that changes in one affect the others less.
     [[nodiscard]] dice& chance_between(unsigned from, unsigned to);
     [[nodiscard]] planted fault() const noexcept { return fault_; }
     [[nodiscard]] witness& watcher() noexcept { return watcher_; }
     [[nodiscard]] agenda& time() noexcept { return time_; }
-    /// A port of the host that nobody has.
+    /// An unused port of the host.
     unsigned free_port(unsigned host);
 
     using on_link = std::function<void(link_ptr)>;
     using on_dialled = std::function<void(boost::system::error_code, std::shared_ptr<stream_half>)>;
     void listen(endpoint where, const std::shared_ptr<place>& at, const limits& bounds, on_link arrived);
-    /// Nobody listens there any more.
+    /// Stops listening there.
     void shut(endpoint where) { doors_.erase(where); }
-    /// `done` is called at the place that dials, later.
+    /// `done` is called on the dialling host, later.
     void dial(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, on_dialled done);
     /// Resets one of the streams of a host, if it has one.
     void cut(unsigned host, unsigned which);
@@ -106,12 +106,12 @@ class network {
     void open(const endpoint& where, const std::shared_ptr<datagram_port>& port) { ports_[where] = port; }
     void send(const endpoint& from, const endpoint& to, std::string_view datagram);
     void join(const std::shared_ptr<group_port>& port);
-    /// To all who have joined; each copy has a fate of its own.
+    /// To all members; each copy is lost, delayed or duplicated independently.
     void multicast(const endpoint& from, std::string_view datagram);
-    /// Nobody listens at the host any more.
+    /// Stops listening on all ports of the host.
     void close_doors(unsigned host);
 
-    /// What has crossed, for those who want to know how much was simulated.
+    /// The amount of traffic, as a measure of how much was simulated.
     [[nodiscard]] std::uint64_t datagrams() const noexcept { return datagrams_; }
     std::uint64_t stream_bytes = 0;
     tampering tampered; ///< what a planted fault does to streams
@@ -138,7 +138,7 @@ class network {
     weather weather_;
     bool stormy_ = false;
     std::map<std::pair<unsigned, unsigned>, time_point> parted_; // from and to
-    time_point disturbed_{};                                     // until when, the last time
+    time_point disturbed_{};                                     // the end of the last disturbance
     std::map<endpoint, door> doors_;
     std::map<endpoint, std::weak_ptr<datagram_port>> ports_;
     std::vector<std::weak_ptr<group_port>> group_;

@@ -10,8 +10,8 @@
 
 namespace cles::simulation {
 
-/// Where something runs: one run of a node, or a client. When it is gone, nothing of it happens any more; while it is
-/// frozen, as a stopped process is, all that comes waits. It has a clock of its own, which may be ahead.
+/// A simulated process: one incarnation of a node, or a client. After it has ended, nothing of it runs any more; while
+/// it is frozen, like a stopped process, everything that arrives waits. It has its own clock, which may be ahead.
 class place : public std::enable_shared_from_this<place> {
   public:
     place(agenda& time, unsigned host, std::string name) : time_(time), host_(host), name_(std::move(name)) {}
@@ -24,7 +24,7 @@ class place : public std::enable_shared_from_this<place> {
     [[nodiscard]] agenda& time() const noexcept { return time_; }
     [[nodiscard]] time_point now() const { return time_.now() + ahead_; }
 
-    /// Does something here: now, or when it goes on.
+    /// Runs an action here: now, or when the process continues.
     void run(agenda::action what) {
         if (frozen_) {
             waiting_.push_back(std::move(what));
@@ -34,14 +34,14 @@ class place : public std::enable_shared_from_this<place> {
     }
     /// Something has arrived at a socket here.
     void receive(agenda::action what) {
-        constexpr std::size_t max_unread = 256; // what the system keeps for a process that does not fetch it
+        constexpr std::size_t max_unread = 256; // what the system buffers for a process that does not read it
         if (waiting_.size() < max_unread) {
             run(std::move(what));
         }
     }
-    /// By its own clock.
+    /// By the process's own clock.
     void at(time_point when, agenda::action what) { at_true(when - ahead_, std::move(what)); }
-    /// By that of the network.
+    /// By the clock of the network.
     void at_true(time_point when, agenda::action what) {
         time_.at(when, [weak = weak_from_this(), what = std::move(what)]() mutable {
             if (const auto self = weak.lock()) {
@@ -70,7 +70,7 @@ class place : public std::enable_shared_from_this<place> {
             run(next);
         }
     }
-    /// Its clock goes ahead at once.
+    /// Its clock jumps ahead.
     void jump(std::chrono::nanoseconds by) {
         ahead_ += by;
         thawed_ = now();
@@ -78,9 +78,9 @@ class place : public std::enable_shared_from_this<place> {
         run([this] { after_jump(); });
     }
     [[nodiscard]] bool frozen() const noexcept { return frozen_; }
-    /// Whether what happens now could not have happened before.
+    /// Whether what happens now could not have happened earlier.
     [[nodiscard]] bool was_frozen_until_now() const { return thawed_ == now(); }
-    /// When it last went on, and when after so long that it must have noticed.
+    /// When it last continued, and when it last did after a time so long that it must have noticed.
     [[nodiscard]] time_point thawed_at() const noexcept { return thawed_; }
     [[nodiscard]] time_point back_since() const noexcept { return back_; }
 

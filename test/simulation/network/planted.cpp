@@ -24,7 +24,7 @@ bool is_result(std::string_view line) {
            line.find(" progress=") == std::string_view::npos;
 }
 
-// The first such request with an id: the copy goes before it, with these digits before its own.
+// The first such request with an id: the copy precedes it, with these digits before its own id.
 void repeat(text_lines& lines, bool (*is_wanted)(std::string_view), std::string_view digits) {
     constexpr std::string_view id{" id="};
     const auto found = std::find_if(lines.begin(), lines.end(), [&](const std::string& line) {
@@ -78,7 +78,7 @@ void tampering::apply(std::string& lines, const std::weak_ptr<place>& sender, di
     boost::algorithm::split(each, lines, boost::algorithm::is_any_of("\n"));
     switch (fault_) {
     case planted::rebind_forgotten: swallow_rebinds(each, bound_[sender]); break;
-    case planted::way_repeats: repeat(each, is_choice, "9000000"); break; // the answer to the copy is nobody's
+    case planted::way_repeats: repeat(each, is_choice, "9000000"); break; // the reply to the copy matches no request
     case planted::stream_repeats: repeat(each, is_push, ""); break;
     case planted::replies_swapped: swap_replies(each); break;
     default: exchange_ids(each);

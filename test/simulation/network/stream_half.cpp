@@ -17,7 +17,7 @@ stream_half::stream_half(network& net, const std::shared_ptr<place>& home, const
                                 .local = true},
       bounds_(bounds), input_(bounds.line) {}
 
-// One that nobody took before its process was gone.
+// One that was not accepted before its process ended.
 stream_half::~stream_half() {
     if (state_ != state::closed && !severed_) {
         reset_peer();
@@ -81,7 +81,7 @@ void stream_half::arrive_reset() {
     }
 }
 
-// Tells the peer that so much has been read.
+// Notifies the peer that this much has been read.
 void stream_half::taken(std::size_t bytes) {
     received_ += bytes;
     const auto peer = peer_.lock();
@@ -95,7 +95,7 @@ void stream_half::taken(std::size_t bytes) {
     }
 }
 
-// Reads what there is. False: nothing.
+// Reads what has arrived. False: nothing.
 bool stream_half::fill() {
     const auto left = inbox_.size() - inbox_at_;
     if (left == 0) {
@@ -135,7 +135,7 @@ void stream_half::hand_over() {
     }
 }
 
-// True where lines may be left.
+// True if there may be further lines.
 bool stream_half::hand_over_batch() {
     const auto owner = owner_;
     bool more = true;
@@ -235,7 +235,7 @@ void stream_half::write_rest() {
     }
 }
 
-// In one piece or in several, wherever that cuts a line.
+// In one piece or in several, split anywhere.
 void stream_half::transmit(std::string_view bytes) {
     if (bytes.empty()) {
         return;

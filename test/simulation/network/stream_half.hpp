@@ -14,12 +14,11 @@
 
 namespace cles::simulation {
 
-/// One end of a simulated stream, which keeps to what transport/stream_link.hpp promises: bytes come in their order,
-/// cut up anywhere; the system takes so many and no more while the peer does not read them; it is half-closed, closed
-/// and reset.
+/// One end of a simulated stream, which guarantees what transport/stream_link.hpp does: bytes arrive in order, split
+/// anywhere; the system accepts a limited amount while the peer does not read; it can be half-closed, closed and reset.
 class stream_half final : public link, public std::enable_shared_from_this<stream_half> {
   public:
-    static constexpr std::size_t window = 16384; ///< bytes that are on their way or not yet read
+    static constexpr std::size_t window = 16384; ///< bytes in transit or not yet read
 
     stream_half(network& net, const std::shared_ptr<place>& home, const limits& bounds, unsigned peer_host);
     ~stream_half() override;
@@ -34,7 +33,7 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     [[nodiscard]] std::size_t unsent() const noexcept override {
         return net_.fault() == planted::never_full ? 0 : held();
     }
-    /// What it holds for its peer, whatever a planted fault says of it.
+    /// The bytes that it holds for its peer, even if a planted fault reports otherwise.
     [[nodiscard]] std::size_t held() const noexcept {
         return urgent_.size() + output_.size() + sending_.size() - sending_at_;
     }
@@ -45,7 +44,7 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     void close() override;
     [[nodiscard]] const identity& peer() const noexcept override { return who_; }
 
-    /// Shuts the sending side, and goes on reading.
+    /// Shuts down the sending side, and continues to read.
     void half_close();
     /// The network resets it, at both ends.
     void cut();
@@ -84,12 +83,12 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     std::weak_ptr<stream_half> peer_;
     std::shared_ptr<link_events> owner_;
     std::string output_;
-    std::string urgent_; // goes before that
+    std::string urgent_; // sent before that
     std::string sending_;
     std::size_t sending_at_ = 0;
-    std::size_t in_flight_ = 0; // sent, and not read by the peer
+    std::size_t in_flight_ = 0; // sent, and not yet read by the peer
     time_point last_{};         // when the last of it arrives
-    std::string inbox_;         // arrived, and not read
+    std::string inbox_;         // arrived, and not yet read
     std::size_t inbox_at_ = 0;
     std::uint64_t sent_ = 0;
     std::uint64_t received_ = 0;

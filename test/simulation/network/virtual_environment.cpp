@@ -13,7 +13,7 @@ namespace cles::simulation {
 
 using std::chrono::milliseconds;
 
-/// Where a node listens; how that begins and ends is up to the transport.
+/// A listener of a node, independent of the transport.
 class virtual_environment::door final : public acceptor {
   public:
     door(url where, std::function<void(const on_link&)> open, std::function<void()> shut)
@@ -86,7 +86,7 @@ void virtual_environment::arm_timer() {
 
 void virtual_environment::on_timer() {
     const auto due = *std::exchange(due_, std::nullopt);
-    if (net_.fault() == planted::excuse_forgotten) { // the node goes through the time in which it was stopped
+    if (net_.fault() == planted::excuse_forgotten) { // the node processes the time in which it was stopped
         constexpr milliseconds step{400};
         for (auto shown = due; process_ != nullptr && shown < process_->now(); shown += step) {
             run_timer_as_if(shown);

@@ -21,12 +21,12 @@ namespace cles::simulation {
 class group_port;
 class node_run;
 
-/// The environment of one simulated node: virtual time, the simulated network, and chance from a seed.
+/// The environment of one simulated node: virtual time, the simulated network, and random numbers from a seed.
 ///
-/// It ends with the process. From then on nothing is sent, received or run, and no timer goes off.
+/// It ends with the process. From then on nothing is sent, received or run, and no timer expires.
 class virtual_environment final : public core::environment {
   public:
-    /// `strangers`: sources of datagrams are not on this host, so what is sent to them is limited.
+    /// `strangers`: sources of datagrams are on other hosts, so output to them is limited.
     virtual_environment(network& net, node_run& process, std::uint64_t seed, bool strangers)
         : net_(net), process_(&process), chance_(seed), strangers_(strangers) {}
 
@@ -51,18 +51,18 @@ class virtual_environment final : public core::environment {
     std::shared_ptr<core::group_port> join(const core::network_interface& by, const multicast_options& where) override;
 
     // For the simulation.
-    /// The process is gone: the system closes what was open, and peers notice nothing else.
+    /// The process has ended: the system closes its sockets; peers notice nothing else.
     void end();
     [[nodiscard]] bool has_ended() const noexcept { return process_ == nullptr; }
-    /// Drops the tasks that did not run before `end`, and all that follow.
+    /// Drops the tasks that did not run before `end`, and all later ones.
     void discard_tasks();
-    /// For planted faults: shows the node another time while its timer goes off.
+    /// For planted faults: shows the node another time while its timer expires.
     void run_timer_as_if(time_point shown);
-    /// The clock has jumped: a timer that is due by now goes off.
+    /// The clock has jumped: a timer that is due by now expires.
     void on_jump() { arm_timer(); }
-    /// The most bytes that a link which others opened holds for its peer.
+    /// The maximum number of bytes that a link which others opened holds for its peer.
     [[nodiscard]] std::size_t most_held() const;
-    /// Null where the node takes no part in multicast.
+    /// Null if it does not take part in multicast.
     [[nodiscard]] group_port* group() const noexcept { return group_.get(); }
 
   private:
@@ -83,8 +83,8 @@ class virtual_environment final : public core::environment {
     bool discards_ = false;
     std::function<void()> on_due_;
     std::optional<time_point> due_;
-    std::uint64_t timer_ = 0;                                 // the one that counts
-    std::optional<time_point> shown_;                         // the time as a planted fault shows it
+    std::uint64_t timer_ = 0;                                 // the current one
+    std::optional<time_point> shown_;                         // the time that a planted fault shows
     std::vector<std::pair<std::weak_ptr<link>, bool>> links_; // and whether others opened them
     std::shared_ptr<group_port> group_;
 };

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// What can be asked, in the order of the number in a plan.
+/// The possible requests, in the order of their numbers in a plan.
 enum task : unsigned { echo, slow, store, keep, work, notice, survey, task_count };
 
 struct offered {
@@ -74,7 +74,7 @@ struct order {
     unsigned to;
     carrier by;
     unsigned what;
-    std::uint32_t deadline; ///< in milliseconds, as its work
+    std::uint32_t deadline; ///< in milliseconds, like its work
     std::uint32_t size;
     std::uint32_t work;
     std::uint32_t steps;
@@ -129,7 +129,7 @@ class asking final : public part {
             for (unsigned step = 1; step < world_.hosts(); ++step) {
                 const auto to = (from + step) % world_.hosts();
                 for (const auto by : {carrier::stream, carrier::datagram, carrier::urgent, carrier::name}) {
-                    // A name that is unknown by now breaks others_known.
+                    // A name that is not known by now violates others_known.
                     if (by != carrier::name || world_.node(from)->node()->peers.find_member(world::name_of(to))) {
                         probe(from, to, by);
                     }
@@ -168,7 +168,7 @@ class asking final : public part {
         double reported = 0;
     };
 
-    // -- serving ---------------------------------------------------------------------------------------------------
+    // -- handlers --------------------------------------------------------------------------------------------------
 
     void ran(std::uint32_t op, const node_run& at) {
         const auto count = ++effects_[effect_key(op, at.host(), at.run_number())];
@@ -207,7 +207,7 @@ class asking final : public part {
         });
     }
 
-    // -- asking ----------------------------------------------------------------------------------------------------
+    // -- requests --------------------------------------------------------------------------------------------------
 
     void ask(const order& o) {
         auto* n = world_.node(o.from);
@@ -254,7 +254,7 @@ class asking final : public part {
         if (!a.ended && n != nullptr && n->run_number() == a.run && !n->frozen()) {
             a.withdrawn = true;
             n->run([&] { n->cancel(a.id); });
-            n->later(std::chrono::microseconds{1}, [this, &a] { // it ends by the completion queue
+            n->later(std::chrono::microseconds{1}, [this, &a] { // its result is delivered through the completion queue
                 if (!a.ended) {
                     complain(rule::ends_in_time, a, "was withdrawn and has not ended");
                 }
@@ -278,7 +278,7 @@ class asking final : public part {
         }
     }
 
-    // -- judging ---------------------------------------------------------------------------------------------------
+    // -- checks ----------------------------------------------------------------------------------------------------
 
     void complain(rule which, const asked& a, const std::string& what) {
         world_.watcher().broken(which, std::string{to_string(tasks[a.what].verb)} + " '" +
@@ -296,18 +296,18 @@ class asking final : public part {
         return false;
     }
 
-    // It ran at a run that has begun to leave since, and cuts nothing short yet; and nothing went wrong on the way.
+    // It ran on an incarnation that has since begun to leave and has not reached its limit, without any disturbance.
     [[nodiscard]] bool is_answered_by_leaver(const asked& a) {
         const auto& left = world_.departure_of(a.to);
         if (world_.departure_of(a.from).run == world_.runs(a.from)) {
-            return false; // a node that leaves gives up its own requests
+            return false; // a node that leaves cancels its own requests
         }
         const auto* n = world_.node(a.from);
         return effects_.contains(effect_key(a.op, a.to, left.run)) && world_.time().now() < left.until &&
                world_.net().undisturbed_since(left.begun) && n != nullptr && !n->was_frozen_until_now();
     }
 
-    // It has just begun, and the name may still be announced.
+    // The node has just started, and the name may still be announced.
     [[nodiscard]] bool is_to_wait_for_name(const asked& a) const {
         auto* n = world_.node(a.from);
         return n != nullptr && n->now() < n->started_at() + core::discovery_grace::length &&
@@ -350,7 +350,7 @@ class asking final : public part {
         const bool may_be = code == errc::deadline || code == errc::unavailable || code == errc::busy ||
                             code == errc::too_large || (code == errc::cancelled && a.withdrawn) ||
                             (code == errc::failed && a.what == work && a.end == fails) ||
-                            // Not known yet, or a namesake, which offers nothing.
+                            // Not known yet, or another node of that name, which offers nothing.
                             (a.by == carrier::name && (code == errc::no_target || code == errc::no_task));
         if (!may_be) {
             complain(rule::replies_match, a, "failed: " + std::string{message});
@@ -373,7 +373,7 @@ class asking final : public part {
     world& world_;
     std::map<std::uint32_t, asked> asked_;
     std::unordered_map<std::uint64_t, unsigned> effects_;     // by request, host and run
-    std::map<core::call*, std::shared_ptr<core::call>> held_; // never answered
+    std::map<core::call*, std::shared_ptr<core::call>> held_; // never replied to
     std::vector<std::shared_ptr<core::call>> kept_;           // by a planted fault
     std::uint32_t next_probe_ = 10'000'000;
 };

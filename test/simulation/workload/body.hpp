@@ -7,7 +7,7 @@
 
 namespace cles::simulation {
 
-/// What bodies of the simulation say: the number that follows such a text; 0 where there is none.
+/// The content of simulated bodies: the number that follows such a text; 0 if there is none.
 inline std::uint64_t number_after(std::string_view json, std::string_view text) {
     const auto at = json.find(text);
     std::uint64_t value = 0;
@@ -17,7 +17,7 @@ inline std::uint64_t number_after(std::string_view json, std::string_view text) 
     return value;
 }
 
-/// Whether a body is that of this request.
+/// Whether a body belongs to this request.
 inline bool speaks_of(std::string_view json, std::uint32_t op) {
     return json.starts_with("{\"op\":") && number_after(json, "{\"op\":") == op;
 }

@@ -22,7 +22,7 @@ class link_follower final : public follower, private core::feed_host {
 
     void start() override {
         local().feeds().enter(machine_, shared_from_this(), terms_);
-        // The machine holds it, and so it does not hold the follower.
+        // The machine owns this object, so this does not own the follower.
         machine_.start(when_ended(
             [weak = weak_self()](std::string_view) {
                 if (const auto self = weak.lock()) {
@@ -45,7 +45,7 @@ class link_follower final : public follower, private core::feed_host {
         return std::static_pointer_cast<link_follower>(shared_from_this());
     }
     core::feed_mailbox& mail() override { return machine_.mail(); }
-    // What a planted fault does: it ends each pause after 20 ms at most.
+    // A planted fault: ends each pause after 20 ms at most.
     void cap_pauses() {
         at().later(milliseconds{20}, [weak = weak_self()] {
             if (const auto self = weak.lock()) {
@@ -55,11 +55,11 @@ class link_follower final : public follower, private core::feed_host {
         });
     }
 
-    // Looks how the machine uses its host, and passes all on to the library's.
+    // Checks how the machine uses its host, and forwards all calls to the library's host.
     void bind(core::feed_machine& feed) override {
-        constexpr milliseconds shortest_pause{75}; // the first one, less a quarter
+        constexpr milliseconds shortest_pause{75}; // the first one, a quarter shorter
         const auto now = at().now();
-        // In the group it may have heard that the publisher is back.
+        // The group may have reported that the publisher is back.
         if (at().group() == nullptr && now < last_bind_ + shortest_pause) {
             complain(rule::backs_off, "binds again without a pause");
         }
@@ -203,9 +203,9 @@ void follower::take(const detail::raw_event& event) {
     }
 }
 
-// -- judging -------------------------------------------------------------------------------------------------------
+// -- checks --------------------------------------------------------------------------------------------------------
 
-// In the group, what was shed before it was fetched is told for all publishers together.
+// In the group, updates that were discarded before they were fetched are reported for all publishers together.
 void follower::on_gap(const detail::raw_event& event) {
     node_.watcher().saw(name(), "missed", std::to_string(event.missed));
     if (node_.fault() != (how_.by_group ? planted::group_gap_hidden : planted::gap_hidden)) {
@@ -222,7 +222,7 @@ void follower::on_update(const detail::raw_event& event) {
     ++seen_;
     const published_mark mark{.number = number_after(event.body, "{\"n\":"),
                               .run = static_cast<unsigned>(number_after(event.body, "\"run\":"))};
-    if (mark.number == 0 && !how_.by_group) { // published on request: it does not say by which run
+    if (mark.number == 0 && !how_.by_group) { // published on request: does not contain the incarnation
         return;
     }
     const auto who = publisher_of(event);

@@ -17,13 +17,13 @@
 
 namespace cles::simulation {
 
-/// What a published body says of itself.
+/// The origin of a published body, from its content.
 struct published_mark {
-    std::uint64_t number = 0; ///< of its noun, from 1; 0 where it says nothing
+    std::uint64_t number = 0; ///< of its noun, from 1; 0 if the body contains none
     unsigned run = 0;         ///< of the publisher
 };
 
-/// A program that has a feed: fetches what comes, quickly, slowly, or not for a while, and keeps account of it.
+/// A program that has a feed: fetches updates quickly, slowly, or not for a while, and records them.
 class follower : public std::enable_shared_from_this<follower> {
   public:
     struct manner {
@@ -40,28 +40,28 @@ class follower : public std::enable_shared_from_this<follower> {
 
     virtual void start() = 0;
     virtual void close() = 0;
-    /// Does not fetch for so long.
+    /// Stops fetching for this time.
     void hold(std::chrono::milliseconds time);
 
     [[nodiscard]] node_run& at() noexcept { return node_; }
     [[nodiscard]] const manner& how() const noexcept { return how_; }
     [[nodiscard]] std::string name() const;
-    /// It was bound and has not been closed: it is to receive what is published.
+    /// It was bound and has not been closed, so it has to receive what is published.
     [[nodiscard]] bool is_open() { return begun_ && !mail().closed(); }
-    /// Whether it is to receive what that node publishes.
+    /// Whether it has to receive what that node publishes.
     [[nodiscard]] bool wants(std::string_view node) const noexcept {
         return node != node_.name() && (how_.target == "all" || how_.target == node);
     }
     [[nodiscard]] std::uint64_t seen() const noexcept { return seen_; }
-    /// The last update that it was given of that publisher.
+    /// The last update of that publisher that it received.
     [[nodiscard]] published_mark last_of(const std::string& publisher) { return sources_[publisher].last; }
 
   protected:
     follower(node_run& at, manner how) : node_(at), local_(at.shared_local()), how_(std::move(how)) {}
 
-    /// From now on it fetches.
+    /// Starts fetching.
     void begin();
-    /// Kept, as a feed keeps its service.
+    /// Kept alive, as a feed keeps its service.
     [[nodiscard]] core::local_node& local() noexcept { return *local_; }
     void complain(rule which, const std::string& what) { node_.watcher().broken(which, name() + " " + what); }
 
@@ -69,7 +69,7 @@ class follower : public std::enable_shared_from_this<follower> {
     class next_event;
     struct source {
         published_mark last;
-        std::uint64_t missed = 0; // told since then
+        std::uint64_t missed = 0; // reported since then
     };
 
     virtual core::feed_mailbox& mail() = 0;
@@ -85,7 +85,7 @@ class follower : public std::enable_shared_from_this<follower> {
     std::shared_ptr<core::local_node> local_;
     manner how_;
     std::map<std::string, source> sources_;
-    std::uint64_t shed_ = 0; // told as missed, but not of whom
+    std::uint64_t shed_ = 0; // reported as missed, of an unknown publisher
     std::uint64_t seen_ = 0;
     bool begun_ = false;
     bool waits_ = false;
@@ -93,10 +93,10 @@ class follower : public std::enable_shared_from_this<follower> {
     bool fetch_planned_ = false;
 };
 
-/// A feed by a link to the publisher, whose URL is in the terms.
+/// A feed over a link to the publisher, whose URL is in the terms.
 std::shared_ptr<follower> follow_by_link(node_run& at, std::uint32_t label, std::string target, std::string path,
                                          core::feed_terms terms, std::chrono::milliseconds slow);
-/// A feed by the multicast group.
+/// A feed in the multicast group.
 std::shared_ptr<follower> follow_by_group(node_run& at, std::uint32_t label, std::string target, std::string path,
                                           std::chrono::milliseconds slow);
 

@@ -18,8 +18,8 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t own_nouns = 3;         // that a node publishes by itself
 constexpr unsigned waiting_noun = 2;         // the one of them that is published with publish_or_wait
-constexpr const char* beacon = "beacon";     // published once by each run, and followed by nobody before the end
-constexpr milliseconds repeated_within{600}; // twice what a repeat is put off by, and the way
+constexpr const char* beacon = "beacon";     // published once by each incarnation, and bound only at the end
+constexpr milliseconds repeated_within{600}; // twice the delay of a repetition, and the latency
 
 std::string path_of(unsigned noun) {
     if (noun == own_nouns) {
@@ -106,7 +106,7 @@ class following final : public part {
                                     by.name() + " sends " + std::to_string(*update.seq) + " of " + path + " " + what);
         };
         const auto now = by.now();
-        // One that was stopped goes through all that was due meanwhile.
+        // A node that was stopped processes everything that was due meanwhile.
         if (!by.was_frozen_until_now() &&
             std::none_of(of.leases.begin(), of.leases.end(), [now](const auto& l) { return l.second >= now; })) {
             complain("though nobody is bound");
@@ -162,7 +162,7 @@ class following final : public part {
             f->at().run([closed = f] { closed->close(); });
         }
         followers_.clear();
-        // A peer that is gone without notice is detected when something is written to it.
+        // The failure of a peer without notice is detected when something is written to it.
         for (unsigned host = 0; host < world_.hosts(); ++host) {
             world_.node(host)->later(std::chrono::seconds{1}, [this, host] {
                 for (unsigned noun = 0; noun < own_nouns; ++noun) {
@@ -179,10 +179,10 @@ class following final : public part {
     }
 
   private:
-    /// A publisher's noun, as the group has to do with it.
+    /// The state of a publisher's noun in the group.
     struct group_noun {
-        std::map<core::group_source, time_point> leases; // until when
-        std::uint64_t sent = 0;                          // the last update's number
+        std::map<core::group_source, time_point> leases; // the expiry of each
+        std::uint64_t sent = 0;                          // the number of the last update
         bool newly_bound = false;                        // since the last update was repeated
     };
     using follower_ptr = std::shared_ptr<follower>;
@@ -259,7 +259,7 @@ class following final : public part {
         });
     }
 
-    // -- judging ---------------------------------------------------------------------------------------------------
+    // -- checks ----------------------------------------------------------------------------------------------------
 
     void probe_group() {
         std::vector<follower_ptr> newcomers;
@@ -298,7 +298,7 @@ class following final : public part {
     std::map<std::uint32_t, std::uint64_t> seen_before_probe_;
     std::vector<std::array<std::uint64_t, own_nouns>> published_; // by the present run of each host
     std::map<std::pair<const node_run*, std::string>, group_noun> nouns_;
-    std::shared_ptr<void> offers_ = std::make_shared<bool>(); // shared by those that have not ended
+    std::shared_ptr<void> offers_ = std::make_shared<bool>(); // shared by those that have not completed
     std::uint32_t next_probe_ = 10'000'000;
 };
 

@@ -18,7 +18,7 @@ using std::chrono::seconds;
 
 constexpr milliseconds look_every{400};
 constexpr milliseconds slack{50};
-constexpr seconds until_all_know{10}; // two intervals of 3.5 s for runs that are over, and time to be heard
+constexpr seconds until_all_know{10}; // two intervals of 3.5 s for ended incarnations, and time to be received
 constexpr seconds namesake_lives{6};
 
 constexpr milliseconds until_silent(milliseconds interval) { return interval * 7 / 2; }
@@ -69,7 +69,7 @@ class neighbouring final : public part {
             return;
         }
         auto& r = accounts_[&at].runs[*update.epoch];
-        if (*update.seq <= r.seq) { // overtaken
+        if (*update.seq <= r.seq) { // reordered
             return;
         }
         if (said.leaving) {
@@ -193,15 +193,15 @@ class neighbouring final : public part {
     }
 
   private:
-    /// What a node has heard of a run of another one.
+    /// What a node has received from an incarnation of another one.
     struct heard_run {
         std::string node;
         std::uint64_t seq = 0;
         time_point at{};
         milliseconds interval{0};
-        bool left = false; ///< said so, and was listed then
+        bool left = false; ///< announced that it leaves, and was listed then
     };
-    /// What a node has heard, and said of it.
+    /// What a node has received and reported.
     struct account {
         std::map<std::uint32_t, heard_run> runs;                  // by epoch
         std::map<std::string, std::uint32_t, std::less<>> owners; // of names: their epochs
@@ -230,14 +230,14 @@ class neighbouring final : public part {
         world_.end_run(n);
     }
 
-    // -- judging ---------------------------------------------------------------------------------------------------
+    // -- checks ----------------------------------------------------------------------------------------------------
 
     // Silence counts from the last announcement, or from when the receiver was back.
     [[nodiscard]] static time_point last_chance(const node_run& n, const heard_run& r) {
         return std::max(r.at, n.back_since());
     }
 
-    // Whether that run has existed and been reachable for long enough to answer a probe.
+    // Whether that incarnation has existed and been reachable for long enough to reply to a probe.
     [[nodiscard]] bool could_answer(node_run& at, std::string_view node, std::uint32_t epoch) {
         constexpr seconds enough{2};
         const auto listens = [&](node_run& n) {
@@ -257,7 +257,8 @@ class neighbouring final : public part {
                world_.net().undisturbed_since(world_.time().now() - enough);
     }
 
-    // Of two runs of one name the earlier one keeps it. Who heard the later one first learns this by asking both.
+    // Of two incarnations of one name the earlier one keeps it. A node that received the later one first learns this by
+    // asking both.
     [[nodiscard]] bool has_precedence(std::uint32_t epoch, std::uint32_t over) const {
         const auto later = began_.at(epoch) - began_.at(over);
         return later <= seconds{0} || (later <= core::name_conflicts::same_start_tolerance && epoch < over);

@@ -16,16 +16,16 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A client on a stream that sends requests without ids, and knows which answer has to come next.
+/// A client on a stream that sends requests without ids, and knows which reply has to be next.
 class talker final : public place, public link_events {
   public:
     enum class ending : std::uint8_t { stays, half_closes, leaves };
     struct manner {
         unsigned to = 0;
-        std::uint32_t first_op = 0; ///< its requests bear this number and those after it
+        std::uint32_t first_op = 0; ///< the number of its first request; the others follow
         unsigned lines = 0;
         milliseconds gap{0};  ///< between its lines
-        milliseconds slow{0}; ///< for so long it does not read
+        milliseconds slow{0}; ///< how long it does not read
         ending end = ending::stays;
     };
 
@@ -51,10 +51,10 @@ class talker final : public place, public link_events {
                   });
     }
 
-    /// The node that it talks to has crashed, and what is open stays open; or it may end the stream.
+    /// The node has crashed, so open requests may remain without a reply; or it may end the stream.
     void excuse() noexcept { excused_ = true; }
     [[nodiscard]] unsigned to() const noexcept { return how_.to; }
-    /// What was to be answered has been, unless its stream was lost. Then it leaves.
+    /// All requests have to have their replies, unless the stream was lost. Then it closes its link.
     void judge_and_leave() {
         if (link_ == nullptr) {
             return;
@@ -70,7 +70,7 @@ class talker final : public place, public link_events {
     }
 
     void on_line(std::string_view line) override {
-        // The node looks whether this is still there, or is about to leave.
+        // The node checks whether this link still works, or is about to leave.
         if (line.empty() || line.starts_with("PUSH self:cles/leaving")) {
             return;
         }
@@ -97,7 +97,7 @@ class talker final : public place, public link_events {
 
     void on_batch() override {}
     void on_end() override {
-        // A node answers all requests without ids before it ends the link.
+        // A node replies to all requests without ids before it ends the link.
         if (!expected_.empty() && !excused_ && !link_->was_cut()) {
             complain(rule::reply_order,
                      std::to_string(expected_.size()) + " requests were not answered before the end");
@@ -120,7 +120,7 @@ class talker final : public place, public link_events {
     struct expected {
         kind what;
         std::uint32_t op;
-        std::string noun; // that was bound
+        std::string noun; // the noun that was bound
     };
 
     void say_next() {
@@ -162,7 +162,7 @@ class talker final : public place, public link_events {
         case 5: say("PULL " + node + ":unknown." + op + "\n", kind::unknown); break;
         case 6: say("PUSH " + node + ":keep/" + op + "/5 {\"op\":" + op + "}\r\n", kind::result); break;
         case 7:
-            if (how_.end != ending::half_closes) { // what is bound would keep the link open
+            if (how_.end != ending::half_closes) { // a binding would keep the link open
                 const auto noun = "fix/" + std::to_string(style_.below(3));
                 say("BIND " + node + ":" + noun + "\n", kind::bound, noun);
                 break;
@@ -246,7 +246,7 @@ class talker final : public place, public link_events {
     dice style_;
     manner how_;
     limits bounds_;
-    bool is_greedy_; ///< asks for much
+    bool is_greedy_; ///< sends many requests
     std::shared_ptr<stream_half> link_;
     std::deque<expected> expected_;
     std::map<std::string, std::uint64_t> bound_; // the last seq of each noun
@@ -260,10 +260,10 @@ class talking final : public part {
     explicit talking(world& in) noexcept : world_(in) {}
 
     void perform(const action& a) override {
-        constexpr std::uint32_t first = 1'000'000; // above all that nodes ask
+        constexpr std::uint32_t first = 1'000'000; // greater than those of the nodes' requests
         constexpr std::uint32_t apart = 1000;
         constexpr unsigned hosts_of_clients = 100;
-        if (a.what == deed::jump) { // by its clock they have taken nothing for long
+        if (a.what == deed::jump) { // by its clock nothing has been accepted for long
             excuse(a["host"]);
         }
         if (a.what != deed::talk || world_.node(a["to"]) == nullptr) {

@@ -7,12 +7,12 @@
 namespace cles::simulation {
 namespace {
 
-/// Thinks of what happens.
+/// Generates the actions.
 class planner {
   public:
     planner(dice& chance, plan& out) : chance_(chance), plan_(out) {}
 
-    /// Some follow from the first moment.
+    /// Some feeds are bound from the start.
     void begin() {
         for (auto count = chance_.below(8); count != 0; --count) {
             follow();
@@ -66,7 +66,7 @@ class planner {
         const auto from = host();
         const auto deadline = chance_.chance(300) ? chance_.between(1, 400) : chance_.between(400, 6000);
         const auto work = chance_.chance(100) ? chance_.between(1000, 5000) : chance_.below(300);
-        // Some at once, so that replies meet on the way.
+        // Some at the same time, so that their replies overlap.
         for (auto count = chance_.chance(200) ? chance_.between(2, 40) : 1U; count != 0; --count) {
             put(deed::ask, {++op_, from, other(from), chance_.below(2), chance_.below(7), deadline, size(2500), work,
                             chance_.chance(500) ? chance_.below(6) : 0,
@@ -137,10 +137,10 @@ plan make_plan(std::uint64_t seed, unsigned actions) {
            .small_limits = chance.chance(700),
            .strangers = chance.chance(250)};
     auto pace = chance.chance(500) ? chance.between(2, 20) : chance.between(20, 150);
-    // Of its own, so that the plans of all others are the same with and without.
+    // A separate generator, so that the other plans do not depend on it.
     dice group{~seed};
     p.group = group.chance(250);
-    if (p.group) { // what is known of others takes seconds
+    if (p.group) { // membership changes take seconds
         pace = group.between(20, 150);
     }
     planner think{chance, p};
@@ -150,7 +150,7 @@ plan make_plan(std::uint64_t seed, unsigned actions) {
         think.add(at);
         at += chance.below(2 * pace);
     }
-    // Of a chance of its own as well.
+    // Also from a separate generator.
     dice later{seed * 7 + 5};
     for (auto& a : p.actions) {
         if (a.what == deed::ask && a["by"] == 0 && later.chance(200)) {

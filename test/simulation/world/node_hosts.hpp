@@ -15,7 +15,7 @@
 
 namespace cles::simulation {
 
-/// Hosts on which nodes run, the network between them, and time; and what goes wrong with a node.
+/// Hosts on which nodes run, the network between them, time, and the faults of nodes.
 class node_hosts {
   public:
     node_hosts(const node_hosts&) = delete;
@@ -25,7 +25,7 @@ class node_hosts {
     [[nodiscard]] network& net() noexcept { return net_; }
     [[nodiscard]] witness& watcher() noexcept { return watcher_; }
     [[nodiscard]] planted fault() const noexcept { return net_.fault(); }
-    /// The node that runs there; null while none does.
+    /// The node that runs there; null if there is none.
     [[nodiscard]] node_run* node(unsigned host) const noexcept;
 
   protected:
@@ -35,15 +35,15 @@ class node_hosts {
     virtual void start(unsigned host) = 0;
     /// Ends a node as a crash does.
     virtual void end_run(node_run& n) { n.crash(); }
-    /// Nothing happens any more. To be called before what `end_run` needs is destroyed.
+    /// No further events run. Call this before what `end_run` needs is destroyed.
     void end_all();
 
-    /// Ends the node there as a crash does; after some time another one starts.
+    /// Crashes the node there; after this time another one starts.
     void end_node(unsigned host, std::chrono::milliseconds down);
-    /// Stops the process there for some time.
+    /// Suspends the process there for this time.
     void freeze(unsigned host, std::chrono::milliseconds span);
     void jump(unsigned host, std::chrono::milliseconds ahead);
-    /// The network is well, and on every host a node runs.
+    /// The network works, and a node runs on every host.
     void end_trouble();
     void pass(std::chrono::milliseconds span) { time_.run_until(time_.now() + span); }
 
@@ -51,7 +51,7 @@ class node_hosts {
     witness watcher_{time_};
     dice chance_;
     network net_;
-    std::map<unsigned, std::shared_ptr<node_run>> nodes_; // by host; null while none runs there
+    std::map<unsigned, std::shared_ptr<node_run>> nodes_; // by host; null if none runs there
 };
 
 } // namespace cles::simulation

@@ -81,7 +81,7 @@ void node_run::stop() {
     run([this] { local_->stop(); });
 }
 
-// What the node does when its process is gone is seen by nobody; it lets go of what it holds.
+// Actions of the node after its process has ended have no effect; it releases its resources.
 void node_run::crash() {
     if (environment_->has_ended()) {
         return;
@@ -116,7 +116,7 @@ void node_run::on_peer(std::string_view node, core::membership::change what, std
     told_.on_peer(node, what, where);
 }
 
-// -- judging ---------------------------------------------------------------------------------------------------------
+// -- checks ----------------------------------------------------------------------------------------------------------
 
 void node_run::check_bounds() {
     const auto& b = bounds();
@@ -135,8 +135,8 @@ void node_run::check_bounds() {
     if (group() != nullptr && group()->unsent() > group_port::max_waiting) {
         complain(rule::bounded, "holds " + std::to_string(group()->unsent()) + " bytes for the group");
     }
-    // What may be unread, what one turn answers beyond it, what runs, and updates, which come in pieces. What the node
-    // asks by itself nobody bounds.
+    // The limit on unread output, the replies of one turn beyond it, running handlers, and updates, which are sent in
+    // pieces. The node's own requests are not limited.
     constexpr std::size_t piece = 65536;
     constexpr std::size_t lines_per_write = 32;
     const auto longest = std::min<std::size_t>(b.line, 4096);

@@ -23,7 +23,7 @@ namespace cles::simulation {
 
 class part;
 
-/// An operation whose end is passed to one of two functions, unless it is discarded.
+/// An operation whose result is passed to one of two functions, unless it is discarded.
 detail::pending_ptr when_ended(std::function<void(std::string_view json)> succeeded,
                                std::function<void(errc code, std::string_view why)> failed = {});
 
@@ -35,15 +35,15 @@ struct request_order {
     std::chrono::milliseconds deadline{0};
 };
 
-/// One run of a node, from its start to its end or crash: the library's node in an environment of virtual time.
+/// One incarnation of a node, from its start to its end or crash: the library's node in an environment of virtual time.
 class node_run final : public place, private core::membership::watcher {
   public:
     struct options {
-        std::uint64_t seed = 0; ///< of its own chance
+        std::uint64_t seed = 0; ///< of its own random numbers
         limits bounds{};
-        bool strangers = false; ///< sources of datagrams are sent little
+        bool strangers = false; ///< output to sources of datagrams is limited
         bool multicast = false; ///< it takes part in the group
-        part* judge = nullptr;  ///< of what it makes of the group; null: nobody
+        part* judge = nullptr;  ///< checks its membership reports; null: none
         std::function<node_load()> load{};
         const detail::routing_part* routing = nullptr;
     };
@@ -51,11 +51,11 @@ class node_run final : public place, private core::membership::watcher {
     node_run(network& net, unsigned host, unsigned run, std::string name, options how);
     ~node_run() override;
 
-    /// Listens, and joins the group. To be called once, when it is owned.
+    /// Listens, and joins the group. Call this once, when it is owned by a shared pointer.
     void start();
-    /// Ends it as `service::stop` does; `crash` is to follow.
+    /// Stops it as `service::stop` does; `crash` has to follow.
     void stop();
-    /// Ends the process at once: the system closes what was open.
+    /// Ends the process at once: the system closes its sockets.
     void crash();
 
     [[nodiscard]] core::node_state* node() noexcept { return &local_->node(); }
@@ -65,23 +65,23 @@ class node_run final : public place, private core::membership::watcher {
     [[nodiscard]] witness& watcher() noexcept { return net_.watcher(); }
     [[nodiscard]] planted fault() const noexcept { return net_.fault(); }
     [[nodiscard]] part* judge() const noexcept { return judge_; }
-    /// Which run of its host it is, from 1.
+    /// The number of this incarnation on its host, from 1.
     [[nodiscard]] unsigned run_number() const noexcept { return run_; }
-    /// By its own clock.
+    /// By the node's own clock.
     [[nodiscard]] time_point started_at() const noexcept { return started_; }
-    /// Null where it takes no part in multicast.
+    /// Null if it does not take part in multicast.
     [[nodiscard]] group_port* group() const noexcept { return environment_->group(); }
-    /// Announces itself no more, and says no farewell that anybody hears.
+    /// Stops announcing itself, and its farewell is not received.
     void fall_silent();
 
-    /// Asks the node of a host, wherever the name in the noun leads.
+    /// Sends a request to the node of a host, independently of the name in the noun.
     std::uint64_t ask(unsigned to, carrier by, const request_order& what, detail::pending_ptr operation,
                       core::outbound::progress_function progress = {});
     void cancel(std::uint64_t id) { local_->cancel(id); }
 
-    /// Looks whether its memory is within its limits.
+    /// Checks that its memory is within its limits.
     void check_bounds();
-    /// Looks whether nothing is kept, when all has been quiet for long.
+    /// Checks that nothing is kept after a long time without activity.
     void check_rest();
 
   private:
@@ -94,7 +94,7 @@ class node_run final : public place, private core::membership::watcher {
     part* judge_;
     std::shared_ptr<virtual_environment> environment_;
     std::shared_ptr<core::local_node> local_;
-    core::membership::watcher& told_; // the node's own
+    core::membership::watcher& told_; // the node's own watcher
     time_point started_{};
 };
 

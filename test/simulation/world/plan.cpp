@@ -18,7 +18,7 @@ struct kind {
     names fields;
 };
 
-// In the order of `deed`. Times and lengths of time in milliseconds, sizes in bytes, chances of a thousand.
+// In the order of `deed`. Times and durations in milliseconds, sizes in bytes, probabilities per mille.
 constexpr std::array<kind, 19> kinds{{
     {"ask", 10, {"op", "from", "to", "by", "what", "deadline", "size", "work", "steps", "end"}},
     {"cancel", 1, {"op"}},

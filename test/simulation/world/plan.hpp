@@ -11,7 +11,7 @@
 
 namespace cles::simulation {
 
-/// What can happen. Parts of the simulation carry it out (part.hpp).
+/// The kinds of actions. Parts of the simulation perform them (part.hpp).
 enum class deed : std::uint8_t {
     ask,
     cancel,
@@ -34,11 +34,11 @@ enum class deed : std::uint8_t {
     retire,
 };
 
-/// The numbers that a deed has, by name.
+/// The numbers of an action, by name.
 std::span<const std::string_view> fields_of(deed what) noexcept;
 std::string_view to_string(deed what) noexcept;
 
-/// Something that happens at a time, from the outside: a program asks for it, or trouble comes.
+/// An external event at a point in time: a request of a program, or a fault.
 struct action {
     static constexpr std::size_t most_fields = 10;
 
@@ -50,27 +50,27 @@ struct action {
     bool operator==(const action&) const = default;
 };
 
-/// All that a simulation needs to know: what happens from the outside, and the seed of the network's chance. Two runs
-/// of a plan are the same to the last byte.
+/// The complete input of a simulation: the external events, and the seed of the network's random numbers. Two runs of a
+/// plan are identical to the last byte.
 struct plan {
     std::uint64_t seed = 1;
     unsigned hosts = 3;
     bool small_limits = true; ///< so that they are reached
-    bool strangers = false;   ///< sources of datagrams are sent little
+    bool strangers = false;   ///< output to sources of datagrams is limited
     bool group = false;       ///< nodes take part in multicast
     std::vector<action> actions{};
 
     bool operator==(const plan&) const = default;
 };
 
-/// A plan as a text that people read and files keep; one action a line.
+/// A plan as readable text, one action a line.
 std::string to_text(const plan& p);
-/// \throws std::runtime_error naming the line that is none
+/// \throws std::runtime_error naming the line that is not valid
 plan plan_from(std::string_view text);
-/// \throws std::runtime_error likewise, or if the file cannot be read
+/// \throws std::runtime_error the same, or if the file cannot be read
 plan plan_in_file(const std::string& path);
 
-/// Makes the plan of a seed, with so many actions.
+/// Makes the plan of a seed, with this number of actions.
 plan make_plan(std::uint64_t seed, unsigned actions);
 
 } // namespace cles::simulation

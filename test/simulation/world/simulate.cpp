@@ -53,7 +53,7 @@ class shrinking {
         return best_.actions.size() < before;
     }
 
-    // A number that says how much or how long is easier to understand where it is 0 or small.
+    // A number that is an amount or a duration is easier to understand if it is 0 or small.
     bool lower_numbers() {
         bool lowered = false;
         for (std::size_t i = 0; i < best_.actions.size(); ++i) {
@@ -75,7 +75,7 @@ class shrinking {
         }
         return lowered;
     }
-    // Nobody asks or follows himself.
+    // No node sends requests to itself or binds its own nouns.
     static bool is_sound(const action& a) {
         const bool between_two = a.what == deed::ask || a.what == deed::follow || a.what == deed::mute ||
                                  (a.what == deed::gather && a["all"] == 0);

@@ -8,14 +8,14 @@
 
 namespace cles::simulation {
 
-/// Lives through a plan.
+/// Runs a plan.
 report simulate(const plan& what, planted fault = planted::none, const witness::reader& reader = {});
 
-/// The same twice, and looks whether both runs are the same.
+/// Runs a plan twice, and checks that both runs are identical.
 report simulate_twice(const plan& what, planted fault = planted::none);
 
-/// A smaller plan that breaks the same rule: with fewer actions, and fewer hosts where that goes. Looks at `max_runs`
-/// plans at most.
+/// A smaller plan that violates the same rule: with fewer actions, and fewer hosts if possible. Tries at most
+/// `max_runs` plans.
 plan minimise(const plan& what, rule broken, planted fault = planted::none, std::size_t max_runs = 1500);
 
 } // namespace cles::simulation

@@ -14,38 +14,38 @@
 
 namespace cles::simulation {
 
-/// What has to hold, whatever happens (README.md of the folder above).
+/// The invariants (README.md of the folder above).
 BOOST_DEFINE_FIXED_ENUM_CLASS(rule, std::uint8_t,
                               effects_once,  ///< PUSH, DELEGATE and UPDATE run at most once
-                              ends_in_time,  ///< every request ends once, by its deadline
-                              reply_order,   ///< anonymous requests are answered in their order
-                              update_order,  ///< a binder sees each update at most once, in order, as published
-                              gaps_told,     ///< what a binder saw and what it was told that it missed are all
-                              replies_match, ///< an answer is that to its request, and true
-                              well_formed,   ///< what crosses the network is a message of its size
+                              ends_in_time,  ///< every request completes once, by its deadline
+                              reply_order,   ///< requests without id are answered in their order
+                              update_order,  ///< a feed receives each update at most once, in order, as published
+                              gaps_told,     ///< a feed's updates and reported gaps together are everything published
+                              replies_match, ///< a reply belongs to its request, and is true
+                              well_formed,   ///< every message on the network is valid and within its size
                               bounded,       ///< memory stays within the limits
-                              at_rest,       ///< nothing is kept when all is quiet
-                              asks_succeed,  ///< once the trouble is over, requests succeed
-                              feeds_receive, ///< once the trouble is over, feeds are bound and receive
-                              backs_off,     ///< a feed that was lost pauses before it binds again
-                              others_known,  ///< once the trouble is over, all know all who are there, and nobody else
-                              names_awaited, ///< a node that has just begun waits for names that it does not know yet
-                              nobody_lost,   ///< who was heard of late is not taken for silent, gone, or another one
-                              gone_in_time,  ///< who is silent is suspect and gone in time, who leaves at once
-                              clashes_told,  ///< a second live node of a name is reported, and has not the name
-                              sent_once,     ///< the group gets each update once, and again only for a new binder
-                              first_soon,    ///< who binds by the group soon gets the last update
-                              same_trace);   ///< a seed always gives the same
+                              at_rest,       ///< nothing is kept without activity
+                              asks_succeed,  ///< after the faults have ended, requests succeed
+                              feeds_receive, ///< after the faults have ended, feeds are bound and receive
+                              backs_off,     ///< a lost feed pauses before it binds again
+                              others_known,  ///< after the faults have ended, each node knows exactly the running nodes
+                              names_awaited, ///< a node that has just started waits for names that it does not know yet
+                              nobody_lost,   ///< a node received lately is not considered silent, gone, or another one
+                              gone_in_time,  ///< a silent node is suspect and gone in time; one that leaves, at once
+                              clashes_told,  ///< a second live node of a name is reported, and does not get the name
+                              sent_once,     ///< the group gets each update once, and again only for a new subscriber
+                              first_soon,    ///< a new subscriber in the group soon receives the last update
+                              same_trace);   ///< a seed always produces the same trace
 
 inline std::string_view to_string(rule r) noexcept { return boost::describe::enum_to_string(r, ""); }
 
-/// A rule that was broken.
+/// A violation of a rule.
 struct violation {
     rule broken;
     std::string what;
 };
 
-/// Sees all that happens: keeps its hash, tells it to who wants to read it, and writes down what must not be.
+/// Receives all events: keeps their hash, passes them to a reader, and records violations.
 class witness {
   public:
     using reader = std::function<void(const std::string&)>;
@@ -53,7 +53,7 @@ class witness {
     explicit witness(const agenda& time) : time_(time) {}
 
     void read_by(reader who) { reader_ = std::move(who); }
-    /// Something happened, which belongs to the trace.
+    /// An event that belongs to the trace.
     void saw(std::string_view who, std::string_view what, std::string_view text = {}) {
         mix(static_cast<std::uint64_t>(time_.now().time_since_epoch().count()));
         mix(who);
@@ -76,7 +76,7 @@ class witness {
 
   private:
     void mix(std::uint64_t value) noexcept {
-        hash_ = (hash_ ^ value) * 0x100000001b3U; // FNV-1a, eight bytes at once
+        hash_ = (hash_ ^ value) * 0x100000001b3U; // FNV-1a, eight bytes at a time
         hash_ ^= hash_ >> 29U;
     }
     void mix(std::string_view text) noexcept {

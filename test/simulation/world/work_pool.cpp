@@ -107,7 +107,7 @@ void work_pool::stop(std::uint64_t number) {
     auto& j = *found->second;
     if (j.queued()) {
         queue_.remove(j);
-        host_.later({}, [keep = std::move(j.what.answer)] {}); // who is just being told
+        host_.later({}, [keep = std::move(j.what.answer)] {}); // its requester is being notified
         jobs_.erase(found);
         return;
     }
@@ -133,7 +133,7 @@ void work_pool::watch() {
     }
 }
 
-// -- judging -------------------------------------------------------------------------------------------------------
+// -- checks --------------------------------------------------------------------------------------------------------
 
 void work_pool::check() {
     if (queue_.size() > most_queued) {

@@ -19,8 +19,9 @@
 
 namespace cles::simulation {
 
-/// The workers of a daemon, in virtual time. Who is admitted, whose turn it is and who is stuck is decided by the
-/// machines of runtime/src; this does for them what its worker_pool and job_dispatcher do. They are to be kept alike.
+/// The workers of a daemon, in virtual time. Admission, the order of links and the detection of stuck workers are
+/// decided by the classes of runtime/src; this replaces its worker_pool and job_dispatcher, and must be kept consistent
+/// with them.
 class work_pool final : public std::enable_shared_from_this<work_pool> {
   public:
     static constexpr std::size_t workers = 2;
@@ -34,14 +35,14 @@ class work_pool final : public std::enable_shared_from_this<work_pool> {
         std::uint64_t requester = 0;
         std::shared_ptr<core::call> answer;
         std::chrono::milliseconds work{0};
-        bool heeds = true; ///< ends when it is told to stop
+        bool heeds = true; ///< stops when it is told to
         std::function<void()> begun;
     };
     void submit(order what);
-    /// Its node has crashed: what was to be done is forgotten.
+    /// Its node has crashed: pending work is discarded.
     void crash();
     [[nodiscard]] node_load load() const noexcept;
-    /// Looks whether it stays within its bounds, and knows who is stuck.
+    /// Checks that it stays within its limits, and knows stuck workers.
     void check();
     void check_rest();
 
@@ -53,7 +54,7 @@ class work_pool final : public std::enable_shared_from_this<work_pool> {
         bool at_work = false;
         bool known_stuck = false;
         time_point begun{};
-        time_point due{}; // when it is to have ended
+        time_point due{}; // when it should have ended
     };
 
     void work();

@@ -10,7 +10,7 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr seconds memory_of_datagrams{75}; // and some more: then what was remembered is forgotten
+constexpr seconds memory_of_datagrams{75}; // and a margin: then remembered datagrams are forgotten
 constexpr seconds probing{10};
 constexpr seconds quiet{300};
 
@@ -32,7 +32,7 @@ limits small_limits() {
     return bounds;
 }
 
-// What must never be: something that outlives a world.
+// A deliberate error: state that outlives a world.
 std::uint64_t leak(planted fault) {
     static std::uint64_t leaked = 0;
     return fault == planted::chance_leaks ? ++leaked : 0;
@@ -85,7 +85,7 @@ void world::end_run(node_run& n) {
     collect(n);
 }
 
-// -- what goes wrong -----------------------------------------------------------------------------------------------
+// -- faults --------------------------------------------------------------------------------------------------------
 
 void world::perform(const action& a) {
     each(&part::perform, a);
@@ -152,7 +152,7 @@ void world::retire(unsigned host, milliseconds limit, milliseconds down) {
 
 void world::end_departure_by(node_run& n, milliseconds span, const agenda::action& end) {
     n.later(span, [this, &n, end] {
-        // A node that was frozen notices its deadlines late.
+        // A node that was suspended notices its deadlines late.
         const auto late_until = n.thawed_at() + n.bounds().discard + milliseconds{100};
         if (time_.now() < late_until) {
             end_departure_by(n, std::chrono::ceil<milliseconds>(late_until - time_.now()), end);
@@ -173,7 +173,7 @@ void world::on_neighbour(node_run& at, std::string_view node, core::membership::
     each(&part::on_neighbour, at, node, what);
 }
 
-// -- a life --------------------------------------------------------------------------------------------------------
+// -- a run ---------------------------------------------------------------------------------------------------------
 
 void world::collect(node_run& n) {
     for (const auto count : n.node()->counts.requests) {

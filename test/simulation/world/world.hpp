@@ -18,21 +18,21 @@
 
 namespace cles::simulation {
 
-/// What came of a plan.
+/// The result of a plan.
 struct report {
     std::vector<violation> violations;
-    std::uint64_t hash = 0; ///< of all that happened
+    std::uint64_t hash = 0; ///< of all events
     std::uint64_t steps = 0;
     std::uint64_t datagrams = 0;
     std::uint64_t stream_bytes = 0;
-    std::uint64_t requests = 0; ///< that nodes served
-    std::uint64_t updates = 0;  ///< that feeds got
+    std::uint64_t requests = 0; ///< served by nodes
+    std::uint64_t updates = 0;  ///< received by feeds
     double node_seconds = 0;    ///< simulated while something was planned
 
     [[nodiscard]] bool broke(rule which) const noexcept;
 };
 
-/// Nodes, what they do to each other, and what goes wrong. Lives through one plan.
+/// Runs one plan: nodes, their activities, and faults.
 class world final : public node_hosts, private part {
   public:
     explicit world(const plan& what, planted fault = planted::none, witness::reader reader = {});
@@ -43,16 +43,16 @@ class world final : public node_hosts, private part {
     // For the parts.
     [[nodiscard]] unsigned hosts() const noexcept { return plan_.hosts; }
     [[nodiscard]] static std::string name_of(unsigned host) { return "n" + std::to_string(host); }
-    /// How many runs have begun there.
+    /// The number of incarnations that have started there.
     [[nodiscard]] unsigned runs(unsigned host) const noexcept { return runs_[host]; }
-    /// The last time that a node there began to leave in order.
+    /// The last time that a node there began to leave with notice.
     struct departure {
         unsigned run = 0;
         time_point begun{};
-        time_point until{}; ///< from then on what it has begun is cut short
+        time_point until{}; ///< from then on its pending requests are cut short
     };
     [[nodiscard]] const departure& departure_of(unsigned host) { return departures_[host]; }
-    /// Begins a node that is none of the hosts'.
+    /// Starts a second node of that name, on an additional host.
     std::shared_ptr<node_run> begin_stranger(const std::string& name, unsigned host, unsigned run);
     void end_run(node_run& n) override;
     [[nodiscard]] bool has_group() const noexcept { return plan_.group; }
@@ -67,9 +67,9 @@ class world final : public node_hosts, private part {
     void start(unsigned host) override;
     void perform(const action& what) override;
     void crash(unsigned host, std::chrono::milliseconds down);
-    /// Ends the node there in order.
+    /// Stops the node there.
     void depart(unsigned host, std::chrono::milliseconds down);
-    /// Has the node there leave in order, within that limit.
+    /// Makes the node there leave with notice, within that limit.
     void retire(unsigned host, std::chrono::milliseconds limit, std::chrono::milliseconds down);
     void end_departure_by(node_run& n, std::chrono::milliseconds span, const agenda::action& end);
     void collect(node_run& n);
