@@ -113,15 +113,15 @@ measurement selected_mode(const CLI::App& command, carrier transport) {
     if (selected == modes.end()) {
         for (const char* option : {"--binders", "--keep"}) {
             if (is_given(command, option)) {
-                refuse(option, "is for --updates and --fan-out");
+                refuse(option, "needs --updates or --fan-out");
             }
         }
         if (transport == carrier::multicast) {
-            refuse("--transport multicast", "is for --fan-out");
+            refuse("--transport multicast", "needs --fan-out");
         }
         return measurement::pulls;
     }
-    const std::string not_for = std::string{"is not for "} + selected->flag;
+    const std::string not_for = std::string{"cannot be combined with "} + selected->flag;
     for (const auto& other : modes) {
         if (&other != &*selected && is_given(command, other.flag)) {
             refuse(other.flag, not_for);
@@ -204,10 +204,10 @@ measurement selected_measurement(const CLI::App& command, const bench_arguments&
     const auto transport = carrier_of(given.transport);
     const auto what = selected_mode(command, transport);
     if (transport == carrier::multicast && given.keep != 0) {
-        refuse("--keep", "has no effect by multicast");
+        refuse("--keep", "has no effect with multicast");
     }
     if (what == measurement::updates && given.binders.size() > 1) {
-        refuse("--updates", "takes one number of --binders");
+        refuse("--updates", "accepts only one value of --binders");
     }
     if (!given.against.empty() && is_given(command, "--transport")) {
         refuse("--transport", "cannot be combined with --against, whose URL contains the transport");

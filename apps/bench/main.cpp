@@ -41,7 +41,7 @@ void run(const CLI::App& command, const tool::bench_arguments& given) {
     const bool has_two_ends = what != tool::measurement::bytes && what != tool::measurement::parse;
     if (has_two_ends && options.against.empty() && options.transport != tool::carrier::inproc && !options.one_core &&
         !cles::perf::place_ends().apart()) {
-        tool::note("there is only one core: both ends share it, and the figures mean little");
+        tool::note("there is only one core: both ends share it, and the figures are not representative");
     }
     tool::write_output(measure(what, options));
 }

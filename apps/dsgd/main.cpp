@@ -54,8 +54,8 @@ int report_result(const arguments& args, const sgd::data_set& data, const dsgd::
     if (all.failure()) {
         return report_failure(*all.failure());
     }
-    std::printf("elapsed   %.3f ms: the longest shard %.3f, all else %.3f\n"
-                "mse       %.7f; no line has less than %.7f; %.4f %% of the points in the wrong class\n",
+    std::printf("elapsed   %.3f ms: the longest shard %.3f, overhead %.3f\n"
+                "mse       %.7f; best possible %.7f; %.4f %% of the points in the wrong class\n",
                 out.times.elapsed_ms, out.times.longest_ms, out.times.overhead_ms, out.quality.mse,
                 out.quality.least_mse, out.quality.wrong * 100);
     return 0;

@@ -81,7 +81,7 @@ boost::asio::awaitable<void> pool::delegate(round& now, std::size_t i) {
             failure = e;
         }
         if (failure && now.all.failed(i, *failure)) {
-            std::fprintf(stderr, "cles-dsgd: shard %zu: %s; again, to %s\n", i + 1, shard.trouble.back().c_str(),
+            std::fprintf(stderr, "cles-dsgd: shard %zu: %s; retrying at %s\n", i + 1, shard.trouble.back().c_str(),
                          shard.target.c_str());
             boost::asio::steady_timer pause{io_, std::chrono::milliseconds{20}};
             co_await pause.async_wait(boost::asio::use_awaitable);

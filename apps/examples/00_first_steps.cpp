@@ -31,7 +31,7 @@ asio::awaitable<void> follow(cles::service& car1, cles::service& car2) {
     const auto next = co_await feed.async_next();
 
     std::cout << "car1 is at " << fix.lat << ", " << fix.lon << '\n';
-    std::cout << "car1 goes at " << next.value.velocity << " m/s\n";
+    std::cout << "car1 drives at " << next.value.velocity << " m/s\n";
     car1.stop();
     car2.stop();
 }
@@ -49,4 +49,4 @@ int main() {
 
 // Prints:
 // car1 is at 48.1371, 11.5754
-// car1 goes at 27.5 m/s
+// car1 drives at 27.5 m/s

@@ -32,7 +32,7 @@ BOOST_DESCRIBE_STRUCT(route, (), (points))
 asio::awaitable<void> drive(cles::service& car, cles::service& planner) {
     const route home{{{48.1, 11.5, "start"}, {48.2, 11.6}}};
     const auto taken = co_await planner.async_push<int>("car:route", home);
-    std::cout << "the car took " << taken << " points\n";
+    std::cout << "the car accepted " << taken << " points\n";
 
     try {
         co_await planner.async_request(
@@ -59,5 +59,5 @@ int main() {
 
 // Prints:
 // from start to 48.2
-// the car took 2 points
-// bad_request: car: the body does not fit: points[1].lon: expected a number, got a string (at byte ...)
+// the car accepted 2 points
+// bad_request: car: the body is invalid: points[1].lon: expected a number, got a string (at byte ...)

@@ -44,7 +44,7 @@ asio::awaitable<void> use(cles::service& me, asio::cancellation_signal& impatien
 int main() {
     asio::io_context io;
     cles::service heater{io, {.name = "heater", .listen = {"tcp://127.0.0.1:0"}}};
-    heater.on_delegate("warmUp", warm_up, {.description = "Takes its time", .parameters = {"ms"}});
+    heater.on_delegate("warmUp", warm_up, {.description = "Warms up for that many milliseconds", .parameters = {"ms"}});
 
     cles::service me{io, {.name = "me", .peers = {{"heater", heater.endpoints().front()}}}};
     asio::cancellation_signal impatience;

@@ -26,7 +26,7 @@ std::unique_ptr<cles::service> start_car(const asio::any_io_executor& executor) 
 
 void show(const cles::feed_item<double>& item) {
     switch (item.kind) {
-    case cles::feed_event::current: std::cout << "as it stands: " << item.value << '\n'; break;
+    case cles::feed_event::current: std::cout << "current: " << item.value << '\n'; break;
     case cles::feed_event::update: std::cout << "update " << item.seq << ": " << item.value << '\n'; break;
     case cles::feed_event::gap: std::cout << item.missed << " missed\n"; break;
     case cles::feed_event::lost: std::cout << "the publisher is lost\n"; break;
@@ -70,9 +70,9 @@ int main() {
 }
 
 // Prints:
-// as it stands: 10.5
+// current: 10.5
 // update 2: 11
 // 100 more, read or missed
 // the publisher is lost
 // the publisher is back
-// as it stands: 0
+// current: 0

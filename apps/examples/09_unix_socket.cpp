@@ -26,13 +26,13 @@ int main() {
     }
     const bool private_to_me =
         (fs::status(file).permissions() & fs::perms::mask) == (fs::perms::owner_read | fs::perms::owner_write);
-    std::cout << (private_to_me ? "nobody else may connect\n" : "others may connect\n");
+    std::cout << (private_to_me ? "only this user may connect\n" : "others may connect\n");
     car.stop();
-    std::cout << (fs::exists(file) ? "the file is left\n" : "the file is gone\n");
+    std::cout << (fs::exists(file) ? "the file is still there\n" : "the file was removed\n");
 }
 
 // Prints:
 // {"value":"my own user"}
 // {"value":"my own user"}
-// nobody else may connect
-// the file is gone
+// only this user may connect
+// the file was removed

@@ -60,9 +60,9 @@ recon::recon(const recon_options& args)
       ground_(io_, {.name = args.name, .listen = {args.listen}, .insecure = args.insecure}),
       space_(io_, {.name = args.name + "-camera", .gossip = cles::gossip(args.satellites), .routing = cles::routing()}),
       scene_(args.seed), run_(run_id()) {
-    ground_.on_bind("tracks", {.description = "What moves on the ground, frame by frame"});
+    ground_.on_bind("tracks", {.description = "Objects that move on the ground, frame by frame"});
     ground_.on_push("impact", [this](const impact& at) { return assess(at); },
-                    {.description = "Where and when something struck; the answer says what is seen of it"});
+                    {.description = "Where and when a weapon struck; the answer describes what is seen"});
     events_.log("listening", "listening on " + ground_.endpoints().front());
 }
 
@@ -221,7 +221,7 @@ void recon::report() const {
     std::string text = std::to_string(all.captured) + " frames: " + std::to_string(all.done) + " done, " +
                        std::to_string(all.failed) + " failed, " + std::to_string(all.skipped) + " skipped; ";
     text += out.judged == 0
-                ? "none judged"
+                ? "no frames scored"
                 : "recall " + fixed(out.recall, 3) + ", " + fixed(out.false_per_frame, 3) + " false tracks a frame";
     events_.log("report", text, out);
 }

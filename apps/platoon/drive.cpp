@@ -202,7 +202,7 @@ class drive_supervisor {
             const bool well = WIFEXITED(status) && WEXITSTATUS(status) == 0;
             book_.record_end(name, well);
             disturbed_ = true;
-            note(name, well ? "left" : "gone", well ? "in good order" : exit_text(status) + last_line(name));
+            note(name, well ? "left" : "gone", well ? "ended normally" : exit_text(status) + last_line(name));
         }
     }
 

@@ -127,9 +127,9 @@ void driver::follow(double dt) {
     const bool broken = mode_ahead == role::fallback && lead_ != ahead_;
     const bool leader_silent = lead_ != ahead_ && silent(lead_);
     if (lead_.empty() && leader_silent) {
-        enter(role::degraded, ahead_ + " ahead does not say who leads");
+        enter(role::degraded, ahead_ + " ahead does not report the leader");
     } else if (leader_silent || broken) {
-        enter(role::degraded, leader_silent ? lead_ + ", who leads, is silent" : ahead_ + " ahead has fallen back");
+        enter(role::degraded, leader_silent ? "the leader " + lead_ + " is silent" : ahead_ + " ahead has fallen back");
     } else {
         enter(role::follow, "receives " + ahead_ + " and " + lead_);
     }
@@ -162,7 +162,7 @@ void driver::fall_back(double dt) {
     if (mode_ != role::fallback) {
         fallback_since_ = now_;
         enter(role::fallback,
-              heard(ahead_) == nullptr ? ahead_ + " ahead was never heard" : ahead_ + " ahead is silent");
+              heard(ahead_) == nullptr ? ahead_ + " ahead was never received" : ahead_ + " ahead is silent");
     }
     const double since = now_ - fallback_since_;
     if (heard(ahead_) != nullptr && since <= lead_after) { // the normal command, reduced more and more

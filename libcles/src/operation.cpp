@@ -76,7 +76,7 @@ pending::verdict judge_unread(const json_reader& reader, std::string_view json, 
         return pending::verdict::malformed;
     }
     code = errc::conversion;
-    why = std::string{what} + " does not fit: " + reader.error();
+    why = std::string{what} + " is invalid: " + reader.error();
     return pending::verdict::completed;
 }
 

@@ -53,7 +53,7 @@ def pull_figures(reports):
             yield figure(f"pull_{name}_bare_ratio", f"the exchange by hand over {meaning}, p50, to that over TCP",
                          (r[bare]["p50_us"] / r["icd"]["p50_us"] for r in rounds), "times")
     if tcp:
-        yield figure("pull_overhead", "what a PULL over TCP takes longer than the exchange by hand, p50",
+        yield figure("pull_overhead", "extra time of a PULL over TCP, compared with the exchange by hand, p50",
                      ((r["cles"]["p50_us"] - r["icd"]["p50_us"]) / 1e3 for r in tcp), "ms", paper=PAPER_OVERHEAD_MS,
                      at_most=PAPER_OVERHEAD_MS)
 

@@ -155,7 +155,7 @@ def main():
     parser = argparse.ArgumentParser(description="Measures distributed stochastic gradient descent (the paper's Table 2).")
     parser.add_argument("--programs", default="build/release/apps")
     parser.add_argument("--runs", type=int, default=30)
-    parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), help="per host; all cores unless said")
+    parser.add_argument("--threads", type=int, default=len(os.sched_getaffinity(0)), help="per host; default: all cores")
     parser.add_argument("--epochs", type=int, default=100)
     parser.add_argument("--quota", type=float, default=0.5, help="part of its core that the second host has")
     parser.add_argument("--quick", action="store_true", help="3 short runs: shows that it works, not how fast")

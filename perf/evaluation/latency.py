@@ -41,7 +41,7 @@ LINKS = [
     ("narrow", "64 kbit/s, 5 ms each way", ["--rate", "64", "--delay", "5"], 100),
 ]
 KINDS = {"icd-pull": "round trip by hand", "pull": "PULL", "icd-update": "one way by hand",
-         "update": "UPDATE, one way", "update-multicast": "UPDATE by multicast, one way, of those that came"}
+         "update": "UPDATE, one way", "update-multicast": "UPDATE by multicast, one way, of those received"}
 
 
 class Figures:

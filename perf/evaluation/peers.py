@@ -108,7 +108,7 @@ def main():
     parser = argparse.ArgumentParser(description="Measures CLES and other middleware beside the hand-written exchange.")
     parser.add_argument("--programs", default="build/release/perf/peers")
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--only", type=lambda text: text.split(","), default=[], help="these peers, with commas between")
+    parser.add_argument("--only", type=lambda text: text.split(","), default=[], help="these peers, separated by commas")
     parser.add_argument("--spread", action="store_true", help="let all ends run on all cores, instead of one core each")
     parser.add_argument("--quick", action="store_true", help="one short round: shows that it works, not how fast")
     parser.add_argument("-o", "--output", help="write JSON there; - is the standard output, and no table then")

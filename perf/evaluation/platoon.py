@@ -103,7 +103,7 @@ def figures_of(checks, rows, drives):
         heeds = row["controller"] == "leader"
         yield figure(f"string_ratio_{row['controller']}_{row['hz']}",
                      f"string ratio at {row['hz']} Hz with 10 % lost, the largest of all seeds, "
-                     + ("the leader being heeded" if heeds else "heeding the one ahead alone, for comparison"),
+                     + ("following the leader too" if heeds else "following only the vehicle ahead, for comparison"),
                      row["string_ratio"], runs=row["seeds"], target=within if heeds else None,
                      reached=checks["string_ratio_reached"][f"{row['hz']} Hz"] if heeds else None)
     yield figure("without_leader_fails", f"without the leader the ratio is above {MOST_RATIO:g} at each rate",
@@ -115,7 +115,7 @@ def figures_of(checks, rows, drives):
                      reached=p999["median"] <= MOST_P999_MS, low=p999["low"], high=p999["high"])
     yield figure("over_budget", f"updates between processes that took more than {BUDGET_MS} ms", checks["over_budget"],
                  runs=len(drives), target="0", reached=checks["over_budget"] == 0)
-    yield figure("nobody_collides", "nobody collides in any drive with the leader heeded",
+    yield figure("nobody_collides", "no collision in any drive that follows the leader too",
                  "yes" if checks["nobody_collides"] else "no", target="yes", reached=checks["nobody_collides"])
 
 

@@ -156,7 +156,7 @@ def main():
     parser.add_argument("--orders", type=int, default=1000, help="of each round, idle and loaded")
     parser.add_argument("--streams", type=int, default=4)
     parser.add_argument("--workers", type=int, default=max(1, cores - 1))
-    parser.add_argument("--real-time", type=int, default=None, help="the I/O thread's priority; 10 where it may, 0: none")
+    parser.add_argument("--real-time", type=int, default=None, help="the I/O thread's priority; default: 10 if permitted; 0: none")
     parser.add_argument("--quick", action="store_true", help="2 short rounds: shows that it works, not how fast")
     parser.add_argument("-o", "--output", default="-")
     options = parser.parse_args()

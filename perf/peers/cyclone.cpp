@@ -291,7 +291,7 @@ const description about{
     .name = "cyclone",
     .carriers = "udp",
     .settings =
-        "listeners on both sides, reliable, keep last 1024, the loopback interface alone, by multicast where it serves",
+        "listeners on both sides, reliable, keep last 1024, the loopback interface alone, by multicast where possible",
 };
 
 std::string version() { return DDS_VERSION; }

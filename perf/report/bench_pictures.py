@@ -21,11 +21,11 @@ def kinds(series, note):
     found = []
     if series.get("latency"):
         found.append(("latency", "Round trip of a PULL of the localization, and of the same by hand: quantiles, medians of the "
-                      "rounds with their 95 % intervals. What the paper's PULL takes longer than its traditional packet is "
-                      "the dotted line.", lambda: latency(series["latency"], note)))
+                      "rounds with their 95 % intervals. The dotted line is how much longer the paper's PULL takes "
+                      "than its traditional packet.", lambda: latency(series["latency"], note)))
     if series.get("parse"):
         found.append(("parse", "What a message costs by its length, without sockets: medians, both scales logarithmic. A line "
-                      "that rises as the dotted one does grows as the length.", lambda: parse(series["parse"], note)))
+                      "parallel to the dotted one is linear in the length.", lambda: parse(series["parse"], note)))
     if series.get("fan_out"):
         found.append(("fan_out", "UPDATE of the localization to many binders in one process: the way of one at 1 kHz, and "
                       "deliveries as fast as possible. Dashed: by hand.", lambda: fan_out(series["fan_out"], note)))

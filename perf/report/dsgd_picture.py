@@ -13,7 +13,7 @@ def kinds(raw, note):
         data = raw["pictured"]
         shown += [
             ("data_set", f"Data set with classifier (the paper's Fig. 5): {len(data['some'])} of {data['of']} points, evenly "
-             "drawn, and the line that the shards' averaged classifier parts them by.",
+             "drawn, and the line by which the averaged classifier separates them.",
              lambda: data_set("data_set", data, data["some"], None, note)),
             ("data_set_zoomed", "The same where the classes meet (the paper's Fig. 6), with every point there.",
              lambda: data_set("data_set_zoomed", data, data["near"], data["box"], note))]

@@ -140,7 +140,7 @@ def _remarks(outcome, raw, unreadable):
     if outcome.state == KEPT:
         yield "Not measured in this run: these are the figures of an earlier one."
     if raw.get("quick"):
-        yield "A quick run: that it works, not how fast. Nothing is held to its target."
+        yield "A quick run: that it works, not how fast. No figure is compared with its target."
     if unreadable:
         yield unreadable
     if busy_of(raw) > BUSY:

@@ -17,7 +17,7 @@ def readable(rows):
 
 
 EXPLANATION = ("Ratios of medians to the hand-written exchange over TCP, which is the row of 1; times below 1 and rates above 1 are "
-        "better. A dash is what a peer does not offer, or nobody measured.")
+        "better. A dash means that a peer does not offer it, or that it was not measured.")
 
 
 def _times(value):

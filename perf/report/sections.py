@@ -29,7 +29,7 @@ SECTIONS = (
     Section("platoon", "Platooning", "Section 4.2, the first case study: each vehicle BINDs to the localization of its leader "
             "and of the one ahead.", ("cles_command", "clesd", "cles_platoon")),
     Section("strike_latency", "Allocation of tasks: from track to strike",
-            "Section 4.2, the second case study: DELEGATE of video processing to whoever offers it, tracks to all that are "
+            "Section 4.2, the second case study: DELEGATE of video processing to a node that offers it, tracks to all that are "
             "bound, and DELEGATE of a strike.", ("clesd", "cles_jadc2", "cles_plugin_fmv", "cles_plugin_strike")),
     Section("peers", "Beside other middleware", "", ("cles_command", "clesd", "cles_peer_*"), "perf/peers"),
 )

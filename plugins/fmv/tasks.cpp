@@ -87,13 +87,13 @@ void process(const cles::request& asked, const cles::responder& answer, shop& he
         const auto at = here.all.find(what.stream, size, begun);
         if (!at) {
             ++here.refused;
-            answer.refuse("no more streams are taken", std::chrono::seconds{1});
+            answer.refuse("the limit of streams is reached", std::chrono::seconds{1});
             return;
         }
         std::unique_lock mine{at->lock, std::try_to_lock};
         if (!mine) {
             ++here.refused;
-            answer.refuse("the stream's last frame is still being looked at", std::chrono::milliseconds{5});
+            answer.refuse("the stream's last frame is still being processed", std::chrono::milliseconds{5});
             return;
         }
         if (at->video.size() != size) {
@@ -134,7 +134,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                                 .refused = here->refused,
                                 .bad = here->bad};
                },
-               {.description = "Streams, and what became of their frames", .idempotent = true, .inline_ok = true});
+               {.description = "Streams, and the outcomes of their frames", .idempotent = true, .inline_ok = true});
     to.on_delegate("FMV_Processing",
                    [here](const cles::request& asked, const cles::responder& answer) { process(asked, answer, *here); },
                    {.description = "Tracks of what moves, after one more frame of a stream", .idempotent = true});

@@ -46,7 +46,7 @@ constexpr std::uint64_t most_parts = 64;
 
 void check(std::uint64_t number, std::uint64_t limit) {
     if (number > limit) {
-        throw error(errc::bad_request, std::to_string(number) + " is past the limit of " + std::to_string(limit));
+        throw error(errc::bad_request, std::to_string(number) + " exceeds the limit of " + std::to_string(limit));
     }
 }
 

@@ -25,10 +25,10 @@ constexpr std::uint64_t most_epochs = 1'000'000;
 
 schedule checked(const order& what, const data_set& data) {
     if (what.data && *what.data != data.made_from()) {
-        refuse("the data here is other: " + to_string(data.made_from()));
+        refuse("this node has other data: " + to_string(data.made_from()));
     }
     if (what.count == 0 || what.first >= data.size() || what.count > data.size() - what.first) {
-        refuse("points " + std::to_string(what.first) + " and " + std::to_string(what.count) + " from there: of " +
+        refuse(std::to_string(what.count) + " points from point " + std::to_string(what.first) + ": there are " +
                std::to_string(data.size()));
     }
     schedule how;
@@ -47,7 +47,7 @@ schedule checked(const order& what, const data_set& data) {
 
 void train(const cles::request& asked, const cles::responder& answer, const data_set& data) {
     if (asked.parameters().size() != 1 || asked.parameters().front() != "train") {
-        refuse("what can be delegated is sgd/train");
+        refuse("only sgd/train can be delegated");
     }
     const auto begun = steady::now();
     const auto what = asked.as<order>();
@@ -95,10 +95,10 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
     from.separation = wanted.separation.value_or(from.separation);
     const auto data = std::make_shared<const data_set>(from);
     to.on_pull("sgd", [data] { return data->made_from(); },
-               {.description = "What the data for sgd/train is made from", .idempotent = true, .inline_ok = true});
+               {.description = "The parameters of the data for sgd/train", .idempotent = true, .inline_ok = true});
     to.on_delegate("sgd",
                    [data](const cles::request& asked, const cles::responder& answer) { train(asked, answer, *data); },
-                   {.description = "sgd/train: a linear classifier for the points 'first' and 'count' from there",
+                   {.description = "sgd/train: a linear classifier for 'count' points from point 'first'",
                     .parameters = {"train"},
                     .idempotent = true});
 }

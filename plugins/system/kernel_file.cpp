@@ -36,7 +36,7 @@ bool read_all(const char* path, std::string& out) {
 std::string read_kernel_file(const char* path, const char* what) {
     std::string text;
     if (!read_all(path, text)) {
-        throw cles::error(cles::errc::failed, std::string{"this kernel does not tell its "} + what);
+        throw cles::error(cles::errc::failed, std::string{"this kernel does not report its "} + what);
     }
     return text;
 }

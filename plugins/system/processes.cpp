@@ -67,7 +67,7 @@ processes read_processes(std::size_t most_listed) {
                              .page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE))};
     const std::unique_ptr<DIR, int (*)(DIR*)> proc{::opendir("/proc"), &::closedir};
     if (!proc) {
-        throw cles::error(cles::errc::failed, "this kernel does not tell its processes");
+        throw cles::error(cles::errc::failed, "this kernel does not report its processes");
     }
     std::vector<process> all;
     while (const auto* entry = ::readdir(proc.get())) { // NOLINT(concurrency-mt-unsafe): a DIR of its own

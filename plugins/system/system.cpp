@@ -48,7 +48,7 @@ class load_meter {
 
 void require_within(std::uint32_t value, std::uint32_t least, std::uint32_t most, const char* what) {
     if (value < least || value > most) {
-        throw cles::setting_error(what, std::string{what} + ": " + std::to_string(value) + " is not within " +
+        throw cles::setting_error(what, std::string{what} + ": " + std::to_string(value) + " is not between " +
                                             std::to_string(least) + " and " + std::to_string(most));
     }
 }
@@ -88,7 +88,7 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
     const auto meter = std::make_shared<load_meter>();
     offer(to, samples, "utc", read_utc, {.description = "Time of day: seconds since 1970, and as text"});
     offer(to, samples, "load", [meter] { return meter->read(); },
-          {.description = "How busy the cores are: part of their time (0 to 1), and threads that want to run"});
+          {.description = "How busy the cores are: part of their time (0 to 1), and runnable threads"});
     offer(to, samples, "memory", [] { return parse_memory(read_kernel_file("/proc/meminfo", "memory")); },
           {.description = "Memory in bytes"});
     offer(to, samples, "disk", read_disk, {.description = "File systems and disks, in bytes"});

@@ -99,7 +99,7 @@ class Interfaces(unittest.TestCase):
         self.assertEqual((code, json.loads(out)["node"]), (0, "car1"))
         code, _, err = self.run_at(near, "auto", "ls", "-vv")
         self.assertEqual(code, 0)
-        self.assertEqual(re.findall(r"takes part in 239.255.25.37:25370 on (\S+),", err), ["lo", "v0", "w0"])
+        self.assertEqual(re.findall(r"has joined 239.255.25.37:25370 on (\S+),", err), ["lo", "v0", "w0"])
 
     def test_automatic_where_there_is_none(self):
         for name in ("lo", "v1", "w1"):

@@ -75,7 +75,7 @@ class Found(Group):
 
     def test_ls_as_a_table(self):
         lines = self.ok("ls", "-o", "table").splitlines()
-        self.assertEqual(lines[0].split(), ["NODE", "STATE", "LOAD", "HEARD", "ENDPOINTS"])
+        self.assertEqual(lines[0].split(), ["NODE", "STATE", "LOAD", "LAST", "SEEN", "ENDPOINTS"])
         self.assertRegex(lines[1], rf"^car1  live +0 +.* ago +{self.nodes[0].url} {self.nodes[0].unix}$")
         self.assertEqual(len(lines), 3)
 
@@ -115,7 +115,7 @@ class Found(Group):
         code, out, err = by_name("pull", "car9:echo")
         self.assertEqual((code, out), (3, ""))
         first, second = err.splitlines()
-        self.assertRegex(first, r"^cles: no_target: cles-\d+ cannot find 'car9': nobody of that name has announced "
+        self.assertRegex(first, r"^cles: no_target: cles-\d+ cannot find 'car9': no node with that name has announced "
                                 r"itself on lo; give its URL$")
         self.assertEqual(second, "cles: cles ls lists the nodes; --at URL or --peer NAME=URL sets the address of another one")
 
@@ -183,7 +183,7 @@ class Lives(unittest.TestCase):
     def test_one_that_stops_takes_its_leave(self):
         node = self.serve("car1")
         watcher = self.serve("car2")
-        told(watcher, "car1 is there")
+        told(watcher, "discovered car1")
         node.send_signal(signal.SIGTERM)
         told(watcher, "car1 has left")
         self.assertEqual(self.names(), [("car2", "live")])
@@ -191,10 +191,10 @@ class Lives(unittest.TestCase):
     def test_one_that_is_killed_and_started_again_elsewhere_is_found_again(self):
         first = self.serve("car1")
         watcher = self.serve("car2")
-        told(watcher, "car1 is there")
+        told(watcher, "discovered car1")
         first.kill()
         second = self.serve("car1")
-        told(watcher, "car1 is elsewhere now")
+        told(watcher, "car1 is now at")
         self.assertEqual(self.names(), [("car1", "live"), ("car2", "live")])
         self.assertIsNone(second.poll())
 
@@ -202,7 +202,7 @@ class Lives(unittest.TestCase):
         first = self.serve("car1", "--allow-clash")
         second = self.serve("car1", "--allow-clash")
         for one in (first, second):
-            self.assertIn("WARNING", told(one, "another node calls itself 'car1' too").upper())
+            self.assertIn("WARNING", told(one, "another node also has the name 'car1'").upper())
         code, out, err = cles("ls", "-w", "3s", "-o", "json", env=self.env)
         self.assertEqual((code, err), (0, ""))
         self.assertEqual([(p["node"], p["state"]) for p in json.loads(out)["peers"]],

@@ -90,7 +90,7 @@ class Loopback(Processes):
         self.assertIn("--multicast: '10.0.0.1' is not an IPv4 multicast group", err)
         code, _, err = cles("bind", "all:x", env=environment(CLES_MULTICAST="lo,239.1.2.3:x"))
         self.assertEqual(code, 2)
-        self.assertIn("CLES_MULTICAST: 'x' in 'lo,239.1.2.3:x' is no port", err)
+        self.assertIn("CLES_MULTICAST: 'x' in 'lo,239.1.2.3:x' is not a port", err)
         code, _, err = cles("bind", "car1:x", "--multicast", "lo", "--at", "tcp://127.0.0.1:1")
         self.assertEqual(code, 2)
 
@@ -232,7 +232,7 @@ class Hosts(Processes):
         process = self.on(1, CLES, "serve", "--listen", "tcp://127.0.0.1:25370", "--multicast", self.here(1))
         code, out, err = finish(process)
         self.assertEqual((code, out), (2, ""))
-        self.assertIn("can be reached from other hosts, and nobody proves who they are; say 'insecure'", err)
+        self.assertIn("can be reached from other hosts, which are not authenticated; set 'insecure'", err)
 
 
 if __name__ == "__main__":

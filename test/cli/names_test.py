@@ -111,7 +111,7 @@ class Names(unittest.TestCase):
             return cles("pull", "car1:echo/x", "--at", router, env=self.env)
 
         wait_until(lambda: asked()[0] == 3, "the clash is told")
-        self.assertIn(f"there are two nodes that call themselves 'car1', at {first.url} and at {second.url}", asked()[2])
+        self.assertIn(f"two nodes have the name 'car1', at {first.url} and at {second.url}", asked()[2])
         second.stop()
         wait_until(lambda: asked()[0] == 0, "there is one alone again")
 

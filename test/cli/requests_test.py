@@ -211,12 +211,12 @@ class Wire(unittest.TestCase):
 
     def test_a_node_that_has_reached_its_limit_of_links(self):
         def refuse(_, send):
-            send('{"error":"busy","message":"car1 has as many links as it may","retry_ms":1000}')
+            send('{"error":"busy","message":"car1 has reached its limit of links","retry_ms":1000}')
             return "close"
 
         with ScriptedNode(refuse) as node:
             code, out, err = cles("pull", "car1:x", "--at", node.url)
-        self.assertEqual((code, out, err), (6, "", "cles: busy: car1 has as many links as it may\n"))
+        self.assertEqual((code, out, err), (6, "", "cles: busy: car1 has reached its limit of links\n"))
 
     def test_an_answer_that_never_comes(self):
         with ScriptedNode(lambda line, send: None) as node:

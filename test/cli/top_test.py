@@ -77,7 +77,7 @@ class Top(unittest.TestCase):
         self.assertEqual((code, err), (0, ""))
         first, second = out.split("\n\n")
         self.assertEqual(first.splitlines()[0].split(), ["NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S",
-                                                         "ERR/S", "P50", "P99", "HEARD"])
+                                                         "ERR/S", "P50", "P99", "LAST", "SEEN"])
         self.assertRegex(first.splitlines()[1], r"^car1 +live +- +0 +0 +- +- ")
         self.assertRegex(second.splitlines()[1], r"^car1 +live +- +0 +0 +0 +0 ")
 
@@ -92,7 +92,7 @@ class Top(unittest.TestCase):
             self.assertEqual(code, wanted)
             self.assertTrue(shown.startswith("\x1b[?1049h"), shown)
             self.assertTrue(shown.endswith("\x1b[?1049l"), shown)
-            self.assertIn("\x1b[Hcles top  2 nodes, 0 requests/s, 0 running, 0 queued  (every 200 ms; q ends)", shown)
+            self.assertIn("\x1b[Hcles top  2 nodes, 0 requests/s, 0 running, 0 queued  (every 200 ms; q quits)", shown)
 
     def test_a_terminal_that_cannot(self):
         code, shown = on_terminal("top", "-n", "1", env={**ENVIRONMENT, "TERM": "dumb"})

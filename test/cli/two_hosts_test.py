@@ -66,7 +66,7 @@ class TwoHosts(unittest.TestCase):
         self.assertEqual([(p["node"], p["endpoints"]) for p in self.peers_of(self.hosts.far)], [("car3", [])])
         code, out, err = self.run_at(self.hosts.far, "pull", "car3:echo")
         self.assertEqual((code, out), (3, ""))
-        self.assertIn("it is there, but at no address that can be used from here", err)
+        self.assertIn("it has announced no address that is reachable from here", err)
 
     def test_one_that_dies_is_suspect_and_another_run_of_it_found_again(self):
         self.serve(self.hosts.near, "watcher", "tcp://0.0.0.0:0")
@@ -85,7 +85,7 @@ class TwoHosts(unittest.TestCase):
         far, _ = self.serve(self.hosts.far, "car5", "tcp://0.0.0.0:0", more=["--allow-clash"])
         for process, other in ((near, "10.77.0.2"), (far, "10.77.0.1")):
             while line := read_line(process, process.stderr):
-                if f"another node calls itself 'car5' too, on {other}" in line:
+                if f"another node also has the name 'car5', on {other}" in line:
                     break
             self.assertTrue(line, "it was not said")
 

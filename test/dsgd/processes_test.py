@@ -121,8 +121,8 @@ class Manager(unittest.TestCase):
             code, out, err = run("--at", daemon.url, "-k", "2", "-e", "50")
         self.assertEqual(code, 0)
         self.assertRegex(out, r"(?m)^done +100000 points +\d+\.\d{3} ms  sat1\ndone +100000 points")
-        self.assertRegex(out, r"(?m)^elapsed +\d+\.\d{3} ms: the longest shard \d+\.\d{3}, all else \d+\.\d{3}$")
-        self.assertRegex(out, r"(?m)^mse +0\.01\d{5}; no line has less than 0\.01\d{5}; 0\.0\d{3} % of the points")
+        self.assertRegex(out, r"(?m)^elapsed +\d+\.\d{3} ms: the longest shard \d+\.\d{3}, overhead \d+\.\d{3}$")
+        self.assertRegex(out, r"(?m)^mse +0\.01\d{5}; best possible 0\.01\d{5}; 0\.0\d{3} % of the points")
         self.assertRegex(err, r"(?m)^cles-dsgd: [1-9]\d % of 2 shards$")
 
     # -- who is killed ---------------------------------------------------------------------------------------------------
@@ -139,7 +139,7 @@ class Manager(unittest.TestCase):
         self.assertEqual([part["node"] for part in report["parts"]], ["sat1"] * 4)
         for i in (1, 3):
             self.assertRegex(report["shards"][i]["trouble"][0], "^sat2: unavailable: ")
-            self.assertRegex(err, rf"(?m)^cles-dsgd: shard {i + 1}: sat2: unavailable: .*; again, to sat1$")
+            self.assertRegex(err, rf"(?m)^cles-dsgd: shard {i + 1}: sat2: unavailable: .*; retrying at sat1$")
         self.assertEqual(report["shards"][0]["trouble"], [])
         self.assertEqual(report["result"], trained_here(LONG))
 
@@ -210,7 +210,7 @@ class Manager(unittest.TestCase):
             with node("sat2", first.url, plugin=f"plugins: [{{path: {PLUGIN}, config: {{seed: 2}}}}]\n") as second:
                 wait_until(lambda: live_at(first) == {"sat2"} and live_at(second) == {"sat1"}, "both know each other")
                 report, err = self.check(["--at", first.url, "--nodes", "sat1,sat2", "-k", "2"], 5)
-        self.assertRegex(err, "bad_request: .*the data here is other: 100000 points per class, 7 apart, from seed [12]")
+        self.assertRegex(err, "bad_request: .*this node has other data: 100000 points per class, 7 apart, from seed [12]")
         self.assertIn("failed", self.fates(report))
         self.assertNotIn("open", self.fates(report))
 

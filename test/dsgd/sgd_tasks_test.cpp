@@ -56,7 +56,7 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(ask("DELEGATE self:sgd/test {}").starts_with("bad_request"));
     BOOST_TEST(refused("{}").starts_with("bad_request"));
     BOOST_TEST(refused(R"({"first":0,"count":0})").starts_with("bad_request"));
-    BOOST_TEST(refused(R"({"first":1999,"count":2})") == "bad_request: node: points 1999 and 2 from there: of 2000");
+    BOOST_TEST(refused(R"({"first":1999,"count":2})") == "bad_request: node: 2 points from point 1999: there are 2000");
     BOOST_TEST(refused(R"({"first":18446744073709551615,"count":2})").starts_with("bad_request"));
     BOOST_TEST(refused(R"({"first":1,"count":18446744073709551615})").starts_with("bad_request"));
     BOOST_TEST(refused(R"({"first":0,"count":9,"epochs":0})") == "bad_request: node: epochs: 1 to 1000000");
@@ -69,7 +69,7 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
 BOOST_AUTO_TEST_CASE(other_data_is_refused) {
     BOOST_TEST(
         ask(R"(DELEGATE self:sgd/train {"first":0,"count":9,"data":{"seed":2,"per_class":1000,"separation":7}})") ==
-        "bad_request: node: the data here is other: 1000 points per class, 7 apart, from seed 1");
+        "bad_request: node: this node has other data: 1000 points per class, 7 apart, from seed 1");
     BOOST_TEST(ask(R"(DELEGATE self:sgd/train {"first":0,"count":9,"data":{"seed":1,"per_class":1000,"separation":7}})")
                    .starts_with(R"({"node":"node")"));
 }

@@ -255,7 +255,7 @@ BOOST_DATA_TEST_CASE(a_request_to_a_node_at_its_limit_of_links_is_busy, tcp_and_
         until([&] { return pulled.done() && pushed.done(); });
         for (const auto& each : {pulled, pushed}) {
             BOOST_TEST((each.code == errc::busy), each.code.message());
-            BOOST_TEST(each.words == "car1 has as many links as it may");
+            BOOST_TEST(each.words == "car1 has reached its limit of links");
         }
     }
     inside.close();

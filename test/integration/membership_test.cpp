@@ -177,7 +177,8 @@ BOOST_FIXTURE_TEST_CASE(after_the_first_round_an_unknown_name_is_refused_at_once
     cles::service asker{here, in_group("asker")};
     const auto first = pulled(asker, "car9:who");
     BOOST_TEST((first.code == errc::no_target));
-    BOOST_TEST(first.why == "asker cannot find 'car9': nobody of that name has announced itself on lo; give its URL");
+    BOOST_TEST(first.why ==
+               "asker cannot find 'car9': no node with that name has announced itself on lo; give its URL");
     const auto second = pull(asker, "car9:who");
     here.restart();
     here.poll();
@@ -371,8 +372,9 @@ BOOST_FIXTURE_TEST_CASE(a_second_live_node_of_a_name_is_reported_and_not_asked, 
     });
     BOOST_TEST(pulled(asker, "car1:who").text == R"({"value":"car1"})");
     BOOST_TEST(std::count(warnings.begin(), warnings.end(),
-                          "there is a second 'car1', on 127.0.0.1, and it is not asked") == 1);
-    BOOST_TEST(std::count(warnings.begin(), warnings.end(), "another node calls itself 'car1' too, on 127.0.0.1") == 1);
+                          "a second node has the name 'car1', on 127.0.0.1, and gets no requests") == 1);
+    BOOST_TEST(std::count(warnings.begin(), warnings.end(), "another node also has the name 'car1', on 127.0.0.1") ==
+               1);
     BOOST_TEST(pulled(asker, "self:cles/peers").text.find(R"("state":"clash")") != std::string::npos);
 }
 
@@ -387,7 +389,7 @@ BOOST_FIXTURE_TEST_CASE(what_is_malformed_is_counted_and_otherwise_without_effec
     BOOST_TEST(pulled(asker, "self:cles/metrics").text.find(R"("announcements_dropped":2)") != std::string::npos);
     const auto nowhere = pulled(asker, "car3:who");
     BOOST_TEST((nowhere.code == errc::no_target));
-    BOOST_TEST(nowhere.why == "asker cannot find 'car3': it is there, but at no address that can be used from here");
+    BOOST_TEST(nowhere.why == "asker cannot find 'car3': it has announced no address that is reachable from here");
 }
 
 BOOST_FIXTURE_TEST_CASE(past_the_limit_nodes_are_passed_over, fixture) {

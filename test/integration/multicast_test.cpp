@@ -150,7 +150,7 @@ BOOST_FIXTURE_TEST_CASE(a_feed_of_all_hears_every_publisher, network) {
     auto heard = updates(feed);
     std::sort(heard.begin(), heard.end());
     BOOST_TEST((heard == std::vector<std::string>{"car1 1", "car1 2", "car2 1"}));
-    BOOST_TEST(logged("car1 takes part in 239.255.25.37:" + std::to_string(where.port) + " on lo"));
+    BOOST_TEST(logged("car1 has joined 239.255.25.37:" + std::to_string(where.port) + " on lo"));
 }
 
 BOOST_FIXTURE_TEST_CASE(one_datagram_serves_eight_binders, network) {

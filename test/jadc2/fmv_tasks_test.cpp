@@ -76,7 +76,7 @@ BOOST_AUTO_TEST_CASE(a_frame_that_comes_twice_changes_nothing) {
 BOOST_AUTO_TEST_CASE(streams_are_apart_and_no_more_than_so_many) {
     BOOST_TEST(cles::from_json<fmv::found>(send(frame(0))).frame == 0U);
     BOOST_TEST(cles::from_json<fmv::found>(send(frame(7, "b"))).frame == 7U);
-    BOOST_TEST(send(frame(0, "c")) == "busy: node: no more streams are taken");
+    BOOST_TEST(send(frame(0, "c")) == "busy: node: the limit of streams is reached");
     BOOST_TEST(ask("PULL self:FMV_Processing") == R"({"streams":2,"frames":2,"repeated":0,"refused":1,"bad":0})");
 }
 
@@ -98,7 +98,7 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(send(what) == "bad_request: node: stream: 1 to 64 characters");
     what.stream = std::string(65, 'a');
     BOOST_TEST(send(what) == "bad_request: node: stream: 1 to 64 characters");
-    BOOST_TEST(ask("DELEGATE self:FMV_Processing {}").starts_with("bad_request: node: the body does not fit: stream"));
+    BOOST_TEST(ask("DELEGATE self:FMV_Processing {}").starts_with("bad_request: node: the body is invalid: stream"));
     send(frame(0));
     what = frame(1);
     std::swap(what.width, what.height);

@@ -111,7 +111,7 @@ class Missing(unittest.TestCase):
         satellite = self.fleet.satellite(plugins=[f"{{path: {self.fleet.plugin('fmv')}, config: {{streams: 2}}}}"])
         code, out, err = run("load", "--streams", "4", "--duration", "30", "--at", satellite.url)
         self.assertEqual((code, out), (6, ""), err)
-        self.assertIn("no more streams are taken", err)
+        self.assertIn("the limit of streams is reached", err)
 
     def test_measuring_where_nobody_is(self):
         at = f"tcp://127.0.0.1:{free_port()}"

@@ -64,7 +64,7 @@ WRONG = {
     "not_callable_object": (handler("position{}", "pull"), "the handler is not callable"),
     "member_function": (
         "struct car_type { void steer(position); };" + handler("&car_type::steer"),
-        "a member function is no handler without its object",
+        "a member function cannot be a handler without its object",
     ),
     "three_arguments": (handler("[](const cles::request&, position, int) {}"), SHAPE),
     "request_second": (handler("[](position, const cles::request&) {}"), SHAPE),
@@ -94,7 +94,7 @@ WRONG = {
     ),
     "bind_coroutine": (
         handler("[](cles::request) -> asio::awaitable<void> { co_return; }", "bind"),
-        "a BIND is decided at once",
+        "a BIND handler must be a plain function",
     ),
     # Calls.
     "undescribed_body": (

@@ -65,7 +65,7 @@ BOOST_AUTO_TEST_CASE(the_one_ahead_may_not_know_who_leads) {
     all.v1.lead.clear();
     all.drive(2);
     BOOST_TEST((all.v2.mode() == role::degraded));
-    BOOST_TEST(said == "v1 ahead does not say who leads");
+    BOOST_TEST(said == "v1 ahead does not report the leader");
 }
 
 BOOST_AUTO_TEST_CASE(in_its_place_it_does_nothing) {
@@ -180,7 +180,7 @@ BOOST_AUTO_TEST_CASE(where_nobody_is_ahead_after_all_it_brakes) {
         v1.step(now);
     }
     BOOST_TEST((v1.mode() == role::fallback));
-    BOOST_TEST(why == "v0 ahead was never heard");
+    BOOST_TEST(why == "v0 ahead was never received");
     BOOST_TEST(v1.position().v == 0);
 }
 

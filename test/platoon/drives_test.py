@@ -71,7 +71,7 @@ class TwoHosts(unittest.TestCase):
         out, err = joins.communicate(timeout=PATIENCE)
         self.assertEqual(joins.returncode, 0, err)
         self.assertGreater(json.loads(out)["received"], 10, err)
-        self.assertIn("v1  left: in good order", "".join(watcher.stdout.readline() for _ in range(4)))
+        self.assertIn("v1  left: ended normally", "".join(watcher.stdout.readline() for _ in range(4)))
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ class Usage(unittest.TestCase):
     def test_the_one_ahead_is_not_there(self):
         code, out, err = run("vehicle", "--name", "v1", "--ahead", "v0", "--multicast", free_group(), "--seconds", 2)
         self.assertEqual((code, out), (0, ""))
-        self.assertRegex(err, r"^ +1\.\d+ s  v1  fallback: v0 ahead was never heard\n$")
+        self.assertRegex(err, r"^ +1\.\d+ s  v1  fallback: v0 ahead was never received\n$")
 
     def test_the_port_is_taken(self):
         with socket.socket(type=socket.SOCK_DGRAM) as other:

@@ -196,7 +196,7 @@ BOOST_AUTO_TEST_CASE(a_cpp_plugin_says_what_its_function_threw) {
         return f.refusal_of_sound(how);
     };
     BOOST_TEST(said("error") == "sound.so: no device there");
-    BOOST_TEST(said("anything") == "sound.so: it threw something that is no exception");
+    BOOST_TEST(said("anything") == "sound.so: it threw something that is not an exception");
     BOOST_TEST(said("twice") == "sound.so: PULL 'number' is added twice");
     BOOST_TEST(said("name").find("'not a name' is not a task's name") != std::string::npos);
     BOOST_TEST(said("coroutine").find("PULL 'later' is a coroutine, for which a plugin has no executor") !=
@@ -215,7 +215,7 @@ BOOST_AUTO_TEST_CASE(settings_that_do_not_fit_are_told) {
         fixture f;
         return f.load("sound.so", config);
     };
-    BOOST_TEST(said(R"({"number":"many"})").find("its configuration does not fit: number: expected") !=
+    BOOST_TEST(said(R"({"number":"many"})").find("its configuration is invalid: number: expected") !=
                std::string::npos);
     BOOST_TEST(said(R"({"numer":7})") == "sound.so: it has no setting 'numer'");
     BOOST_TEST(said(R"({"number":7})") == "");

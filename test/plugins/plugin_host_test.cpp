@@ -101,7 +101,7 @@ BOOST_AUTO_TEST_CASE(handlers_of_all_shapes_answer_as_in_an_application) {
     BOOST_TEST(ask("PULL self:parameters/a%20b") == R"({"value":3})");
     BOOST_TEST(ask("PULL self:parameters") == "bad_request: node: parameter 1 is missing");
     BOOST_TEST(ask(R"(PUSH self:sum {"a":1.5,"b":2})") == R"({"value":3.5})");
-    BOOST_TEST(ask(R"(PUSH self:sum {"a":1.5})").starts_with("bad_request: node: the body does not fit: b"));
+    BOOST_TEST(ask(R"(PUSH self:sum {"a":1.5})").starts_with("bad_request: node: the body is invalid: b"));
     BOOST_TEST(ask("PUSH self:fails") == "denied: node: not you");
     BOOST_TEST(ask(R"(UPDATE self:target {"x":1})") == "{}");
     BOOST_TEST(host->figures().jobs == 0U);

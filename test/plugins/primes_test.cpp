@@ -27,15 +27,15 @@ BOOST_FIXTURE_TEST_SUITE(primes, fixture)
 BOOST_AUTO_TEST_CASE(they_are_told_and_counted) {
     BOOST_TEST(ask("PULL self:prime/97") == R"({"value":true})");
     BOOST_TEST(ask("PULL self:prime/98") == R"({"value":false})");
-    BOOST_TEST(ask("PULL self:prime/x") == "bad_request: node: parameter 1 is not a number that fits");
+    BOOST_TEST(ask("PULL self:prime/x") == "bad_request: node: parameter 1 is not a valid number");
     BOOST_TEST(ask(R"(DELEGATE self:primes {"below":1000000})") == R"({"count":78498,"largest":999983})");
     BOOST_TEST(ask(R"(DELEGATE self:primes {"from":90,"below":100})") == R"({"count":1,"largest":97})");
 }
 
 BOOST_AUTO_TEST_CASE(the_limit_is_kept) {
     BOOST_TEST(ask(R"(DELEGATE self:primes {"below":1000001})") ==
-               "bad_request: node: 1000001 is past the limit of 1000000");
-    BOOST_TEST(ask("PULL self:prime/1000001") == "bad_request: node: 1000001 is past the limit of 1000000");
+               "bad_request: node: 1000001 exceeds the limit of 1000000");
+    BOOST_TEST(ask("PULL self:prime/1000001") == "bad_request: node: 1000001 exceeds the limit of 1000000");
     BOOST_CHECK_THROW(::primes::register_tasks(node, {.limit = 2'000'000'000'000, .parts_by = {}}), cles::error);
 }
 
@@ -43,7 +43,7 @@ BOOST_AUTO_TEST_CASE(others_count_parts) {
     BOOST_TEST(ask(R"(DELEGATE self:primes_in_parts {"below":1000000,"parts":5})") ==
                R"({"count":78498,"largest":999983})");
     BOOST_TEST(ask(R"(DELEGATE self:primes_in_parts {"below":2000000})") ==
-               "bad_request: node: 2000000 is past the limit of 1000000");
+               "bad_request: node: 2000000 exceeds the limit of 1000000");
 }
 
 BOOST_AUTO_TEST_CASE(a_part_that_fails_fails_the_whole) {

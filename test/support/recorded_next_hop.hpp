@@ -59,7 +59,7 @@ class recorded_next_hop final : public core::next_hop {
         for (const auto& s : all_) {
             if (s->ticket == ticket && s->open()) {
                 s->cancelled = true;
-                s->fails(errc::cancelled, "the request was withdrawn");
+                s->fails(errc::cancelled, "the request was cancelled");
             }
         }
     }

@@ -90,7 +90,7 @@ std::string tasks_text(const std::string& tasks) {
 }
 
 std::string ls_table(const std::vector<listed_node>& nodes, bool tasks) {
-    table out{"NODE", "STATE", "LOAD", "HEARD", "ENDPOINTS"};
+    table out{"NODE", "STATE", "LOAD", "LAST SEEN", "ENDPOINTS"};
     const std::size_t tasks_column = tasks ? out.column("TASKS") : 0;
     for (const auto& node : nodes) {
         out.row();

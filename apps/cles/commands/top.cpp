@@ -111,7 +111,7 @@ class live_view {
     void show() {
         if (screen_) {
             const auto title = bold(stream::out, "cles top") + "  " + summary_of(rows_) + "  (every " +
-                               to_text(args_.interval) + "; q ends)";
+                               to_text(args_.interval) + "; q quits)";
             screen_->show(title + "\n" + printable(error_) + "\n" + to_table(rows_));
             return;
         }

@@ -120,7 +120,7 @@ std::string summary_of(const std::vector<top_row>& rows) {
 }
 
 std::string to_table(const std::vector<top_row>& rows) {
-    table out{"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50", "P99", "HEARD"};
+    table out{"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50", "P99", "LAST SEEN"};
     const auto number = [&](std::size_t column, std::string text) { out.set(column, std::move(text), true); };
     for (const auto& row : rows) {
         const auto& node = row.node;

@@ -121,7 +121,7 @@ bool check_group(const cles::multicast_options& group, const std::string& interf
             found.ok("multicast", "datagrams to " + address + " on " + interface + " are received");
             return true;
         }
-        found.failure("multicast", "datagrams from this host to " + address + " on " + interface + " do not come back",
+        found.failure("multicast", "datagrams from this host to " + address + " on " + interface + " are not received",
                       "a firewall drops them: allow udp from any port to " + address);
     } catch (const boost::system::system_error& e) {
         found.failure("multicast", "this host cannot " + step + ": " + e.code().message(),

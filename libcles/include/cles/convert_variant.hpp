@@ -35,7 +35,7 @@ struct converter<std::variant<T...>> {
             return false;
         }
         std::string why;
-        return try_each(raw, value, why, std::index_sequence_for<T...>{}) || r.fail("fits no alternative: " + why);
+        return try_each(raw, value, why, std::index_sequence_for<T...>{}) || r.fail("matches no alternative: " + why);
     }
 
   private:

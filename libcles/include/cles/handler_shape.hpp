@@ -164,7 +164,7 @@ constexpr bool fits_handler() {
         static_assert(!overloaded,
                       "the handler's arguments are not known, since its call operator is a template (an 'auto' "
                       "parameter) or overloaded: write the types, as [](const cles::request&, position)");
-        static_assert(!member, "a member function is no handler without its object: use a lambda, as "
+        static_assert(!member, "a member function cannot be a handler without its object: use a lambda, as "
                                "[this](position to) { return steer(to); }");
         static_assert(overloaded || member,
                       "the handler is not callable: it is a function, a lambda or an object with a "

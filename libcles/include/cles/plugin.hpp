@@ -108,7 +108,7 @@ class plugin_entry {
         } catch (const std::exception& e) {
             host.refuse(&host, abi_text(e.what()));
         } catch (...) {
-            host.refuse(&host, abi_text("it threw something that is no exception"));
+            host.refuse(&host, abi_text("it threw something that is not an exception"));
         }
         return false;
     }

@@ -48,7 +48,7 @@ C plugin_config(std::string_view json) {
     C config{};
     std::string why;
     if (!from_json(json, config, &why)) {
-        throw setting_error(setting_named_in(why), "its configuration does not fit: " + why);
+        throw setting_error(setting_named_in(why), "its configuration is invalid: " + why);
     }
     if constexpr (described_struct<C>) {
         if (const auto unknown = unknown_setting<C>(json); !unknown.empty()) {

@@ -146,7 +146,7 @@ class plugin_registrar final : public registrar {
         case CLES_ADDED: return;
         case CLES_TASK_EXISTS: throw error(errc::already_registered, what);
         case CLES_BAD_TASK: throw error(errc::invalid_name, what + " is refused by the host");
-        default: throw error(errc::failed, what + " comes too late: tasks are added while the plugin starts");
+        default: throw error(errc::failed, what + " is too late: tasks can only be added while the plugin starts");
         }
     }
 

@@ -146,7 +146,7 @@ class registrar {
         if constexpr (detail::one_signature<F>) {
             using shape = detail::handler_shape<F>;
             static_assert(!shape::takes_responder && !shape::is_coroutine,
-                          "a BIND is decided at once: its handler is a plain function");
+                          "a BIND handler must be a plain function, because it decides at once");
         }
         add_handler(verb::bind, task, std::move(handler), std::move(info));
     }

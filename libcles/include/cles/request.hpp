@@ -105,7 +105,7 @@ class request {
             static_assert(!std::is_same_v<T, bool>, "a parameter is text or a number");
             T number{};
             if (!detail::read_number(text, number)) {
-                throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is not a number that fits");
+                throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is not a valid number");
             }
             return number;
         } else {
@@ -121,7 +121,7 @@ class request {
         carrier value{};
         std::string why;
         if (!from_json(body(), value, &why)) {
-            throw error(errc::bad_request, "the body does not fit: " + why);
+            throw error(errc::bad_request, "the body is invalid: " + why);
         }
         if constexpr (detail::comes_wrapped<T>) {
             return std::move(value.value);

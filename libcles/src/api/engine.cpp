@@ -86,7 +86,7 @@ class service_call final : public call_control, public std::enable_shared_from_t
             refuse(errc::cancelled, "the requesting job has already ended");
         } else if (const auto left = std::chrono::floor<std::chrono::milliseconds>(call_->due() - by->now());
                    left.count() <= 0) {
-            refuse(errc::deadline, "the requesting job has no time left");
+            refuse(errc::deadline, "the deadline of the requesting job has passed");
         } else {
             send(*by, command, options, std::move(answered), left);
         }
@@ -251,7 +251,8 @@ class posted_updates final : public update_sink, public std::enable_shared_from_
         if (lost != 0) {
             if (const auto by = service_.lock()) {
                 by->write_log(log_level::warning,
-                              std::to_string(lost) + " updates were dropped: they come faster than they can be sent");
+                              std::to_string(lost) +
+                                  " updates were dropped: they are published faster than they can be sent");
             }
         }
         for (const auto& update : fetched) {

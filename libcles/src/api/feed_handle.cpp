@@ -70,7 +70,7 @@ class feed_handle : public feed_control, public std::enable_shared_from_this<fee
         if (from.closed() || from.has_waiter()) {
             const auto code = make_error_code(from.closed() ? errc::stopped : errc::busy);
             asio::post(executor(), [operation = std::move(operation), code]() mutable {
-                operation.release()->fail(code, code == errc::busy ? "another async_next of this feed waits"
+                operation.release()->fail(code, code == errc::busy ? "another async_next of this feed is pending"
                                                                    : "the feed is closed");
             });
         } else if (from.next(std::move(operation))) {
@@ -167,7 +167,7 @@ struct refusal {
 refusal objection_to(engine& host, const protocol::noun_view& noun, const bind_options& options) {
     const std::string target{noun.target};
     if (!options.at_.empty()) {
-        return {errc::bad_request, "a binding by multicast takes no address: '" + options.at_ + "'"};
+        return {errc::bad_request, "a binding by multicast must not have an address: '" + options.at_ + "'"};
     }
     if (noun.task == "cles") {
         return {errc::bad_request, "the task 'cles' cannot be bound by multicast"};

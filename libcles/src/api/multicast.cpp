@@ -19,7 +19,7 @@ std::uint16_t port_of(std::string_view digits, std::string_view whole) {
     const auto [rest, code] = std::from_chars(digits.data(), end, port);
     if (code != std::errc{} || rest != end || port == 0) {
         throw error(errc::invalid_url,
-                    "'" + std::string{digits} + "' in '" + std::string{whole} + "' is no port from 1 to 65535");
+                    "'" + std::string{digits} + "' in '" + std::string{whole} + "' is not a port from 1 to 65535");
     }
     return port;
 }
@@ -56,7 +56,7 @@ void check_interfaces(const std::string& list) {
     }
     if (names.size() > multicast_options::most_interfaces) {
         refuse("names " + std::to_string(names.size()) + " interfaces: at most " +
-               std::to_string(multicast_options::most_interfaces) + " take part");
+               std::to_string(multicast_options::most_interfaces) + " are allowed");
     }
 }
 

@@ -266,7 +266,7 @@ std::string service::request(std::string_view command, const call_options& optio
     io->restart();
     while (!result->ended) {
         if (io->run_one() == 0) {
-            throw error(errc::stopped, "the context was stopped before the answer came");
+            throw error(errc::stopped, "the context was stopped before the answer was received");
         }
     }
     if (result->code) {

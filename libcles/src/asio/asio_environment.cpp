@@ -49,7 +49,7 @@ class posted_task {
 int make_timer() {
     const int made = ::timerfd_create(CLOCK_BOOTTIME, TFD_NONBLOCK | TFD_CLOEXEC);
     if (made < 0) {
-        throw error(boost::system::error_code{errno, boost::system::system_category()}, "cannot make a timer");
+        throw error(boost::system::error_code{errno, boost::system::system_category()}, "cannot create a timer");
     }
     return made;
 }

@@ -86,7 +86,7 @@ json_reader::kind json_reader::peek() noexcept {
 
 bool json_reader::require(kind wanted) { return ok() && (peek() == wanted || expected(name_of(wanted))); }
 
-bool json_reader::fail_too_deep() { return fail("deeper than " + std::to_string(max_depth_) + " brackets"); }
+bool json_reader::fail_too_deep() { return fail("nested deeper than " + std::to_string(max_depth_) + " levels"); }
 
 bool json_reader::enter() {
     if (depth_ == max_depth_) {
@@ -230,7 +230,7 @@ bool json_reader::scan_string(std::string_view& out, std::string& decoded) {
     }
     if (escaped) {
         if (!json_detail::unescape(out, decoded)) {
-            return fail("half of a surrogate pair");
+            return fail("an unpaired surrogate");
         }
         out = decoded;
     }

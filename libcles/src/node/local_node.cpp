@@ -47,14 +47,14 @@ std::string foreign_adverb(std::string_view command) {
     parts.next(); // noun
     for (auto part = parts.next(); !part.empty(); part = parts.next()) {
         if (!part.starts_with("deadline=") && part != "urgent=yes") {
-            return "of the adverbs only 'deadline' and 'urgent' can be given here, not " + protocol::quoted(part);
+            return "only the adverbs 'deadline' and 'urgent' are allowed here, not " + protocol::quoted(part);
         }
     }
     return {};
 }
 
 std::string negative(const char* option, std::chrono::milliseconds value) {
-    return std::string{option} + " is " + std::to_string(value.count()) + " ms: a time from 0";
+    return std::string{option} + " is " + std::to_string(value.count()) + " ms: must be 0 or more";
 }
 
 /// Checks the settings, and adds what a node draws for each incarnation, and who calls its completions.
@@ -90,7 +90,7 @@ std::string invalid_option_reason(const bind_options& options) {
         return negative("bind_options::every", options.every_);
     }
     if (options.keep_ > protocol::max_keep) {
-        return "bind_options::keep is " + std::to_string(options.keep_) + ": 1 to " +
+        return "bind_options::keep is " + std::to_string(options.keep_) + ": must be 1 to " +
                std::to_string(protocol::max_keep) + ", or 0 for the default";
     }
     return {};

@@ -164,7 +164,7 @@ bool parse_noun(std::string_view text, noun_view& out, std::string& why) {
             const auto which = "parameter " + std::to_string(out.parameters.size() + 1);
             why = parameter.empty()
                       ? which + " is empty"
-                      : which + " " + quoted(parameter) + " holds a character or an escape that is not allowed";
+                      : which + " " + quoted(parameter) + " contains a character or an escape that is not allowed";
             return false;
         }
         out.parameters.push_back(parameter);

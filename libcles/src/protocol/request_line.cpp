@@ -131,7 +131,7 @@ bool parse_adverbs(part_reader& parts, request_line& out, std::string& why) {
         }
         const auto bit = 1U << known;
         if ((seen & bit) != 0) {
-            why = "the adverb " + quoted(a.key) + " stands twice";
+            why = "the adverb " + quoted(a.key) + " occurs twice";
             return false;
         }
         seen |= bit;

@@ -44,8 +44,8 @@ const char* const usage = R"(  --mode exchange|task|fanout  what is measured (ex
   --subscribers N              of a fan-out (1)
   --interval-us N              between its publications (1000)
   --spread                     let both ends run on all cores, instead of one core each
-  --about                      only says what this peer is
-Prints one object of JSON. Ends with 77 where the peer does not offer what is asked.
+  --about                      only describes this peer
+Prints a JSON object. The exit code is 77 if the peer does not offer the measurement.
 )";
 
 options read_options(std::span<char*> arguments) {

@@ -13,7 +13,7 @@ void delegated_requests::send(const job_ptr& job, const responder* by, const std
     const auto ticket = ++last_ticket_;
     open_.emplace(ticket, open_request{job, callback});
     if (by == nullptr) {
-        complete(ticket, errc::cancelled, "{}", "the requester of the job does not wait any more");
+        complete(ticket, errc::cancelled, "{}", "the requester of the job no longer waits");
         return;
     }
     auto forwarded = options;

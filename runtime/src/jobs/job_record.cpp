@@ -271,7 +271,7 @@ bool job_record::start(time_point executor_due) noexcept {
     }
     run_guarded([&] {
         if (stopped()) { // while a worker took it from the queue
-            fail(errc::cancelled, "the requester does not wait for it any more");
+            fail(errc::cancelled, "the requester no longer waits for it");
         } else if (over) {
             fail(errc::deadline, "its deadline had passed before it began");
         } else if (task_->plain) {

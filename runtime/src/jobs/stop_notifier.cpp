@@ -123,7 +123,7 @@ struct stop_notifier::state : std::enable_shared_from_this<state> {
         log(*slow, log_level::warning, "its on_stop callback does not return; another thread notifies the other jobs");
         if (last) {
             log(*slow, log_level::error,
-                std::to_string(blocked_threads) + " on_stop callbacks do not return: one more delays all that follow");
+                std::to_string(blocked_threads) + " on_stop callbacks do not return: one more would delay all others");
         }
         lock.lock();
     }

@@ -361,7 +361,7 @@ void loaded_plugin::delegate(plugin_jobs::id job, std::string_view command, cons
                     });
     });
     if (!sent) {
-        request->complete(errc::cancelled, "{}", "the requester of the job does not wait any more");
+        request->complete(errc::cancelled, "{}", "the requester of the job no longer waits");
     } else if (request.use_count() == 1) { // nothing can answer it any more
         request->complete(errc::unavailable, "{}", "the node has stopped");
     }

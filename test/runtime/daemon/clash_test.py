@@ -66,7 +66,7 @@ class Clash(unittest.TestCase):
 
     def test_it_continues_if_allowed(self):
         second = self.daemon("allow_clash: true\n")
-        second.wait_for_entry("is taken: the node at " + self.first.url)
+        second.wait_for_entry("is already in use: the node at " + self.first.url)
         wait_until(lambda: '"clash"' in self.first.ask("PULL self:cles/peers"), "the first knows of it")
         self.assertIsNone(second.process.poll())
         for each in (self.first, second):

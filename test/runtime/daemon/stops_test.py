@@ -117,7 +117,7 @@ class Stops(unittest.TestCase):
     def test_exhausted_threads_are_reported(self):
         with self.daemon.connect() as link:
             self.withdraw(link, self.begin(link, "blocks_when_stopped", [f"b{n}" for n in range(20)]))
-            self.assertEqual(self.daemon.wait_for_entry("one more delays all that follow")["level"], "error")
+            self.assertEqual(self.daemon.wait_for_entry("one more would delay all others")["level"], "error")
             # It continues to serve.
             self.assertEqual(link.ask("PULL sat1:quick"), '{"value":42}')
         self.assertEqual(self.daemon.stop()[0], 0)

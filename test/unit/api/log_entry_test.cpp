@@ -55,7 +55,7 @@ BOOST_AUTO_TEST_CASE(an_entry_about_a_request_has_peer_and_id) {
         {}, [](const cles::access&) -> bool { throw std::runtime_error{"the data base is gone"}; }, last.sink()};
     cles::test::test_link link{node};
     link.ask("PULL car1:cles id=7");
-    BOOST_TEST(last.text == "denied, since the access rules threw: the data base is gone");
+    BOOST_TEST(last.text == "denied, because the access rules threw an exception: the data base is gone");
     BOOST_TEST((last.level == cles::log_level::error));
     BOOST_TEST(last.peer == "tcp://127.0.0.1:1");
     BOOST_TEST(last.request == 7U);

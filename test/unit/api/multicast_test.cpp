@@ -48,7 +48,7 @@ BOOST_AUTO_TEST_CASE(group_and_port_may_be_named) {
 BOOST_AUTO_TEST_CASE(the_error_names_what_is_wrong) {
     BOOST_TEST(refusal("lo,10.0.0.1").find("'10.0.0.1' is not an IPv4 multicast group") == 0U);
     BOOST_TEST(refusal("lo,ff02::1").find("'ff02' is not") == 0U);
-    BOOST_TEST(refusal("lo,239.1.2.3:0").find("'0' in 'lo,239.1.2.3:0' is no port") == 0U);
+    BOOST_TEST(refusal("lo,239.1.2.3:0").find("'0' in 'lo,239.1.2.3:0' is not a port") == 0U);
     BOOST_TEST(refusal("lo,239.1.2.3:70000").find("'70000'") == 0U);
     BOOST_TEST(refusal("lo,239.1.2.3:").find("''") == 0U);
     BOOST_TEST(refusal("").find("'' does not begin with an interface") == 0U);
@@ -81,7 +81,7 @@ BOOST_AUTO_TEST_CASE(invalid_lists_of_interfaces_are_refused) {
     BOOST_TEST(refusal("lo,eth0,lo") == "'lo,eth0,lo' names 'lo' twice");
     BOOST_TEST(refusal("lo,auto") == "'lo,auto' combines 'auto' with other names");
     BOOST_TEST(refusal("off,lo").find("combines 'off' with other names") != std::string::npos);
-    BOOST_TEST(refusal("a,b,c,d,e,f,g,h,i") == "'a,b,c,d,e,f,g,h,i' names 9 interfaces: at most 8 take part");
+    BOOST_TEST(refusal("a,b,c,d,e,f,g,h,i") == "'a,b,c,d,e,f,g,h,i' names 9 interfaces: at most 8 are allowed");
     BOOST_CHECK_THROW(cles::check({.interface = "lo,lo"}), cles::error);
 }
 

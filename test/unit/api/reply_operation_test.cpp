@@ -83,12 +83,12 @@ BOOST_AUTO_TEST_CASE(a_result_that_is_not_json_is_malformed) {
 
 BOOST_AUTO_TEST_CASE(a_result_of_another_shape_is_a_failed_conversion_that_names_the_path) {
     BOOST_TEST(read<wrapped<int>>("{\"value\":\"x\"}") ==
-               "conversion: the answer does not fit: value: expected a number, got a string");
-    BOOST_TEST(read<wrapped<int>>("{}") == "conversion: the answer does not fit: value: is missing");
-    BOOST_TEST(read<wrapped<int>>("[5]") == "conversion: the answer does not fit: expected an object, got an array");
+               "conversion: the answer is invalid: value: expected a number, got a string");
+    BOOST_TEST(read<wrapped<int>>("{}") == "conversion: the answer is invalid: value: is missing");
+    BOOST_TEST(read<wrapped<int>>("[5]") == "conversion: the answer is invalid: expected an object, got an array");
     BOOST_TEST(read<reply_types::pose>("{\"x\":null}") == "read"); // the written form of a number that is not finite
     BOOST_TEST(read<reply_types::pose>("{\"x\":[]}") ==
-               "conversion: the answer does not fit: x: expected a number, got an array");
+               "conversion: the answer is invalid: x: expected a number, got an array");
 }
 
 BOOST_AUTO_TEST_CASE(json_text_is_returned_unchanged) {

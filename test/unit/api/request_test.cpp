@@ -74,7 +74,7 @@ BOOST_AUTO_TEST_CASE(a_parameter_is_read_as_text_or_as_a_number) {
 BOOST_AUTO_TEST_CASE(a_missing_or_invalid_parameter_is_bad_request_with_its_position) {
     const auto& r = request;
     const auto missing = [](const cles::error& e) { return says(e, "parameter 7 is missing"); };
-    const auto no_number = [](const cles::error& e) { return says(e, "is not a number that fits"); };
+    const auto no_number = [](const cles::error& e) { return says(e, "is not a valid number"); };
     BOOST_CHECK_EXCEPTION(static_cast<void>(r.parameter(6)), cles::error, missing);
     BOOST_CHECK_EXCEPTION(static_cast<void>(r.parameter<int>(6)), cles::error, missing);
     BOOST_CHECK_EXCEPTION(static_cast<void>(r.parameter<int>(2)), cles::error, no_number);

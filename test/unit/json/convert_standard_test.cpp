@@ -267,9 +267,9 @@ BOOST_AUTO_TEST_CASE(a_variant_is_the_value_that_it_holds) {
     BOOST_TEST(std::get<pose>(from_json<either>("{\"x\":1,\"y\":2}")).y == 2.0);
     BOOST_TEST(std::get<std::vector<int>>(from_json<either>("[1,2]")).size() == 2U);
     BOOST_TEST((why<std::variant<double, pose>>("{\"x\":1}") ==
-                "fits no alternative: expected a number, got an object; y: is missing"));
+                "matches no alternative: expected a number, got an object; y: is missing"));
     BOOST_TEST((why<std::map<std::string, std::variant<bool>>>("{\"a\":1}") ==
-                "a: fits no alternative: expected true or false, got a number"));
+                "a: matches no alternative: expected true or false, got a number"));
     // The first alternative that fits.
     BOOST_TEST((from_json<std::variant<int, double>>("2").index() == 0U));
     BOOST_TEST((from_json<std::variant<int, double>>("2.5").index() == 1U));

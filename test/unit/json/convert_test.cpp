@@ -289,7 +289,7 @@ BOOST_AUTO_TEST_CASE(the_whole_text_must_be_read) {
 
 BOOST_AUTO_TEST_CASE(depth_is_limited_while_reading) {
     const auto deep = std::string(33, '[') + std::string(33, ']');
-    BOOST_TEST(why<cles::json_text>(deep) == "deeper than 32 brackets");
+    BOOST_TEST(why<cles::json_text>(deep) == "nested deeper than 32 levels");
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -78,7 +78,7 @@ BOOST_AUTO_TEST_CASE(an_error_names_the_path) {
     BOOST_TEST(why("{\"a\":[1,{\"b\":x}]}") == "a[1].b: expected a value, got something that is not JSON");
     BOOST_TEST(why("[1e400]") == "[0]: a number out of the range of a double");
     BOOST_TEST(why("") == "expected a value, but the text ends");
-    BOOST_TEST(why(std::string(33, '[') + std::string(33, ']')).ends_with("deeper than 32 brackets"));
+    BOOST_TEST(why(std::string(33, '[') + std::string(33, ']')).ends_with("nested deeper than 32 levels"));
 }
 
 BOOST_AUTO_TEST_CASE(an_object_or_an_array_can_be_requested) {

@@ -252,7 +252,7 @@ BOOST_AUTO_TEST_CASE(a_known_adverb_twice_is_refused) {
           "PULL a:b hops=1 hops=2", "DELEGATE a:b progress=yes progress=yes", "BIND a:b lease=1 lease=1",
           "BIND a:b every=1 every=1", "BIND a:b keep=1 keep=1", "UPDATE a:b seq=1 seq=1 epoch=00000000",
           "UPDATE a:b seq=1 epoch=00000000 epoch=00000000", "PULL a:b via=a via=b", "PULL a:b since=0 since=0"}) {
-        BOOST_TEST(names(why(bad), "stands twice"), bad << " gives: " << why(bad));
+        BOOST_TEST(names(why(bad), "occurs twice"), bad << " gives: " << why(bad));
     }
 }
 

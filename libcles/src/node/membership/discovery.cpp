@@ -91,7 +91,7 @@ void discovery::join(multicast_group& through) {
 void discovery::gossip(const gossip_options& how) {
     if (!gossip_ && how.part == nullptr) {
         if (!how.seeds.empty()) {
-            throw error(errc::invalid_option, "gossip_options has seeds but no part: make it by cles::gossip({seeds})");
+            throw error(errc::invalid_option, "gossip_options with seeds must be created by cles::gossip({seeds})");
         }
         return;
     }
@@ -298,12 +298,12 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
 void discovery::on_peer(std::string_view node, membership::change what, std::string_view where) {
     const std::string name{node};
     const auto place =
-        where.empty() ? std::string{", at no address that can be used from here"} : ", at " + std::string{where};
+        where.empty() ? std::string{" at no address that is reachable from here"} : " at " + std::string{where};
     switch (what) {
-    case membership::change::appeared: host_.post_log(log_level::info, name + " is there" + place); break;
-    case membership::change::moved: host_.post_log(log_level::info, name + " is elsewhere now" + place); break;
-    case membership::change::silent: host_.post_log(log_level::debug, name + " is not heard any more"); break;
-    case membership::change::returned: host_.post_log(log_level::debug, name + " is heard again"); break;
+    case membership::change::appeared: host_.post_log(log_level::info, "discovered " + name + place); break;
+    case membership::change::moved: host_.post_log(log_level::info, name + " is now" + place); break;
+    case membership::change::silent: host_.post_log(log_level::debug, name + " is no longer received"); break;
+    case membership::change::returned: host_.post_log(log_level::debug, name + " is received again"); break;
     case membership::change::left: host_.post_log(log_level::info, name + " has left"); break;
     case membership::change::gone:
         host_.post_log(log_level::info, name + " is gone");
@@ -314,15 +314,16 @@ void discovery::on_peer(std::string_view node, membership::change what, std::str
     case membership::change::clash:
         host_.post_log(log_level::warning,
                        name == host_.node().name
-                           ? "another node calls itself '" + name + "' too, on " + std::string{where}
-                           : "there is a second '" + name + "', on " + std::string{where} + ", and it is not asked");
+                           ? "another node also has the name '" + name + "', on " + std::string{where}
+                           : "a second node has the name '" + name + "', on " + std::string{where} +
+                                 ", and gets no requests");
         if (name != host_.node().name) {
             host_.peer_channels().on_address_changed(name);
         }
         return;
     case membership::change::taken:
-        host_.post_log(log_level::error, "the name '" + name + "' is taken: the node at " + std::string{where} +
-                                             " was there first, and is asked by it");
+        host_.post_log(log_level::error, "the name '" + name + "' is already in use: the node at " +
+                                             std::string{where} + " had it first, and gets its requests");
         host_.on_name_taken(std::string{where});
         return;
     }
@@ -375,10 +376,10 @@ bool discovery::expects_more_of(std::string_view node) const noexcept {
 
 std::string discovery::unknown_reason() const {
     if (group_ == nullptr) {
-        return gossip_ ? "no node that it asks knows of it; " : "";
+        return gossip_ ? "no node that it asks knows that name; " : "";
     }
     const bool others = host_.node().counts.announcements_foreign != 0;
-    return "nobody of that name has announced itself on " + group_->interfaces() +
+    return "no node with that name has announced itself on " + group_->interfaces() +
            (others ? ", where there are nodes of other pools too; " : "; ");
 }
 

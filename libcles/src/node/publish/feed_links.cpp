@@ -288,7 +288,7 @@ void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
         }
         if (replaced && elsewhere && feed->is_bound()) {
             detach(*feed);
-            feed->on_lost("another run of " + std::string{node} + " has its name", now);
+            feed->on_lost(std::string{node} + " was replaced by another instance", now);
         }
         feed->expedite(now);
     }

@@ -55,14 +55,14 @@ void multicast_group::join(environment& by, const network_interface& interface, 
                            bool insecure) {
     if (!interface.loopback && !insecure) {
         throw error(errc::insecure_listen, "multicast on '" + interface.name +
-                                               "' can be reached from other hosts, and nobody proves who they "
-                                               "are; say 'insecure' if that is meant");
+                                               "' can be reached from other hosts, which are not authenticated; "
+                                               "set 'insecure' to allow it");
     }
     auto port = by.join(interface, where);
     const auto source = port->source();
     sessions_.emplace_back(node_, *this, std::move(port), by.random());
     interfaces_ += (interfaces_.empty() ? "" : ", ") + interface.name;
-    node_->write_log(log_level::info, node_->name + " takes part in " + where.group + ":" + std::to_string(where.port) +
+    node_->write_log(log_level::info, node_->name + " has joined " + where.group + ":" + std::to_string(where.port) +
                                           " on " + interface.name + ", sending from " + to_text(source));
 }
 
@@ -115,8 +115,7 @@ void multicast_group::join_automatic(environment& by, const multicast_options& w
         throw error(failure, cannot(where, where.interface) + "no interface of this host can be used");
     }
     if (!left_out.empty()) {
-        node_->write_log(log_level::warning,
-                         "multicast on 'auto' takes " + interfaces_ + ", and leaves out " + left_out);
+        node_->write_log(log_level::warning, "multicast on 'auto' uses " + interfaces_ + ", and skips " + left_out);
     }
 }
 

@@ -143,7 +143,7 @@ void publications::remove(topic& t) {
 void publications::publish(std::string_view path, const std::function<void(json_writer&)>& write) {
     auto& t = open(path, true);
     if (t.is_begun()) {
-        throw error(errc::failed, "'" + t.path() + "' is published while a value of it is being written");
+        throw error(errc::failed, "'" + t.path() + "' cannot be published while a value of it is being written");
     }
     if (t.is_linked()) {
         t.unlink(); // it must not retire while it is written, whatever else is published meanwhile
@@ -176,8 +176,7 @@ void publications::take_memory(topic& t) {
     while (!t.account_memory()) {
         auto* oldest = oldest_idle(*t.task);
         if (oldest == nullptr) {
-            throw error(errc::busy,
-                        "an update of '" + t.path() + "' does not fit the memory that is left (limits.memory)");
+            throw error(errc::busy, "an update of '" + t.path() + "' needs more memory than is left (limits.memory)");
         }
         retire(*oldest);
     }
@@ -194,7 +193,7 @@ void publications::end(topic& t, std::size_t body_at) {
                                          " bytes, the limit is " + std::to_string(bounds_.line));
     }
     if (protocol::begins_with_error(line.substr(body_at))) {
-        throw error(errc::failed, "an update whose first key is 'error' would be taken for a failure");
+        throw error(errc::failed, "an update whose first key is 'error' would be read as a failure");
     }
     take_memory(t);
     t.commit(body_at);
@@ -229,7 +228,7 @@ bool publications::cancel(std::uint64_t ticket) {
         if (found != waiting.end()) {
             auto operation = std::move(found->operation);
             waiting.erase(found);
-            completions_.fail(std::move(operation), errc::cancelled, "the update was withdrawn");
+            completions_.fail(std::move(operation), errc::cancelled, "the update was cancelled");
             return true;
         }
     }

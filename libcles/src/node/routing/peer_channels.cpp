@@ -45,7 +45,7 @@ void peer_channel::send(const protocol::outgoing_request& r, time_point deadline
         held.resize(bytes);
     } else if (!held.try_resize(bytes)) {
         host_->fail_later(std::move(operation), errc::busy,
-                          "too much waits for a link to " + address_ + " or others (limits.memory)",
+                          "no memory is left to queue a request to " + address_ + " (limits.memory)",
                           std::move(progress));
         return;
     }
@@ -64,14 +64,14 @@ bool peer_channel::cancel(std::uint64_t id) {
     if (found == requests_.end()) {
         return false;
     }
-    fail(found, errc::cancelled, "the request was withdrawn");
+    fail(found, errc::cancelled, "the request was cancelled");
     return true;
 }
 
 void peer_channel::waiting_request::on_deadline(time_point) {
     auto& all = owner->requests_;
     const auto found = std::find_if(all.begin(), all.end(), [this](const auto& w) { return w.get() == this; });
-    owner->fail(found, errc::deadline, "no link to " + owner->address_ + " came about in time"); // destroys this
+    owner->fail(found, errc::deadline, "no link to " + owner->address_ + " was established in time"); // destroys this
 }
 
 void peer_channel::fail(waiting_requests::iterator which, errc code, std::string_view message) {
@@ -257,19 +257,19 @@ std::string peer_channels::address_of(std::string_view target) const {
     if (protocol::is_reserved_target(target)) {
         throw error(errc::no_target, "'" + std::string{target} +
                                          "' needs a node that routes: give this one cles::routing() as "
-                                         "service_options::routing, or say with call_options::at where another is");
+                                         "service_options::routing, or set call_options::at to the URL of another");
     }
     const auto unknown = own_name + " cannot find '" + std::string{target} + "': ";
     const auto& discovery = host_.discovery();
     const auto& peers = host_.node().peers;
     if (const auto heard = peers.address_of(target); heard && !discovery.expects_more_of(target)) {
         if (const auto second = peers.conflicting_endpoint_of(target)) {
-            throw error(errc::no_target, "there are two nodes that call themselves '" + std::string{target} + "', at " +
+            throw error(errc::no_target, "two nodes have the name '" + std::string{target} + "', at " +
                                              std::string{*heard} + " and at " + std::string{*second} +
                                              ": give the URL of one");
         }
         if (heard->empty()) {
-            throw error(errc::no_target, unknown + "it is there, but at no address that can be used from here");
+            throw error(errc::no_target, unknown + "it has announced no address that is reachable from here");
         }
         return std::string{*heard};
     }

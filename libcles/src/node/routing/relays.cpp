@@ -132,7 +132,7 @@ void relays::join(std::string_view node, std::string_view path, std::string_view
         return;
     }
     if (all_.size() >= node_.bounds.nouns || stopped_) {
-        tell(nullptr, {}, {}, {.code = errc::busy, .message = "as many nouns are passed on as may be"});
+        tell(nullptr, {}, {}, {.code = errc::busy, .message = "the limit of forwarded nouns is reached"});
         return;
     }
     if (!node_.kept_values->has_capacity(1)) {

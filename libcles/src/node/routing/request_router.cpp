@@ -55,7 +55,7 @@ bool request_router::route(const protocol::request_line& r, const identity& peer
         begin(std::make_shared<scatter_gather>(shared_from_this(), r, peer, std::move(c), due), now);
     } else if (r.hops == 0) {
         c->fail({.code = errc::no_target,
-                 .message = "it may not be passed on to '" + std::string{target} + "': it bears hops=0"});
+                 .message = "the request cannot be forwarded to '" + std::string{target} + "': hops=0"});
     } else {
         forward(r, std::move(c), due);
     }
@@ -121,8 +121,8 @@ void request_router::bind(const protocol::request_line& r, relayed_bindings& pla
         }
     } else if (r.noun.target == "any" || r.hops == 0) {
         c->fail({.code = errc::no_target,
-                 .message = r.hops == 0 ? "it may not be passed on: it bears hops=0"
-                                        : "a binding is of a node's noun, or of that of all"});
+                 .message = r.hops == 0 ? "the request cannot be forwarded: hops=0"
+                                        : "a binding needs a node's name or 'all'"});
     } else {
         place.bind(r.noun.target, path, forwarded_adverbs(r, node_->name), wanted, r.wants_mark, c);
     }
@@ -188,8 +188,8 @@ void request_router::on_offers() {
 
 protocol::failure request_router::no_provider(const protocol::request_line& r) const {
     return {.code = errc::no_target,
-            .message = "nobody that is known offers " + std::string{to_string(r.verb)} + " '" +
-                       std::string{r.noun.task} + "'"};
+            .message =
+                "no known node offers " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} + "'"};
 }
 
 } // namespace cles::core

@@ -97,7 +97,7 @@ void connection::on_batch() {
     now_.reset();
     host_->check_shutdown();
     if (from_ == origin::refused) {
-        abandon("there are as many links as there may be");
+        abandon("the limit of links is reached");
     }
 }
 
@@ -263,20 +263,20 @@ void connection::on_stall(time_point now) {
         host_->deadlines().arm(stall_, saturating_add(now, host_->bounds().stall));
         return;
     }
-    host_->post_log(log_level::warning, "closed a link whose peer takes nothing: " + link_->peer().address,
+    host_->post_log(log_level::warning, "closed a link whose peer reads nothing: " + link_->peer().address,
                     link_->peer().address);
-    abandon("the peer took nothing for too long");
+    abandon("the peer read nothing for too long");
 }
 
 void connection::on_silence() {
     const auto keep = shared_from_this();
     if (datagrams_) {
-        abandon("nothing came for a while");
+        abandon("nothing was received for too long");
         return;
     }
-    host_->post_log(log_level::debug, "closed a link that brought no line: " + link_->peer().address,
+    host_->post_log(log_level::debug, "closed a link on which no line was received: " + link_->peer().address,
                     link_->peer().address);
-    close_after_flush("no line came in time");
+    close_after_flush("no line was received in time");
 }
 
 // Output that is pending anyway also shows whether the peer exists.
@@ -320,7 +320,7 @@ void connection::evict() {
     if (!monitor_->has_received()) {
         append_link_refusal(link_->output(), host_->node());
     }
-    close_after_flush("others needed the room");
+    close_after_flush("evicted, because the limit of links was reached");
 }
 
 // Ends the connection now; the link sends its output and takes its time to close.

@@ -96,7 +96,7 @@ bool connections::has_capacity(const link& arrived) {
 void connections::drop_idle_sources() {
     for (const auto& c : all()) {
         if (c->is_source() && c->is_idle()) {
-            c->abandon("others needed the room");
+            c->abandon("evicted, because the limit of sources was reached");
         }
     }
 }
@@ -267,8 +267,8 @@ std::string listeners::listen(std::string_view where, bool insecure) {
     }
     if (!insecure && environment.is_exposed(address)) {
         throw error(errc::insecure_listen, "'" + std::string{where} +
-                                               "' can be reached from other hosts, and nobody proves who they are; "
-                                               "say 'insecure' if that is meant");
+                                               "' can be reached from other hosts, which are not authenticated; "
+                                               "set 'insecure' to allow it");
     }
     std::unique_ptr<acceptor> made;
     try {
@@ -298,8 +298,8 @@ void listeners::open_local_endpoints() {
             start(*made, false);
             local_acceptors_.push_back(std::move(made));
         } catch (const boost::system::system_error&) {
-            host_.write_log(log_level::warning,
-                            "another '" + host_.node().name + "' in this process is the one that others find here");
+            host_.write_log(log_level::warning, "another node in this process has the name '" + host_.node().name +
+                                                    "', and gets its requests");
         }
     }
 }

@@ -125,7 +125,7 @@ bool datagram_requests::admit(const protocol::request_line& r) {
     // A cancellation may be repeated, and takes effect even if no memory is left.
     if (needs_id && r.noun.task != "cles" && !seen_.begin(r.id, r.text, out_.datagram())) {
         replies_.fail(r, {.code = errc::busy,
-                          .message = node_.name + " remembers as many requests by datagram as it may",
+                          .message = node_.name + " has reached its limit of requests by datagram",
                           .retry_ms = 1000});
         return false;
     }

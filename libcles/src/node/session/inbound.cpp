@@ -124,7 +124,7 @@ void inbound::abort_running() {
     }
     for (const auto& c : running) {
         if (!c->ended()) {
-            c->abort({.code = errc::unavailable, .message = node_->name + " shut down before this had ended"});
+            c->abort({.code = errc::unavailable, .message = node_->name + " shut down before the request had ended"});
         }
     }
     while (has_more() && !ordered_.is_serving()) {
@@ -161,7 +161,7 @@ void inbound::serve_more(time_point now) {
 void inbound::serve(const protocol::request_line& r, time_point arrived, time_point now) {
     const auto due = saturating_add(arrived, std::chrono::milliseconds{r.deadline_ms});
     if (now >= due) {
-        replies_.fail(r, errc::deadline, node_->name + ": its time ran out while it waited for its turn");
+        replies_.fail(r, errc::deadline, node_->name + ": the deadline passed while the request was queued");
         return;
     }
     if (refuses_new_requests_) {
@@ -222,7 +222,7 @@ void inbound::withdraw(std::uint64_t id) {
     const auto found = calls_.find(id);
     if (found != calls_.end()) {
         const auto c = found->second;
-        c->abort({.code = errc::cancelled, .message = node_->name + ": the requester withdrew it"});
+        c->abort({.code = errc::cancelled, .message = node_->name + ": the requester cancelled it"});
     }
 }
 

@@ -63,14 +63,14 @@ void outbound::on_due(entry& e, time_point now) {
              is_datagram() ? "a request by datagram has at most " + std::to_string(out_.datagram()) + " bytes: use TCP"
                            : "a request has at most " + std::to_string(node_.bounds.line) + " bytes");
     } else if (e.refused) {
-        fail(e.id, errc::busy, "too much waits for the peer or others to take it (limits.memory)");
+        fail(e.id, errc::busy, "no memory is left for requests that are not sent yet (limits.memory)");
     } else if (e.copies && !e.copies->over(now)) {
         out_.output().append(e.copies->again(now));
         ++node_.counts.requests_resent;
         node_.deadlines.arm(e, e.copies->next());
         out_.wake();
     } else {
-        fail(e.id, errc::deadline, "no answer came in time");
+        fail(e.id, errc::deadline, "no answer was received in time");
     }
 }
 
@@ -119,7 +119,7 @@ bool outbound::cancel(std::uint64_t id) {
         protocol::append_request(out_.output(), {.verb = verb::push, .noun = noun, .wants_reply = false});
         out_.wake();
     }
-    fail(id, errc::cancelled, "the request was withdrawn");
+    fail(id, errc::cancelled, "the request was cancelled");
     return true;
 }
 

@@ -30,10 +30,10 @@ bool allows(const node_state& n, const identity& peer, const protocol::request_l
     try {
         return n.authorise({peer, r.verb, r.noun.task, path});
     } catch (const std::exception& thrown) {
-        const auto why = std::string{"denied, since the access rules threw: "} + thrown.what();
+        const auto why = std::string{"denied, because the access rules threw an exception: "} + thrown.what();
         n.write_log(log_level::error, {why, peer.address, r.id});
     } catch (...) {
-        n.write_log(log_level::error, {"denied, since the access rules threw", peer.address, r.id});
+        n.write_log(log_level::error, {"denied, because the access rules threw an exception", peer.address, r.id});
     }
     return false; // rules that throw deny access
 }
@@ -56,10 +56,10 @@ std::optional<protocol::failure> refusal_reason(const node_state& n, const ident
     if (stays && !is_local_target(n, r)) {
         const auto target = protocol::quoted(r.noun.target);
         if (n.active_router != nullptr) {
-            return object(errc::no_target, n.name + " forwards PULL of 'cles' only, and this is for " + target);
+            return object(errc::no_target, n.name + " forwards only PULL of 'cles', not this request for " + target);
         }
         return object(errc::no_target,
-                      n.name + " does not route, and so asks nobody for " + target +
+                      n.name + " does not route, and cannot forward a request to " + target +
                           (protocol::is_reserved_target(r.noun.target)
                                ? ": give it cles::routing() as service_options::routing, or ask a node that routes, "
                                  "as clesd does"
@@ -67,7 +67,7 @@ std::optional<protocol::failure> refusal_reason(const node_state& n, const ident
     }
     if (is_in_via(r.via, n.name)) {
         return object(errc::no_target, n.name + " has forwarded this request for " + protocol::quoted(r.noun.target) +
-                                           " before: the nodes in 'via' pass it round");
+                                           " before: the nodes in 'via' form a loop");
     }
     std::string why;
     if (!r.body.empty() && !is_valid_json(r.body, n.bounds.depth, &why)) {
@@ -86,7 +86,7 @@ protocol::failure shutting_down(const node_state& n) {
 void append_link_refusal(std::string& out, const node_state& n, std::uint64_t id) {
     protocol::append_reply_head(out, id);
     protocol::append_failure(
-        out, {.code = errc::busy, .message = n.name + " has as many links as it may", .retry_ms = 1000});
+        out, {.code = errc::busy, .message = n.name + " has reached its limit of links", .retry_ms = 1000});
     out.push_back('\n');
 }
 
@@ -100,7 +100,7 @@ std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun) {
 protocol::failure busy(std::string message) { return {.code = errc::busy, .message = std::move(message)}; }
 
 protocol::failure no_memory(const node_state& n) {
-    return busy(n.name + ": too much waits or runs for this link or all of them (limits.memory)");
+    return busy(n.name + ": no memory is left for this link or for all links (limits.memory)");
 }
 
 protocol::failure no_such_task(const node_state& n, const protocol::request_line& r) {
@@ -121,7 +121,7 @@ std::optional<protocol::failure> no_capacity_to_run(const node_state& n) {
     if (n.counts.handlers_running < n.bounds.running) {
         return std::nullopt;
     }
-    return busy(n.name + " runs as many handlers as it may");
+    return busy(n.name + " has reached its limit of running handlers");
 }
 
 protocol::failure after_run(protocol::failure why) {

@@ -171,7 +171,7 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
         if (host.gossip_responder->on_pushed_table(r.body, observed_source::of(peer), host.time.now())) {
             replies.done(reply_target{r}, {});
         } else {
-            replies.fail(r, errc::bad_request, host.name + ": the body is no table of nodes");
+            replies.fail(r, errc::bad_request, host.name + ": the body is not a table of nodes");
         }
     } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
         replies.fail(r, errc::bad_request, host.name + ": cancel needs an id from 1 to 2^63-1");

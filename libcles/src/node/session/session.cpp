@@ -41,7 +41,7 @@ void session::on_line(std::string_view line, time_point now) {
     }
     if (is_datagram() && protocol::has_many_lines(line)) {
         if (!is_web_datagram(line)) {
-            refuse(line, "a datagram holds one line");
+            refuse(line, "a datagram must contain one line");
         }
         return;
     }
@@ -60,7 +60,7 @@ void session::on_line(std::string_view line, time_point now) {
         if (is_datagram()) { // web pages cannot send datagrams
             return;
         }
-        node_->write_log(log_level::warning, {"a web client was turned away: " + peer_.address, peer_.address});
+        node_->write_log(log_level::warning, {"rejected a web client: " + peer_.address, peer_.address});
         on_lost("the peer speaks HTTP");
         out_.close();
         return;
@@ -118,9 +118,10 @@ void session::on_update(const subscriptions::match& found) {
 void session::on_leaving() {
     ++node_->counts.requests[static_cast<std::size_t>(verb::push)];
     out_.retire();
-    outbound_.refuse(failure_text({.code = errc::busy,
-                                   .message = "the node at " + peer_.address + " is leaving, and has not begun this",
-                                   .retry_ms = 1000}));
+    outbound_.refuse(
+        failure_text({.code = errc::busy,
+                      .message = "the node at " + peer_.address + " is leaving, and has not started this request",
+                      .retry_ms = 1000}));
 }
 
 void session::send_leave_notice() {
@@ -179,7 +180,7 @@ void session::on_overlong(std::string_view head) {
 void session::on_cut(std::string_view rest) {
     rest = protocol::trim(rest);
     if (!rest.empty() && !closed_) {
-        refuse(rest, "the last line is not ended by LF");
+        refuse(rest, "the last line does not end with LF");
     }
 }
 

@@ -127,7 +127,7 @@ std::optional<protocol::failure> task_execution::refusal(const memory_account* m
         return no_memory(*node_);
     }
     if (line_.verb == verb::update && !node_->published.can_publish(publish_path())) {
-        return busy(node_->name + ": '" + std::string{line_.noun.task} + "' has as many nouns as it may");
+        return busy(node_->name + ": '" + std::string{line_.noun.task} + "' has reached its limit of nouns");
     }
     return handler_->plain ? std::nullopt : no_capacity_to_run(*node_);
 }

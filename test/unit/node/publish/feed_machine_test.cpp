@@ -302,7 +302,7 @@ BOOST_AUTO_TEST_CASE(closing_unbinds_once_and_ends_the_wait) {
     wait w;
     feed.mail().next(cles::core::feed_machine::event_ptr{&w});
     feed.close(errc::cancelled);
-    BOOST_TEST(w.text == "failed: the request was withdrawn");
+    BOOST_TEST(w.text == "failed: the request was cancelled");
     BOOST_TEST(feed.closed());
     feed.close(errc::stopped);
     BOOST_TEST(host.unbinds == 1);
@@ -332,7 +332,7 @@ BOOST_AUTO_TEST_CASE(a_wait_can_be_cancelled_without_harm_to_the_feed) {
     wait w;
     feed.mail().next(cles::core::feed_machine::event_ptr{&w});
     feed.mail().cancel();
-    BOOST_TEST(w.text == "failed: the request was withdrawn");
+    BOOST_TEST(w.text == "failed: the request was cancelled");
     feed.mail().cancel();
     update(1);
     BOOST_TEST(next() == "update 1 {}");
@@ -406,7 +406,7 @@ BOOST_AUTO_TEST_CASE(unanswered_renewals_lose_the_feed_which_binds_again) {
     pass(3s);
     const auto asked = clock.now();
     pass(6s);
-    feed.on_renewal_refused(asked, errc::deadline, "no answer came in time", clock.now());
+    feed.on_renewal_refused(asked, errc::deadline, "no answer was received in time", clock.now());
     BOOST_TEST(host.detaches == 1);
     BOOST_TEST(next() == "lost the publisher did not renew the lease in time");
     pass(100ms);

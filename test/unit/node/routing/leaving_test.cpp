@@ -78,7 +78,8 @@ BOOST_AUTO_TEST_CASE(requests_that_exceed_the_time_are_aborted) {
     link.session().serving().abort_running();
     const auto lines = link.take_lines();
     BOOST_REQUIRE_EQUAL(lines.size(), 2U);
-    BOOST_TEST(lines[0] == "id=1 {\"error\":\"unavailable\",\"message\":\"car1 shut down before this had ended\"}");
+    BOOST_TEST(lines[0] ==
+               "id=1 {\"error\":\"unavailable\",\"message\":\"car1 shut down before the request had ended\"}");
     BOOST_TEST(cles::test::kind_of(lines[1]) == "unavailable");
     BOOST_TEST(node.started.at(0)->stopped);
     BOOST_TEST(node.started.at(1)->stopped);
@@ -132,7 +133,7 @@ BOOST_AUTO_TEST_CASE(requests_that_a_leaving_node_has_not_answered_were_not_star
     BOOST_TEST(link.ask("PUSH self:cles/leaving reply=no").empty());
     BOOST_TEST(!first->code);
     BOOST_TEST((second->code == errc::busy));
-    BOOST_TEST(second->text == "the node at tcp://127.0.0.1:1 is leaving, and has not begun this");
+    BOOST_TEST(second->text == "the node at tcp://127.0.0.1:1 is leaving, and has not started this request");
     BOOST_TEST(link.retires == 1); // no more requests are sent on it
     BOOST_TEST(link.session().asking().in_flight() == 0U);
     link.half_close();

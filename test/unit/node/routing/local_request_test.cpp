@@ -100,8 +100,8 @@ BOOST_FIXTURE_TEST_CASE(number_of_running_handlers_is_bounded, fixture) {
     BOOST_REQUIRE(cles::protocol::parse_request("DELEGATE any:work", r, wrong));
     cles::core::local_request second{full.host, reported.outcome()};
     second.run(r, peer, full.clock.now() + 1s, full.clock.now());
-    BOOST_TEST(last() == "busy: car1 runs as many handlers as it may");
-    BOOST_TEST(link.reply("DELEGATE self:work id=2").message == "car1 runs as many handlers as it may");
+    BOOST_TEST(last() == "busy: car1 has reached its limit of running handlers");
+    BOOST_TEST(link.reply("DELEGATE self:work id=2").message == "car1 has reached its limit of running handlers");
 }
 
 BOOST_FIXTURE_TEST_CASE(later_busy_is_a_refusal, fixture) {
@@ -184,7 +184,7 @@ BOOST_FIXTURE_TEST_CASE(update_that_cannot_be_published_after_its_handler_says_t
     node.on_later(verb::update, "note");
     run("UPDATE any:note/a [1]");
     cles::test::test_link subscriber{node};
-    subscriber.ask("BIND car1:note/b"); // now the task has as many nouns as it may
+    subscriber.ask("BIND car1:note/b"); // now the task has reached its limit of nouns
     node.started.at(0)->call->done("");
     BOOST_TEST(last().starts_with("busy ran begun: car1: "));
 }

@@ -22,7 +22,7 @@ using cles::verb;
 using cles::test::send_on;
 using namespace std::chrono_literals;
 
-constexpr std::string_view busy = R"({"error":"busy","message":"car2 has as many links as it may","retry_ms":1000})";
+constexpr std::string_view busy = R"({"error":"busy","message":"car2 has reached its limit of links","retry_ms":1000})";
 
 struct fixture {
     fixture() { link.session().expect_refusal(); }
@@ -49,7 +49,7 @@ BOOST_AUTO_TEST_CASE(all_its_requests_are_busy_when_it_ends) {
     link.half_close();
     for (const auto& each : {one, two}) {
         BOOST_TEST((each->code == errc::busy));
-        BOOST_TEST(each->text == "car2 has as many links as it may");
+        BOOST_TEST(each->text == "car2 has reached its limit of links");
     }
     BOOST_TEST(node.counts().replies_dropped == 1U); // it replied to none of them
 }

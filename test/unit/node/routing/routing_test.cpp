@@ -61,7 +61,7 @@ BOOST_AUTO_TEST_CASE(all_waits_until_the_tasks_of_each_node_are_known) {
     link.ask("PULL all:speed id=7");
     ways.to("car2").answers(description("car2", task("PULL", "speed")));
     BOOST_TEST(ways.to("car2").text == "PULL car2:cles");
-    ways.to("car3").fails(errc::deadline, "no answer came in time");
+    ways.to("car3").fails(errc::deadline, "no answer was received in time");
     BOOST_TEST(ways.to("car2").text == "PULL car2:speed hops=7 via=car1");
     ways.to("car2").answers("[1]");
     BOOST_TEST(link.take() == "id=7 {\"results\":{\"car2\":[1]},\"errors\":{}}\n");

@@ -89,7 +89,7 @@ BOOST_AUTO_TEST_CASE(nodes_of_one_digest_are_asked_once) {
 BOOST_AUTO_TEST_CASE(if_one_node_of_a_digest_does_not_answer_another_is_asked) {
     hear("car2", "same");
     hear("car3", "same");
-    ways.to("car2").fails(errc::deadline, "no answer came in time");
+    ways.to("car2").fails(errc::deadline, "no answer was received in time");
     BOOST_TEST(ways.to("car3").text == "PULL car3:cles");
     ways.to("car3").answers(description("car3", task("PULL", "speed")));
     BOOST_TEST(offered_by(verb::pull, "speed") == "car2 car3");

@@ -46,7 +46,7 @@ BOOST_FIXTURE_TEST_SUITE(datagram_requests, fixture)
 BOOST_AUTO_TEST_CASE(a_datagram_with_more_than_one_line_is_a_bad_request) {
     const auto told = link.reply("PULL car1:speed\nPULL car1:speed");
     BOOST_TEST(told.error == "bad_request");
-    BOOST_TEST(told.message == "car1: a datagram holds one line");
+    BOOST_TEST(told.message == "car1: a datagram must contain one line");
     BOOST_TEST(link.kind("PULL car1:speed id=7\nPULL car1:speed id=8") == "id=7 bad_request");
     BOOST_TEST(link.kind("PULL car1:speed id=7\n") == "id=7 bad_request");
     BOOST_TEST(link.ask("PUSH car1:count id=7 reply=no\nx").empty());

@@ -35,7 +35,7 @@ BOOST_AUTO_TEST_SUITE(half_close)
 
 BOOST_AUTO_TEST_CASE(a_last_line_without_its_lf_is_bad_request_and_does_not_run) {
     link.cut("PULL car1:speed id=7");
-    BOOST_TEST(link.take() == R"(id=7 {"error":"bad_request","message":"car1: the last line is not ended by LF"})"
+    BOOST_TEST(link.take() == R"(id=7 {"error":"bad_request","message":"car1: the last line does not end with LF"})"
                               "\n");
     link.cut("PULL car1:speed");
     BOOST_TEST(link.sent() == "bad_request");

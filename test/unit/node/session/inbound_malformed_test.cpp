@@ -61,7 +61,7 @@ BOOST_AUTO_TEST_CASE(every_malformed_line_is_bad_request_and_says_what_is_wrong_
         {"PULL car1:speed 5", "'5'"},
         {"PULL car1:speed deadline=0", "'deadline'"},
         {"PULL car1:speed deadline=86400001", "'deadline'"},
-        {"PULL car1:speed deadline=1 deadline=1", "'deadline' stands twice"},
+        {"PULL car1:speed deadline=1 deadline=1", "'deadline' occurs twice"},
         {"PULL car1:speed id=0", "'id'"},
         {"PULL car1:speed id=9223372036854775808", "'id'"},
         {"PULL car1:speed hops=17", "'hops'"},

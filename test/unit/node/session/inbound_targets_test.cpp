@@ -64,8 +64,8 @@ BOOST_AUTO_TEST_CASE(without_routing_the_error_says_what_any_and_all_need) {
         BOOST_TEST(said.find("cles::routing()") != std::string::npos, said);
     }
     BOOST_TEST(link.reply("PULL car2:speed").message ==
-               "car1 does not route, and so asks nobody for 'car2': ask that node itself, or a node that routes, as "
-               "clesd does");
+               "car1 does not route, and cannot forward a request to 'car2': ask that node itself, or a node that "
+               "routes, as clesd does");
 }
 
 BOOST_AUTO_TEST_CASE(a_node_that_finds_itself_in_via_answers_no_target) {
