@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What the kernel's files say, from samples of them.
+// Parsing of the kernel's files, from samples of them.
 #include "system/cpu_use.hpp"
 #include "system/disk.hpp"
 #include "system/load.hpp"
@@ -49,10 +49,10 @@ BOOST_AUTO_TEST_CASE(use_of_the_cores_is_what_was_between_two_readings_that_lie_
     BOOST_TEST(use.take({.busy = 250, .all = 1000}, start) == 0.25); // since the machine started
     BOOST_TEST(use.take({.busy = 260, .all = 1010}, start + 10ms) == 260.0 / 1010);
     BOOST_TEST(use.take({.busy = 350, .all = 1200}, start + 200ms) == 0.5);
-    // Soon after: still against the reading before.
+    // Soon after: still relative to the reading before.
     BOOST_TEST(use.take({.busy = 351, .all = 1201}, start + 210ms) == 101.0 / 201);
     BOOST_TEST(use.take({.busy = 350, .all = 1300}, start + 400ms) == 0);
-    BOOST_TEST(use.take({.busy = 340, .all = 1400}, start + 600ms) == 0); // some kernels go back
+    BOOST_TEST(use.take({.busy = 340, .all = 1400}, start + 600ms) == 0); // some kernels count backwards
     BOOST_TEST(use.take({.busy = 340, .all = 1400}, start + 800ms) == 0);
 }
 

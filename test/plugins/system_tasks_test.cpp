@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The system's tasks, in an application's service, on this machine.
+// The tasks of `system`, in an application's service, on this machine.
 #include <cles/service.hpp>
 
 #include "support/run_until.hpp"

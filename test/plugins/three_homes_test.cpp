@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The tasks of the example 14 answer alike wherever they live.
+// The tasks of example 14 reply identically in a service, a test and a plugin.
 #include <cles/service.hpp>
 
 #include "../../apps/examples/three_homes/odometer.hpp"
