@@ -60,7 +60,7 @@ BOOST_AUTO_TEST_CASE(a_scheme_that_nobody_registered_has_no_transport) {
     BOOST_TEST(cles::find_transport("") == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, every_door, kind) {
+BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, listening_carriers, kind) {
     link_pair pair{kind};
     if (pair.address().scheme == "tcp" || pair.address().scheme == "udp") {
         BOOST_TEST(pair.address().port != 0);
@@ -70,7 +70,7 @@ BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, every_door, kind) {
     pair.open();
 }
 
-BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, every_door, kind) {
+BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, listening_carriers, kind) {
     link_pair pair{kind};
     pair.connect();
     const auto far = pair.far.run([&] { return pair.far.link->peer(); });
@@ -130,7 +130,7 @@ BOOST_DATA_TEST_CASE(dialling_where_nobody_listens_is_refused_and_never_inside_t
     BOOST_TEST(fits, result.code.message());
 }
 
-BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, every_door, kind) {
+BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, listening_carriers, kind) {
     link_pair pair{kind};
     dial_result result;
     const auto give_up =
@@ -193,7 +193,7 @@ BOOST_AUTO_TEST_CASE(a_unix_socket_whose_queue_is_full_is_an_error_and_no_link) 
     BOOST_TEST(dials.back()->made == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, every_door, kind) {
+BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, listening_carriers, kind) {
     link_pair pair{kind};
     asio::io_context other;
     BOOST_TEST(listen_failure(other, pair.address()) == asio::error::address_in_use);

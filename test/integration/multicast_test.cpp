@@ -74,13 +74,13 @@ using cles::feed_event;
 namespace {
 
 /// A member of the group that is not a node: receives everything, and sends what a test specifies.
-struct stranger final : cles::core::group_listener {
-    stranger(boost::asio::io_context& io, const cles::multicast_options& where)
+struct plain_member final : cles::core::group_listener {
+    plain_member(boost::asio::io_context& io, const cles::multicast_options& where)
         : port(std::make_shared<cles::transport::group_port>(io.get_executor(),
                                                              cles::transport::find_interface(where.interface), where)) {
         port->start(*this);
     }
-    ~stranger() { port->close(); }
+    ~plain_member() { port->close(); }
     void on_datagram(const cles::core::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
     void on_writable() override {}
     void say(std::string_view line) { port->send(line); }
@@ -154,7 +154,7 @@ BOOST_FIXTURE_TEST_CASE(a_feed_of_all_hears_every_publisher, network) {
 }
 
 BOOST_FIXTURE_TEST_CASE(one_datagram_serves_eight_binders, network) {
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     const auto car = node("car1");
     std::vector<std::unique_ptr<cles::service>> towers;
     std::vector<std::unique_ptr<feed_log>> feeds;
@@ -268,7 +268,7 @@ BOOST_FIXTURE_TEST_CASE(a_node_neither_hears_itself_nor_binds_itself, network) {
     const auto car = node("car1");
     feed_log feed;
     until_bound(feed, *car, "all:place");
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     car->update("place", 1);
     run_ready(io);
     BOOST_TEST(feed.items.empty());
@@ -282,7 +282,7 @@ BOOST_FIXTURE_TEST_CASE(a_node_neither_hears_itself_nor_binds_itself, network) {
 
 BOOST_FIXTURE_TEST_CASE(a_lease_runs_out_when_its_binder_dies_without_a_word, network) {
     const auto car = node("car1");
-    stranger binder{io, where};
+    plain_member binder{io, where};
     binder.say("BIND all:place lease=100\n");
     run_until(io, [&] { return metric(*car, "group_leases") == 1; });
     run_until(io, [&] { return metric(*car, "leases_expired") == 1; });
@@ -297,7 +297,7 @@ BOOST_FIXTURE_TEST_CASE(renewals_keep_a_binding_beyond_its_lease, network) {
     bounds.lease = 3000ms;
     const auto car = node("car1");
     const auto tower = node("tower", bounds);
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     feed_log feed;
     until_bound(feed, *tower, "all:place");
     run_until(io, [&] { return sniffer.count("BIND all:place lease=3000") >= 5; });
@@ -309,7 +309,7 @@ BOOST_FIXTURE_TEST_CASE(renewals_keep_a_binding_beyond_its_lease, network) {
 BOOST_FIXTURE_TEST_CASE(closing_the_last_feed_and_stopping_say_goodbye, network) {
     const auto car = node("car1");
     const auto tower = node("tower");
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     feed_log one;
     feed_log two;
     until_bound(one, *tower, "all:place");
@@ -331,7 +331,7 @@ BOOST_FIXTURE_TEST_CASE(closing_the_last_feed_and_stopping_say_goodbye, network)
 
 BOOST_FIXTURE_TEST_CASE(gaps_and_repeats_are_told_for_each_publisher, network) {
     const auto tower = node("tower");
-    stranger publisher{io, where};
+    plain_member publisher{io, where};
     feed_log feed;
     until_bound(feed, *tower, "all:place");
     for (const auto* line : {"UPDATE a:place seq=1 epoch=00000001 {}\n", "UPDATE b:place seq=7 epoch=00000002 {}\n",

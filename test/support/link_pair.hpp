@@ -31,9 +31,9 @@ inline constexpr std::array every_socket{carrier::tcp4, carrier::tcp6, carrier::
 /// Those that send each line as one datagram.
 inline constexpr std::array every_datagram{carrier::udp4, carrier::udp6};
 /// All of them, for tests of listening and dialling.
-inline constexpr std::array every_door{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
-                                       carrier::unix_abstract, carrier::inproc, carrier::inproc_threads,
-                                       carrier::udp4,          carrier::udp6};
+inline constexpr std::array listening_carriers{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
+                                               carrier::unix_abstract, carrier::inproc, carrier::inproc_threads,
+                                               carrier::udp4,          carrier::udp6};
 
 std::ostream& operator<<(std::ostream& out, carrier kind);
 

@@ -66,7 +66,7 @@ struct world {
     void run_what_is_ready();
 
     /// The service still works: it replies, and its timer is armed. Meanwhile, what is ready is run.
-    void check_that_it_lives(deed d);
+    void check_that_it_works(deed d);
 
     boost::asio::io_context io;
     scripted_listener silent{io};
