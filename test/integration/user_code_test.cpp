@@ -157,7 +157,7 @@ BOOST_DATA_TEST_CASE(a_publisher_that_waits_may_do_anything, data::make(every_de
     }
 }
 
-BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_deed), does) {
+BOOST_DATA_TEST_CASE(a_progress_function_may_do_anything, data::make(every_deed), does) {
     world w;
     int reports = 0;
     answer<int> a;
@@ -185,7 +185,7 @@ BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_dee
 }
 
 // It is destroyed with its operation, or after it; never inside a call of the library.
-BOOST_DATA_TEST_CASE(what_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
+BOOST_DATA_TEST_CASE(a_progress_callback_may_act_when_it_is_destroyed, data::make(every_place) * every_deed, where,
                      does) {
     if (does == deed::throws) { // destructors do not throw
         return;
@@ -239,7 +239,7 @@ BOOST_DATA_TEST_CASE(what_hears_of_progress_may_do_it_when_it_is_destroyed, data
     }
 }
 
-BOOST_DATA_TEST_CASE(who_is_told_to_stop_may_do_anything, data::make(every_deed), does) {
+BOOST_DATA_TEST_CASE(a_stop_callback_may_do_anything, data::make(every_deed), does) {
     for (const auto where : {place::deadline, place::lost, place::cancelled, place::stop}) {
         BOOST_TEST_CONTEXT("at " << where) {
             world w;

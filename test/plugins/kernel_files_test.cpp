@@ -99,7 +99,7 @@ BOOST_AUTO_TEST_CASE(disks_are_counted_whole_and_in_bytes) {
     BOOST_TEST(all[2].device == "nvme0n12");
 }
 
-BOOST_AUTO_TEST_CASE(interfaces_are_counted_both_ways) {
+BOOST_AUTO_TEST_CASE(interfaces_are_counted_in_both_directions) {
     const auto n =
         sysinfo::parse_network("Inter-|   Receive                                                |  Transmit\n"
                                " face |bytes    packets errs drop fifo frame compressed multicast|bytes    packets "
@@ -121,7 +121,7 @@ BOOST_AUTO_TEST_CASE(interfaces_are_counted_both_ways) {
     BOOST_TEST(alias.sent.dropped == 4U);
 }
 
-BOOST_AUTO_TEST_CASE(a_process_is_read_whatever_its_name) {
+BOOST_AUTO_TEST_CASE(a_process_with_any_name_is_parsed) {
     const auto p =
         sysinfo::parse_process("42 (a (b) c) S 1 42 42 0 -1 4194560 100 200 300 400 150 50 11 12 20 0 7 0 12345 "
                                "1000000 250 18446744073709551615 1 1\n",
@@ -135,7 +135,7 @@ BOOST_AUTO_TEST_CASE(a_process_is_read_whatever_its_name) {
     BOOST_TEST(p->memory == 250U * 4096);
 }
 
-BOOST_AUTO_TEST_CASE(what_is_no_such_file_is_harmless) {
+BOOST_AUTO_TEST_CASE(files_of_another_format_are_harmless) {
     for (const std::string_view text :
          {"", "\n", "42", "42 (a", "42 )a(", "42 (a) ", "\xFF\xFE:::", ":", "a:b", "/dev/"}) {
         BOOST_TEST(!sysinfo::parse_process(text, {}).has_value());

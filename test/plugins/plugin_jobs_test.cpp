@@ -99,7 +99,7 @@ BOOST_AUTO_TEST_CASE(from_elsewhere_or_later_the_answer_is_posted) {
     BOOST_TEST(record->told == (std::vector<std::string>{"done 1", "done 1"}), boost::test_tools::per_element());
 }
 
-BOOST_AUTO_TEST_CASE(what_comes_twice_is_counted_and_dropped) {
+BOOST_AUTO_TEST_CASE(duplicates_are_counted_and_dropped) {
     const auto job = open();
     BOOST_TEST(jobs.finish(job, done));
     BOOST_TEST(!jobs.finish(job, done));
@@ -111,7 +111,7 @@ BOOST_AUTO_TEST_CASE(what_comes_twice_is_counted_and_dropped) {
     BOOST_TEST(jobs.stopped(job));
 }
 
-BOOST_AUTO_TEST_CASE(a_job_is_stopped_once_and_told) {
+BOOST_AUTO_TEST_CASE(a_job_is_stopped_once_and_notified) {
     counted c;
     const auto job = open();
     BOOST_TEST(!jobs.stopped(job));

@@ -84,7 +84,7 @@ BOOST_AUTO_TEST_CASE(a_pull_that_hangs_does_not_slow_another_task_down) {
     BOOST_TEST(good);
 }
 
-BOOST_AUTO_TEST_CASE(a_bind_whose_handler_hangs_holds_up_nobody_else) {
+BOOST_AUTO_TEST_CASE(a_bind_whose_handler_hangs_delays_no_other) {
     load("rough.so");
     auto binder = peer();
     auto other = peer();
@@ -97,7 +97,7 @@ BOOST_AUTO_TEST_CASE(a_bind_whose_handler_hangs_holds_up_nobody_else) {
     BOOST_TEST(binder.line() == "id=1 {}");
 }
 
-BOOST_AUTO_TEST_CASE(a_job_may_refuse_and_say_when_to_ask_again) {
+BOOST_AUTO_TEST_CASE(a_job_may_refuse_with_a_retry_time) {
     load("sound.so");
     BOOST_TEST(peer().ask("DELEGATE self:full") ==
                R"({"error":"busy","message":"car1: the dock is full","retry_ms":250})");
@@ -117,7 +117,7 @@ BOOST_AUTO_TEST_CASE(an_answer_that_is_not_json_is_not_passed_on) {
                R"({"error":"failed","message":"car1: the plugin's answer is not JSON"})");
 }
 
-BOOST_AUTO_TEST_CASE(a_job_that_waits_for_others_is_told_once_that_the_node_stops) {
+BOOST_AUTO_TEST_CASE(a_job_that_waits_for_others_is_notified_once_that_the_node_stops) {
     cles::service other{io, listening("other")};
     std::vector<cles::responder> kept;
     other.on_delegate("never", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });

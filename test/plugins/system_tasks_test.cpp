@@ -71,7 +71,7 @@ BOOST_AUTO_TEST_CASE(this_machine_makes_sense) {
     BOOST_TEST(own->state.size() == 1U);
 }
 
-BOOST_DATA_TEST_CASE(each_noun_is_published_once_somebody_is_bound, boost::unit_test::data::make(nouns), noun) {
+BOOST_DATA_TEST_CASE(each_noun_is_published_once_it_has_a_subscriber, boost::unit_test::data::make(nouns), noun) {
     fixture f;
     int updates = 0;
     using json_feed = cles::feed<cles::json_text>;
