@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""`cles bench`: what it measures and how it tells it, on runs too short to say how fast anything is."""
+"""`cles bench`: what it measures and how it reports it, on runs that are too short for meaningful figures."""
 
 import json
 import os
@@ -189,7 +189,7 @@ class Stress(unittest.TestCase):
         self.assertGreaterEqual(report["processes"], 2)
         for name in ("idle", "idle_fifo", "loaded", "loaded_fifo"):
             figures = report.get(name)
-            if figures is None:  # the system gives no real-time priority
+            if figures is None:  # the system does not grant a real-time priority
                 self.assertTrue(name.endswith("_fifo"), report)
                 continue
             self.assertTrue(0 < figures["p50_us"] <= figures["p99_us"] <= figures["p999_us"] <= figures["max_us"])
@@ -262,7 +262,7 @@ class Program(unittest.TestCase):
     def setUp(self):
         folder = tempfile.TemporaryDirectory(prefix="cles-bench-")
         self.addCleanup(folder.cleanup)
-        self.alone = os.path.join(folder.name, "alone", "cles")  # a copy with nothing beside it
+        self.alone = os.path.join(folder.name, "alone", "cles")  # a copy without `cles-bench`
         self.path = os.path.join(folder.name, "path")
         os.mkdir(os.path.dirname(self.alone))
         os.mkdir(self.path)
@@ -294,7 +294,7 @@ class Program(unittest.TestCase):
         self.assertEqual(self.run_alone("-v", "bench", "--rounds", "3", "-o", "json"),
                          (7, "in PATH: --rounds 3 -o json\n", ""))
         self.write_program(os.path.dirname(self.alone), 'echo "beside:" "$@"\n')
-        self.assertEqual(self.run_alone("bench", "--requests=1 000", "--bytes")[0], 2)  # refused before
+        self.assertEqual(self.run_alone("bench", "--requests=1 000", "--bytes")[0], 2)  # refused before it starts
         self.assertEqual(self.run_alone("bench", "--against", "a b"), (0, "beside: --against a b\n", ""))
 
     def test_one_that_cannot_be_started_is_reported(self):

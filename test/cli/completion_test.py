@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Completion: what is offered where, how soon, and that the shells make of it what they should."""
+"""Completion: the candidates, how soon they appear, and their treatment by the shells."""
 
 import os
 import shutil
@@ -13,7 +13,7 @@ import unittest
 import shells
 from support import CLES, Node, ScriptedNode, cles, environment, free_port, id_of, wait_until
 
-# The program by its name, so that the scripts find it as they do where it is installed.
+# The program by its name, so that the scripts find it as if it were installed.
 FOLDER = os.path.dirname(os.path.abspath(shutil.which(CLES) or CLES))
 
 
@@ -22,7 +22,7 @@ ENVIRONMENT = environment(CLES_MULTICAST=GROUP, PATH=FOLDER + os.pathsep + os.en
 
 
 def offered(*words, env=None):
-    """What is offered for the last of these words, and what is said about each."""
+    """The candidates for the last of these words, and their descriptions."""
     code, out, err = cles("__complete", *words, env=env or ENVIRONMENT)
     if (code, err) != (0, ""):
         raise AssertionError(f"ended with {code}: {err}")
@@ -30,7 +30,7 @@ def offered(*words, env=None):
 
 
 def soon(*words, env=None):
-    """As `offered`, but again and again until there is something: a node that has just announced itself pauses for as
+    """As `offered`, but repeated until there is a candidate: a node that has just announced itself pauses for as
     long as completion waits."""
     found = {}
 
@@ -43,7 +43,7 @@ def soon(*words, env=None):
 
 
 class WithoutNodes(unittest.TestCase):
-    """What can be known without asking anybody."""
+    """Completion without requests to nodes."""
 
     def test_commands(self):
         found = offered("")
@@ -159,7 +159,7 @@ class Nouns(unittest.TestCase):
 
     def test_in_less_than_100_ms(self):
         def has_quick_ones(wanted, *words, env=ENVIRONMENT):
-            """Three of forty: whatever else the machine does only adds to the time that they take."""
+            """Three of forty runs: other load on the machine only increases the time that they take."""
             quick = 0
             for _ in range(40):
                 begin = time.monotonic()
@@ -169,7 +169,7 @@ class Nouns(unittest.TestCase):
                     return True
             return False
 
-        # With a sanitizer all takes longer, above all the start of a program.
+        # With a sanitizer everything takes longer, above all the start of a program.
         slowdown = max(1.0, float(os.environ.get("CLES_TEST_PATIENCE", "30")) / 30)
         start = 0.0
         if slowdown > 1:
@@ -185,7 +185,7 @@ class Nouns(unittest.TestCase):
             self.assertTrue(has_quick_ones(limit(0.1), *words), words)
         alone = environment(CLES_MULTICAST=f"lo,239.255.25.38:{free_port()}")
         for words in (("pull", ""), ("pull", "car1:")):
-            self.assertTrue(has_quick_ones(limit(0.05), *words, env=alone), words)  # nobody is waited for
+            self.assertTrue(has_quick_ones(limit(0.05), *words, env=alone), words)  # without waiting for nodes
 
     def test_a_silent_node_is_not_waited_for(self):
         with socket.create_server(("127.0.0.1", 0)) as silent:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""`cles doctor`: on hosts of its own, each with another illness."""
+"""`cles doctor`: on separate hosts, each with a different fault."""
 
 import json
 import os
@@ -14,7 +14,7 @@ from two_hosts import Hosts
 
 CLESD = os.environ.get("CLESD", "")
 
-# Announces a node called ghost, again and again, at a port of the loopback where it listens itself, if it is to.
+# Announces a node called ghost repeatedly, at a port of the loopback on which it listens itself if requested.
 GHOST = """
 import json, socket, sys, threading, time
 answers, clock = sys.argv[1] == "answers", float(sys.argv[2])
@@ -67,7 +67,7 @@ time.sleep(3600)
 
 
 class Doctor(unittest.TestCase):
-    """Each test has a host for itself, where port 25370 is nobody's."""
+    """Each test has a separate host, on which port 25370 is unused."""
 
     def setUp(self):
         self.hosts = Hosts()
@@ -108,7 +108,7 @@ class Doctor(unittest.TestCase):
         return done.returncode, done.stdout
 
     def examine(self, *arguments, **variables):
-        """Exit code, and of each check what was found."""
+        """Exit code, and the findings of each check."""
         code, out = self.run_doctor("-o", "json", *arguments, **variables)
         report = json.loads(out)
         found = {}
@@ -120,7 +120,7 @@ class Doctor(unittest.TestCase):
         return code, found
 
     def failure(self, found, check, says):
-        """The one failure of a check, which says that."""
+        """The only failure of a check, which contains this text."""
         failures = [each for each in found[check] if each["verdict"] == "failure"]
         self.assertEqual(len(failures), 1, found)
         self.assertRegex(failures[0]["text"], says)
@@ -196,17 +196,17 @@ class Doctor(unittest.TestCase):
         self.assertEqual(code, 0, found)
         by_tcp, by_udp = found["ports"]
         self.assertRegex(by_tcp["text"], r"^tcp://127.0.0.1:25370: the node sat1 listens here, version \d")
-        # It has more to say of itself than goes into a datagram.
+        # Its description does not fit into a datagram.
         self.assertRegex(by_udp["text"], r"^udp://127.0.0.1:25370: a node listens here, and replies: sat1: .* use TCP$")
         self.assertEqual(found["nodes"][0]["text"], "1 node found")
-        self.assertFalse([each for each in found["clock"] if "sat1" in each["text"]])  # whose clock is this host's
+        self.assertFalse([each for each in found["clock"] if "sat1" in each["text"]])  # its clock is this host's
 
     def test_an_interface_that_is_not_there(self):
         code, found = self.examine(CLES_MULTICAST="nowhere0")
         self.assertEqual(code, 1)
         self.failure(found, "interfaces", "for nowhere0, which does not exist")
         self.failure(found, "multicast", "cannot join the group 239.255.25.37 on nowhere0")
-        self.assertIn("ports", found)  # the rest is looked at all the same
+        self.assertIn("ports", found)  # the other checks still run
 
     def test_an_interface_that_is_down(self):
         self.hosts._ip(self.hosts.near, "link", "set", "v0", "down")

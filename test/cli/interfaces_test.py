@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Multicast by several interfaces: two hosts with two cables between them, whose nodes are found on this host too."""
+"""Multicast by several interfaces: two hosts with two cables; nodes of the same host are also discovered."""
 
 import json
 import re
@@ -53,7 +53,7 @@ class Interfaces(unittest.TestCase):
         return re.search(r"tcp://\S+:(\d+)$", read_line(process)).group(1)
 
     def found_at(self, host, interfaces):
-        """The nodes that are heard there, each with its first endpoint."""
+        """The nodes that are received there, each with its first endpoint."""
         code, out, err = self.run_at(host, interfaces, "ls", "-o", "json")
         self.assertEqual((code, err), (0, ""))
         return [(p["node"], p["state"], p["endpoints"][:1]) for p in json.loads(out)["peers"]]

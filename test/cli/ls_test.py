@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Nodes found by their names: `cles ls`, and the other commands without --at. On loopback, with a group port of the
-tests' own."""
+"""Nodes that are discovered by name: `cles ls`, and the other commands without --at. On loopback, with a separate group
+port for the tests."""
 
 import json
 import signal
@@ -11,7 +11,7 @@ from support import PATIENCE, Node, cles, environment, finish, free_port, read_l
 
 
 def told(process, text):
-    """The line of a node's log that says it."""
+    """The line of a node's log that reports it."""
     while line := read_line(process, process.stderr):
         if text in line:
             return line
@@ -100,7 +100,7 @@ class Found(Group):
         peers = self.peers("--offers", "echo", "-l")
         self.assertIn("tasks", peers[0])
         self.assertNotIn("tasks", self.peers("--offers", "echo")[0])
-        for task in ("primes", "push:localization"):  # nobody does, which is no reason to say that nobody is there
+        for task in ("primes", "push:localization"):  # no node does, but nodes exist
             self.assertEqual(self.peers("--offers", task), [])
 
     def test_a_node_tells_whom_it_knows(self):
@@ -124,7 +124,7 @@ class Found(Group):
         self.assertEqual((code, err), (0, ""))
 
     def test_what_says_where_needs_no_group(self):
-        # A group that cannot be joined would be an error if it were.
+        # Joining a group that cannot be joined would be an error.
         env = environment(CLES_MULTICAST="nowhere0")
         node = self.nodes[0]
         for place in (("--at", node.url), ("--peer", f"car1={node.unix}")):

@@ -113,7 +113,7 @@ while True:
 
 
 def why_no_hosts():
-    """Why network namespaces cannot be made here; empty where they can."""
+    """Why network namespaces cannot be made here; empty if they can."""
     if not shutil.which("ip"):
         return "there is no 'ip' (iproute2)"
     name = f"cles-try-{os.getpid()}"
@@ -196,7 +196,7 @@ class Hosts(Processes):
         while len(seen) < 10:
             datagram = json.loads(read_line(sniffer))
             self.assertEqual(datagram["ttl"], 1)
-            if datagram["line"].startswith("UPDATE") and ":cles " not in datagram["line"]:  # else an announcement
+            if datagram["line"].startswith("UPDATE") and ":cles " not in datagram["line"]:  # otherwise an announcement
                 self.assertEqual(datagram["from"], "10.77.0.1")
                 self.assertTrue(datagram["line"].startswith("UPDATE car1:localization seq="), datagram)
                 seen.append(int(datagram["line"].split("seq=")[1].split()[0]))

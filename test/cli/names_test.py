@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Whose name it is: nodes that are killed and started again, two of one name, and pools. On loopback, with a group port
-of the tests' own."""
+"""Ownership of names: nodes that are killed and restarted, two nodes of one name, and pools. On loopback, with a
+separate group port for the tests."""
 
 import json
 import os
@@ -12,7 +12,7 @@ import unittest
 
 from support import Node, cles, environment, finish, free_port, read_line, start, wait_until
 
-RETURNS_WITHIN = 1.5  # seconds, on a machine that is not busy with anything else
+RETURNS_WITHIN = 1.5  # seconds, on an idle machine
 PATIENT = 1 + float(os.environ.get("CLES_TEST_PATIENCE", "30")) / 60
 
 
@@ -46,7 +46,7 @@ class Names(unittest.TestCase):
         return process
 
     def returns(self, noun):
-        """Seconds from when the next run of the publisher was started until its first update came."""
+        """Seconds from the start of the publisher's next incarnation to its first update."""
         first = self.node("--name", "car1")
         feed = self.feed(noun)
         for _ in range(3):
@@ -55,7 +55,7 @@ class Names(unittest.TestCase):
         begun = time.monotonic()
         second = self.node("--name", "car1")
         self.assertNotEqual(first.port, second.port)
-        # Updates of the first run may still wait to be read: of the second one there are five only later.
+        # Updates of the first incarnation may still be unread: five of the second one arrive only later.
         for _ in range(5):
             self.assertTrue(read_line(feed))
         took = time.monotonic() - begun
@@ -81,7 +81,7 @@ class Names(unittest.TestCase):
 
     def test_the_second_of_a_name_does_not_start(self):
         first = self.node("--name", "car1")
-        time.sleep(1.1)  # who starts within a second of another was not there first
+        time.sleep(1.1)  # nodes that start within a second count as simultaneous
         code, _, err = cles("serve", "--name", "car1", "--listen", "tcp://127.0.0.1:0", "-m", self.group, env=self.env)
         self.assertEqual(code, 1, err)
         self.assertIn(f"the node at {first.url} had the name 'car1' first", err)
@@ -121,7 +121,7 @@ class Names(unittest.TestCase):
         for i in range(3):
             start_daemon(self, f"sat{i}")
         wait_until(lambda: plain.ask("PULL self:cles/peers").count('"node"') == 3, "all are known")
-        time.sleep(3)  # until they have found out that it takes no part in gossip
+        time.sleep(3)  # until they have learned that it does not take part in gossip
 
         def counted():
             return json.loads(plain.ask("PULL self:cles/metrics"))
@@ -131,7 +131,7 @@ class Names(unittest.TestCase):
         after = counted()
         asked = after["housekeeping"] - before["housekeeping"]
         longest = max(len(plain.ask(f"PULL self:{noun}")) for noun in ("cles", "cles/peers"))
-        rate = asked * (longest + 200) / 5  # with what the questions take
+        rate = asked * (longest + 200) / 5  # including the time of the requests
         print(f"a plain node beside three daemons: {asked} questions in 5 s, at most {rate:.0f} bytes a second")
         self.assertLessEqual(rate, 1000)
         self.assertEqual((after["errors"], after["errors_unsent"]), (0, 0))

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""`cles pull`, `push`, `delegate`, `update`: answers, output forms, exit codes, and what is sent."""
+"""`cles pull`, `push`, `delegate`, `update`: replies, output formats, exit codes, and what is sent."""
 
 import json
 import signal
@@ -94,7 +94,7 @@ class Answers(NodeTest):
         out = self.run_ok("push", "car1:echo", "-d", '{"key":"abc","n":7}', "-o", "table", "-n", "2", "-i", "0")
         self.assertEqual(out, "key  n\nabc  7\nabc  7\n")
         out = self.run_ok("push", "car1:echo", "-d", '{"a":7,"bc":1234.5,"d":-3}', "-o", "table")
-        self.assertEqual(out, "a        7\nbc  1234.5\nd       -3\n")  # nothing but numbers
+        self.assertEqual(out, "a        7\nbc  1234.5\nd       -3\n")  # only numbers
 
     def test_the_wire_is_shown(self):
         code, out, err = self.run_at("pull", "car1:echo/x", "-vv")
@@ -170,7 +170,7 @@ class Failures(NodeTest):
 
 
 class Wire(unittest.TestCase):
-    """What the command sends, and how it takes what a node of another make answers."""
+    """What the command sends, and how it treats the replies of other implementations."""
 
     def ask(self, answer, *arguments):
         with ScriptedNode(lambda line, send: send(id_of(line) + answer)) as node:

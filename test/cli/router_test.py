@@ -40,7 +40,7 @@ class Router(unittest.TestCase):
     def test_one_that_is_known_is_asked(self):
         self.start_daemon("sat1")
         self.assertIn("seconds", self.run_ok("pull", "any:utc")[0])
-        self.assertEqual(self.run_ok("push", "any:echo", "-d", '{"a":1}'), [{"a": 1}])  # which car1 alone offers
+        self.assertEqual(self.run_ok("push", "any:echo", "-d", '{"a":1}'), [{"a": 1}])  # which only car1 offers
         self.assertEqual(list(self.run_ok("pull", "all:utc")[0]["results"]), ["sat1"])
         self.assertEqual(len(self.run_ok("pull", "any:utc", "-n", "3", "-i", "0")), 3)
 

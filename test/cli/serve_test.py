@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""`cles serve`: its tasks as they are on the wire, its endpoints, its end."""
+"""`cles serve`: its tasks on the wire, its endpoints, its termination."""
 
 import json
 import os
@@ -51,7 +51,7 @@ class Tasks(NodeTest):
 
     def test_the_vehicle_moves_as_it_says(self):
         first = json.loads(self.node.ask("PULL car1:localization"))
-        time.sleep(0.2)  # the time that passes is what is measured
+        time.sleep(0.2)  # the elapsed time is what is measured
         second = json.loads(self.node.ask("PULL car1:localization"))
         north = (second["lat"] - first["lat"]) * 111320
         east = (second["lon"] - first["lon"]) * 111320 * 0.6663

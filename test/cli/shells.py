@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Interactive shells on a terminal of their own, so that a completion is what somebody who types gets."""
+"""Interactive shells on a separate terminal, so that completion works as for a user who types."""
 
 import os
 import pty
@@ -10,21 +10,21 @@ import time
 
 from support import PATIENCE
 
-# A key that shows the line as it stands, so that a test sees what completion made of it.
+# A key that shows the current line, so that a test sees the result of completion.
 SHOW = "\x07"
 SHOWN = re.compile(rb"<<<(.*?)>>>")
 
 
 class Shell:
     def __init__(self, arguments, env, setup):
-        """Starts the shell, and gives it the lines of `setup`."""
+        """Starts the shell, and sends it the lines of `setup`."""
         self.pid, self.terminal = pty.fork()
         if self.pid == 0:
             os.execvpe(arguments[0], arguments, env)
         self.seen = b""
         for line in setup:
             self.send(line + "\n")
-        # The two parts are one only where it has been run.
+        # The two parts are joined only if it has been run.
         self.send("echo rea''dy\n")
         self.wait_for(re.compile(rb"ready\r\n"))
 
@@ -56,7 +56,7 @@ class Shell:
     def list(self, typed):
         """What several TABs show below the line.
 
-        Nodes announce themselves at most every 100 ms, and a completion waits 80 ms. So a TAB that follows at once upon a
+        Nodes announce themselves at most every 100 ms, and a completion waits 80 ms. So a TAB directly after a
         successful one may find no node. bash lists from the second TAB on: here that one or the third finds it.
         """
         self.send(typed + "\t\t\t")

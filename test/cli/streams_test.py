@@ -36,7 +36,7 @@ class Bind(NodeTest):
     def test_sees_updates_that_others_ask_for(self):
         self.run_ok("update", "car1:notice", "-d", '{"text":"hi"}')
         process = start("bind", "car1:notice", "-n", "2", "--at", self.node.url)
-        # Whether the binding is there shows only by what it brings.
+        # Only an update shows that the binding exists.
         for _ in range(200):
             self.run_ok("update", "car1:notice", "-d", '{"text":"hi"}')
             if process.poll() is not None:
@@ -53,7 +53,7 @@ class Bind(NodeTest):
 
     def test_a_reader_that_leaves_ends_it_quietly(self):
         self.run_ok("update", "car1:notice", "-d", '{"text":"last"}')
-        # Of notices no further one comes: it must notice all the same.
+        # There are no further notices; it must still detect that its reader has closed.
         for noun in ("car1:localization", "car1:notice"):
             process = start("bind", noun, "--at", self.node.url)
             self.assertTrue(read_line(process))

@@ -16,21 +16,21 @@ import time
 import unittest
 
 CLES = os.environ.get("CLES_COMMAND", "cles")
-# Sanitizers and busy machines are slow; nothing here takes long unless it hangs.
+# Sanitizers and busy machines are slow; everything here is quick unless it hangs.
 PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
 
 
 def environment(**more):
-    """The environment for a command, free of what the tester's own may hold."""
+    """The environment for a command, without the variables of the tester's own."""
     env = {k: v for k, v in os.environ.items() if k not in ("CLES_AT", "NO_COLOR")}
     env["TERM"] = "xterm"
-    env["CLES_MULTICAST"] = "off"  # but where a test is about it
+    env["CLES_MULTICAST"] = "off"  # unless a test needs it
     env.update(more)
     return env
 
 
 def cles(*arguments, stdin=None, env=None):
-    """Runs the command to its end; gives exit code, stdout, stderr."""
+    """Runs the command to its end; returns exit code, stdout, stderr."""
     done = subprocess.run([CLES, *arguments], input=stdin if stdin is not None else "", capture_output=True, text=True,
                           env=env or environment(), timeout=PATIENCE, check=False)
     return done.returncode, done.stdout, done.stderr
@@ -45,8 +45,8 @@ def start(*arguments, **options):
 
 
 def read_line(process, stream=None):
-    """The next line of a process's output, or a failure where none comes. Reads past Python's buffer, which would keep
-    further lines from being waited for."""
+    """The next line of a process's output, or a failure if none arrives. Bypasses Python's buffer, which would prevent
+    waiting for further lines."""
     stream = stream or process.stdout
     line = b""
     end = time.monotonic() + PATIENCE
@@ -64,7 +64,7 @@ def read_line(process, stream=None):
 
 
 def finish(process):
-    """Waits for the end; gives exit code and the rest of both streams."""
+    """Waits for the end; returns exit code and the rest of both streams."""
     try:
         out, err = process.communicate(timeout=PATIENCE)
     except subprocess.TimeoutExpired:
@@ -75,7 +75,7 @@ def finish(process):
 
 
 def free_port():
-    """A UDP port that nobody has, for a multicast group of the test's own."""
+    """An unused UDP port, for a separate multicast group of the test."""
     with socket.socket(type=socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
@@ -116,7 +116,7 @@ class Node:
         return s, s.makefile("r", encoding="utf-8", newline="\n")
 
     def ask(self, line):
-        """One line in, one line out, by a plain socket."""
+        """Sends one line and returns one line, over a plain socket."""
         s, answers = self.connect()
         with s, answers:
             s.sendall(line.encode() + b"\n")
@@ -133,7 +133,7 @@ class Node:
 
 
 class NodeTest(unittest.TestCase):
-    """Tests that talk to one node."""
+    """Tests that communicate with one node."""
 
     ARGUMENTS = ()
 
@@ -196,13 +196,13 @@ class ScriptedNode:
 
 
 def id_of(line):
-    """The `id=...` of a request line, with a space behind it where there is one."""
+    """The `id=...` of a request line, followed by a space if present."""
     found = re.search(r" (id=\d+)", line)
     return found.group(1) + " " if found else ""
 
 
 def on_terminal(*arguments, env=None, interrupt_after=None, keys=b"\x03"):
-    """Runs the command on a terminal of its own; gives exit code and all it showed. After it has shown
+    """Runs the command on a separate terminal; returns exit code and everything it showed. After it has shown
     `interrupt_after`, the keys are pressed."""
     pid, terminal = pty.fork()
     if pid == 0:
@@ -214,7 +214,7 @@ def on_terminal(*arguments, env=None, interrupt_after=None, keys=b"\x03"):
         if ready:
             try:
                 data = os.read(terminal, 65536)
-            except OSError:  # the other side has gone
+            except OSError:  # the other side is closed
                 break
             if not data:
                 break

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""What shows on a terminal only: tables, colours, progress, Ctrl-C."""
+"""What is shown only on a terminal: tables, colours, progress, Ctrl-C."""
 
 import unittest
 

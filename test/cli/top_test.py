@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""`cles top`: what nodes have to do, as it changes."""
+"""`cles top`: the load of nodes, as it changes."""
 
 import json
 import signal
@@ -25,7 +25,7 @@ class Top(unittest.TestCase):
             raise AssertionError(f"nodes ended with {codes}")
 
     def watch(self, *arguments):
-        """The documents of a run to its end."""
+        """All documents of a complete run."""
         code, out, err = cles("top", "-o", "json", *arguments, env=ENVIRONMENT)
         self.assertEqual((code, err), (0, ""))
         return [json.loads(line)["nodes"] for line in out.splitlines()]
@@ -39,7 +39,7 @@ class Top(unittest.TestCase):
                 self.assertEqual(node["load"], {"queued": 0, "running": 0, "workers": 0})
                 self.assertNotIn("failure", node)
         self.assertNotIn("requests_per_s", first[0])
-        self.assertEqual(second[0]["requests_per_s"], 0)  # its own questions do not count
+        self.assertEqual(second[0]["requests_per_s"], 0)  # its own requests do not count
         self.assertEqual(second[0]["errors_per_s"], 0)
 
     def test_rates(self):
@@ -48,7 +48,7 @@ class Top(unittest.TestCase):
         s, answers = self.nodes[1].connect()
         with s, answers:
             seen = None
-            while not seen:  # asks all the time, until it shows
+            while not seen:  # sends requests until they appear
                 s.sendall(b"PULL self:echo\nPULL self:nothing\n" * 20)
                 for _ in range(40):
                     answers.readline()
@@ -64,7 +64,7 @@ class Top(unittest.TestCase):
         top = start("top", "-o", "json", "-i", "200ms", env=ENVIRONMENT)
         try:
             while (nodes := json.loads(read_line(top))["nodes"])[0]["node"] != "car2":
-                self.assertEqual([node["node"] for node in nodes], ["car1", "car2"])  # until it has told
+                self.assertEqual([node["node"] for node in nodes], ["car1", "car2"])  # until it has reported
             self.assertEqual(nodes[0]["load"]["running"], 1)
             self.assertEqual(self.watch("--sort", "name", "-n", "1")[0][0]["node"], "car1")
         finally:
@@ -102,7 +102,7 @@ class Top(unittest.TestCase):
 
 class Spans(unittest.TestCase):
     def show(self, p99):
-        """The table of a node whose handlers took so many microseconds."""
+        """The table of a node whose handlers took this many microseconds."""
         handlers = {"samples": 2, "p50": 6.143, "p99": p99}
 
         def answer(line, send):

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Two hosts with a cable between them: network namespaces, which root makes as root, and others as the system lets users
-do so."""
+"""Two hosts with a cable between them: network namespaces, which root creates directly, and other users as far as the
+system permits."""
 
 import os
 import shutil
@@ -9,16 +9,16 @@ import unittest
 
 
 def cannot_be_made(why):
-    """Where everything is to be tested, that is a failure."""
+    """If everything has to be tested, that is a failure."""
     if os.environ.get("CI") == "true":
         raise AssertionError(why)
     raise unittest.SkipTest(why)
 
 
 class Hosts:
-    """`near` has 10.77.0.1 at v0, `far` has 10.77.0.2 at v1, unless others are given; both have loopback."""
+    """`near` has 10.77.0.1 at v0, `far` has 10.77.0.2 at v1, unless other addresses are given; both have loopback."""
 
-    # Of a user who is not root the namespace is one in which he is: a container or a change of root has none to give.
+    # A user who is not root is root in such a namespace: a container or a changed root directory may not permit it.
     IS_ROOT = os.geteuid() == 0
 
     def __init__(self, near=("v0", "10.77.0.1/24"), far=("v1", "10.77.0.2/24")):
@@ -39,7 +39,7 @@ class Hosts:
             cannot_be_made(f"no network namespaces here: {failure} {words.decode(errors='replace').strip()}")
 
     def _keep(self, command):
-        """A process that lives in a namespace of its own, and keeps it."""
+        """A process in a separate namespace, which keeps it alive."""
         keeper = subprocess.Popen([*command, "sh", "-c", "echo up; exec sleep infinity"], stdout=subprocess.PIPE,
                                   stderr=subprocess.PIPE)
         self.keepers.append(keeper)
@@ -49,7 +49,7 @@ class Hosts:
 
     @classmethod
     def inside(cls, host):
-        """What a command begins with that runs there."""
+        """The prefix of a command that runs there."""
         user = [] if cls.IS_ROOT else ["--preserve-credentials", "--user"]
         return ["nsenter", *user, "--net", f"--target={host}"]
 

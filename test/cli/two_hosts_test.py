@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Nodes on two hosts find each other by name, over a cable that is nobody else's."""
+"""Nodes on two hosts discover each other by name, over a separate cable."""
 
 import json
 import re

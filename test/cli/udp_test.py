@@ -80,7 +80,7 @@ class UdpNode(unittest.TestCase):
             first, second = unheard.recv(2000), unheard.recv(2000)  # sent, and sent again
             self.assertEqual(first, second)
             sent = re.match(r"^PULL car1:localization id=\d+ deadline=(\d+)\n$", first.decode())
-            self.assertTrue(200 < int(sent[1]) <= 300, first)  # what is left when it is sent
+            self.assertTrue(200 < int(sent[1]) <= 300, first)  # the remaining time when it is sent
 
     def test_a_plain_socket_is_a_client(self):
         with self.plain() as s:

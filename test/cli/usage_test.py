@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Arguments that cannot be, each with a message that says why; help and version."""
+"""Invalid arguments, each with a message that says why; help and version."""
 
 import tempfile
 import unittest

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a project of somebody else's may look like: a service and a client in one program.
+// An example of another project's program: a service and a client in one program.
 #include <cles/service.hpp>
 #include <cles/version.hpp>
 
@@ -12,7 +12,7 @@ struct position {
 };
 BOOST_DESCRIBE_STRUCT(position, (), (lat, lon))
 
-// Others keep to other rules than ours: with our warnings as errors this would not compile.
+// Other projects have other rules than ours: with our warnings as errors this would not compile.
 int rounded(double degrees) {
     int unused;
     return degrees;

@@ -41,7 +41,7 @@ class Consumer(ForeignProject):
 
 
 def check_links(pages: Path) -> int:
-    """The links between installed pages lead somewhere."""
+    """The links between installed pages have existing targets."""
     count = 0
     for page in sorted(pages.rglob("*.md")):
         for target in LINK.findall(page.read_text(encoding="utf-8")):
@@ -53,7 +53,7 @@ def check_links(pages: Path) -> int:
 
 def check_daemon(consumer: Consumer, clesd: Path) -> None:
     """The installed daemon finds and loads the installed plugins by their names alone."""
-    if not clesd.exists():  # it was not built, and nothing of it is there
+    if not clesd.exists():  # it was not built, and nothing of it is installed
         expect(not list(clesd.parents[1].rglob("libcles-*.so")), "there are plugins without a daemon")
         return
     config = consumer.scratch / "clesd.yaml"
@@ -106,7 +106,7 @@ def install(consumer: Consumer) -> None:
     expect((pages / "docs" / "protocol.md").is_file(), "the protocol's page is missing")
     expect(check_links(pages) > 20, "the installed pages should link to each other")
 
-    # Nothing names a place of this machine, or what only tests need.
+    # Nothing contains a path of this machine, or what only tests need.
     for file in (f for f in prefix.rglob("*") if f.is_file()):
         data = file.read_bytes()
         for place in (source, consumer.options.build, consumer.scratch):
@@ -139,7 +139,7 @@ def pkg_config(consumer: Consumer) -> None:
         expect(("-DBOOST_ASIO_SEPARATE_COMPILATION" in flags) == separate, f"with {asio_flags} the flags are {flags}")
         compiled = [flag for flag in flags if flag.startswith(("-I", "-D", "-isystem", "-pthread"))]
         linked = [flag for flag in flags if flag not in compiled or flag == "-pthread"]
-        # In two steps, which ccache remembers.
+        # In two steps, which ccache caches.
         object_file = consumer.scratch / "consumer.o"
         consumer.run(*launcher, consumer.options.compiler, "-std=c++20", "-c", HERE / "consumer.cpp", "-o", object_file,
                      *compiled)
@@ -158,7 +158,7 @@ def add_subdirectory(consumer: Consumer) -> None:
     build = consumer.configure("add_subdirectory", source)
     consumer.run(consumer.options.cmake, "--build", build)
     consumer.check(build / "my_program")
-    # Another project's installation is its own.
+    # Installing another project does not install the library.
     consumer.run(consumer.options.cmake, "--install", build, "--prefix", consumer.scratch / "prefix")
     expect(not (consumer.scratch / "prefix").exists(), "the library is part of another project's installation")
 

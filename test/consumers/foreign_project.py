@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""A project of somebody else's, built against CLES from outside of its tree."""
+"""Another project, built against CLES from outside of its tree."""
 
 import argparse
 import os
@@ -14,14 +14,14 @@ def expect(holds: bool, what: str) -> None:
 
 
 class ForeignProject:
-    """Lives in a folder that is emptied first."""
+    """Uses a folder that is emptied first."""
 
     def __init__(self, options: argparse.Namespace):
         self.options = options
         self.scratch: Path = options.scratch
         shutil.rmtree(self.scratch, ignore_errors=True)
         self.scratch.mkdir(parents=True)
-        # Nothing of the caller's setup helps; and what ccache knows of an earlier run counts, precompiled headers too.
+        # Without the caller's settings; the results of earlier runs in ccache are used, including precompiled headers.
         self.environment = {k: v for k, v in os.environ.items() if not k.startswith(("CMAKE_", "PKG_CONFIG"))}
         self.environment |= {"CCACHE_SLOPPINESS": "pch_defines,time_macros", "CCACHE_BASEDIR": str(options.source),
                              "CCACHE_NOHASHDIR": "1"}

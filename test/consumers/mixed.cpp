@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// The part of a program that compiles Asio's functions itself, beside one that takes them from the library. There is to
-// be one of each object that they share.
+// The part of a program that compiles Asio's functions itself, together with one that uses those of the library.
+// Objects that they share must exist only once.
 #include <cles/service.hpp>
 
 #include "separate_part.hpp"

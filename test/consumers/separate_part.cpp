@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The part of a program that takes Asio's functions from the library.
+// The part of a program that uses Asio's functions from the library.
 #include "separate_part.hpp"
 
 #include <boost/asio/error.hpp>

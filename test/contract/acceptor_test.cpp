@@ -49,7 +49,7 @@ const auto shortages = boost::unit_test::data::make({EMFILE, ENFILE, ENOBUFS, EN
 } // namespace
 
 // The connection stays in the queue, so the socket remains readable.
-BOOST_DATA_TEST_CASE(it_does_not_spin_and_goes_on_when_the_shortage_is_over, shortages, error) {
+BOOST_DATA_TEST_CASE(it_does_not_spin_and_continues_after_the_shortage, shortages, error) {
     link_pair pair{carrier::tcp4};
     attempts = 0;
     fails_with = error;

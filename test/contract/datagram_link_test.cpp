@@ -45,21 +45,21 @@ using lines = std::vector<std::string>;
 
 } // namespace
 
-BOOST_DATA_TEST_CASE(it_says_what_a_datagram_holds, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(it_reports_the_size_of_a_datagram, every_datagram, kind) {
     link_pair pair{kind};
     pair.connect();
     BOOST_TEST(pair.near.link->datagram() == 1200U);
     BOOST_TEST(pair.far.link->datagram() == 1200U);
 }
 
-BOOST_DATA_TEST_CASE(a_stream_says_that_it_is_none, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(a_stream_reports_that_it_has_no_datagrams, every_carrier, kind) {
     link_pair pair{kind};
     pair.connect();
     BOOST_TEST(pair.near.link->datagram() == 0U);
     BOOST_TEST(pair.far.run([&] { return pair.far.link->datagram(); }) == 0U);
 }
 
-BOOST_DATA_TEST_CASE(each_line_crosses_both_ways_with_a_batch_of_its_own, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(each_line_arrives_in_both_directions_with_a_separate_batch, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.near.say("one\ntwo\n");
@@ -95,7 +95,7 @@ BOOST_DATA_TEST_CASE(several_lines_in_one_datagram_are_handed_over_as_they_came,
     BOOST_TEST(pair.far.events->lines[0] == "one\ntwo"); // the session refuses it
 }
 
-BOOST_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_nobody_comes_in_by_it, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_makes_no_link, every_datagram, kind) {
     link_pair pair{kind};
     plain_socket someone{pair.io, pair.address()};
     for (const auto* nothing : {"", "\n", "\r\n"}) {
@@ -108,7 +108,7 @@ BOOST_DATA_TEST_CASE(an_empty_datagram_is_ignored_and_nobody_comes_in_by_it, eve
     BOOST_TEST(pair.far.events->lines[0] == "x");
 }
 
-BOOST_DATA_TEST_CASE(one_over_the_limit_is_told_and_the_link_goes_on, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(one_over_the_limit_is_reported_and_the_link_continues, every_datagram, kind) {
     link_pair pair{kind};
     plain_socket someone{pair.io, pair.address()};
     someone.send(std::string(1200, 'a'));
@@ -165,7 +165,7 @@ BOOST_AUTO_TEST_CASE(what_waits_behind_the_first_datagram_of_a_source_leaves_it_
     BOOST_TEST((events->lines == lines{"the first", "2nd", "a longer third"}));
 }
 
-BOOST_DATA_TEST_CASE(a_link_that_was_dialled_hears_its_peer_alone, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(a_dialled_link_receives_only_from_its_peer, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     // The port of the near end is known to the far end.
@@ -200,7 +200,7 @@ BOOST_DATA_TEST_CASE(a_flood_is_handed_over_in_turns, every_datagram, kind) {
     BOOST_TEST(seen_by_others <= 257U);
 }
 
-BOOST_DATA_TEST_CASE(what_comes_while_a_link_is_paused_is_lost, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(what_arrives_while_a_link_is_paused_is_lost, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.until([&] { return pair.far.lines() == 1; });
@@ -213,7 +213,7 @@ BOOST_DATA_TEST_CASE(what_comes_while_a_link_is_paused_is_lost, every_datagram, 
     BOOST_TEST(pair.far.events->lines[1] == "heard");
 }
 
-BOOST_DATA_TEST_CASE(nobody_listening_is_no_error_but_silence, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(a_missing_listener_is_not_an_error, every_datagram, kind) {
     link_pair pair{kind};
     pair.stop_listening();
     cles::link_ptr made;
@@ -252,7 +252,7 @@ BOOST_DATA_TEST_CASE(links_outlive_their_acceptor_and_the_address_is_free_after_
     BOOST_CHECK_NO_THROW(pair.transport().listen(pair.io.get_executor(), pair.address(), pair.bounds()));
 }
 
-BOOST_DATA_TEST_CASE(a_closed_link_says_nothing_and_its_source_may_come_in_again, every_datagram, kind) {
+BOOST_DATA_TEST_CASE(a_closed_link_is_silent_and_its_source_may_make_a_new_one, every_datagram, kind) {
     link_pair pair{kind};
     pair.open();
     pair.until([&] { return pair.far.lines() == 1; });

@@ -74,7 +74,7 @@ struct fixture {
 
 } // namespace
 
-BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixture) {
+BOOST_FIXTURE_TEST_CASE(every_member_receives_what_one_sends_with_its_source, fixture) {
     member one{io, where};
     member two{io, where};
     BOOST_TEST(one.port->send("BIND all:x\n").bytes == 11U);
@@ -90,7 +90,7 @@ BOOST_FIXTURE_TEST_CASE(every_member_hears_what_one_sends_with_its_source, fixtu
 }
 
 // Each receives it in a separate function.
-BOOST_FIXTURE_TEST_CASE(what_one_does_about_a_datagram_is_done_before_the_next_hears_it, fixture) {
+BOOST_FIXTURE_TEST_CASE(each_member_completes_its_reaction_before_the_next_receives, fixture) {
     member one{io, where};
     member two{io, where};
     asio::io_context elsewhere;
@@ -106,7 +106,7 @@ BOOST_FIXTURE_TEST_CASE(what_one_does_about_a_datagram_is_done_before_the_next_h
     BOOST_TEST(done_first == 3);
 }
 
-BOOST_FIXTURE_TEST_CASE(who_is_alone_on_its_executor_does_not_hear_itself, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_member_alone_on_its_executor_does_not_receive_itself, fixture) {
     member one{io, where};
     asio::io_context elsewhere;
     member two{elsewhere, where};
@@ -180,7 +180,7 @@ BOOST_FIXTURE_TEST_CASE(a_line_that_cannot_be_sent_is_lost_alone, fixture) {
     BOOST_TEST(two.heard == (std::vector<std::string>{"1\n", "2\n"}), boost::test_tools::per_element());
 }
 
-BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_hears_hears_no_more, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_member_that_closes_while_it_receives_receives_no_more, fixture) {
     member one{io, where};
     member two{io, where};
     two.close_at_next = true;
@@ -214,7 +214,7 @@ BOOST_FIXTURE_TEST_CASE(what_one_member_throws_keeps_nothing_from_the_others, fi
     BOOST_TEST(two.heard == one.heard, boost::test_tools::per_element());
 }
 
-BOOST_FIXTURE_TEST_CASE(the_others_hear_on_when_one_of_them_leaves_and_one_that_comes_back_does_too, fixture) {
+BOOST_FIXTURE_TEST_CASE(the_others_still_receive_when_one_leaves_and_it_does_again_after_rejoining, fixture) {
     member one{io, where};
     { const member passing{io, where}; }
     member two{io, where};
@@ -272,7 +272,7 @@ BOOST_FIXTURE_TEST_CASE(datagrams_go_out_with_a_TTL_of_1, fixture) {
     BOOST_TEST(ttl == 1);
 }
 
-BOOST_FIXTURE_TEST_CASE(an_interface_that_is_none_is_refused, fixture) {
+BOOST_FIXTURE_TEST_CASE(an_invalid_interface_is_refused, fixture) {
     const auto code_of = [](const std::string& name) {
         try {
             cles::transport::find_interface(name);

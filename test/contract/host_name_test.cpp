@@ -117,14 +117,14 @@ BOOST_DATA_TEST_CASE(a_name_leads_to_its_host, schemes, scheme) {
     BOOST_TEST(one.link->peer().address == to_string(at->local()));
 }
 
-BOOST_DATA_TEST_CASE(a_name_that_nobody_has_is_an_error, schemes, scheme) {
+BOOST_DATA_TEST_CASE(an_unknown_name_is_an_error, schemes, scheme) {
     asio::io_context io;
     dialled one{io, scheme + "://nobody.test:4000"};
     run_until(io, [&] { return one.calls != 0; });
     BOOST_TEST((one.code == asio::error::host_not_found));
 }
 
-BOOST_DATA_TEST_CASE(while_a_name_is_looked_up_the_loop_goes_on_and_the_time_is_bounded, schemes, scheme) {
+BOOST_DATA_TEST_CASE(while_a_name_is_resolved_the_loop_runs_and_the_time_is_bounded, schemes, scheme) {
     asio::io_context io;
     const slowness names;
     dialled one{io, scheme + "://car1.slow.test:4000", 100ms};
@@ -143,7 +143,7 @@ BOOST_DATA_TEST_CASE(while_a_name_is_looked_up_the_loop_goes_on_and_the_time_is_
     BOOST_TEST(turns > 2);
 }
 
-BOOST_DATA_TEST_CASE(a_lookup_that_is_given_up_says_nothing_any_more, schemes, scheme) {
+BOOST_DATA_TEST_CASE(a_cancelled_lookup_does_not_report, schemes, scheme) {
     asio::io_context io;
     auto names = std::make_unique<slowness>();
     dialled one{io, scheme + "://car1.slow.test:4000"};

@@ -131,7 +131,7 @@ BOOST_DATA_TEST_CASE(a_peer_that_vanishes_after_its_end_of_stream_is_noticed, ev
     BOOST_TEST(pair.far.events->in_order());
 }
 
-BOOST_DATA_TEST_CASE(nothing_follows_close_and_the_peer_is_told, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(no_event_follows_close_and_the_peer_is_notified, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.say("on its way\n");
@@ -401,7 +401,7 @@ BOOST_DATA_TEST_CASE(a_reset_while_finishing_is_a_loss, every_socket, kind) {
     BOOST_TEST(pair.far.events->count('x') == 1U);
 }
 
-BOOST_DATA_TEST_CASE(a_write_to_a_peer_that_is_gone_is_a_loss_told_later, every_socket, kind) {
+BOOST_DATA_TEST_CASE(a_write_to_a_closed_peer_is_a_loss_reported_later, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();

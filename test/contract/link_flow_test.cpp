@@ -112,7 +112,7 @@ BOOST_DATA_TEST_CASE(on_writable_follows_any_flush_that_left_something, every_ca
     BOOST_TEST(pair.near.events->has('r') == left);
 }
 
-BOOST_DATA_TEST_CASE(a_paused_link_hands_nothing_over_until_it_goes_on, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(a_paused_link_delivers_nothing_until_it_is_resumed, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });
@@ -179,7 +179,7 @@ BOOST_DATA_TEST_CASE(a_paused_link_still_writes, every_carrier, kind) {
     pair.until([&] { return pair.near.lines() == 1; });
 }
 
-BOOST_DATA_TEST_CASE(a_socket_that_nobody_reads_fills_and_drains, every_socket, kind) {
+BOOST_DATA_TEST_CASE(an_unread_socket_fills_and_drains, every_socket, kind) {
     link_pair pair{kind};
     scripted_peer peer{pair.io, to_string(pair.address()), buffers::small};
     pair.accept();

@@ -47,7 +47,7 @@ std::size_t bytes_of(const std::vector<std::string>& lines) {
 
 } // namespace
 
-BOOST_DATA_TEST_CASE(lines_cross_whole_and_in_order_both_ways, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(lines_arrive_whole_and_in_order_in_both_directions, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     const auto there = numbered_lines(3000, 'x');
@@ -140,7 +140,7 @@ BOOST_DATA_TEST_CASE(lines_of_a_mebibyte_cross, every_carrier, kind) {
     BOOST_TEST(pair.far.run([&] { return pair.far.events->lines[5] == "small"; }));
 }
 
-BOOST_DATA_TEST_CASE(one_over_the_limit_is_told_once_and_no_line_follows, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(one_over_the_limit_is_reported_once_and_no_line_follows, every_carrier, kind) {
     link_pair pair{kind, {.line = 5000}};
     pair.open();
     pair.near.say("before\n" + std::string(5001, 'x') + "\nafter\n");
@@ -177,7 +177,7 @@ BOOST_DATA_TEST_CASE(bytes_one_at_a_time_make_the_same_lines, every_socket, kind
     BOOST_TEST((pair.far.events->lines == std::vector<std::string>{"PULL self:cles\r", "", "{\"a\":1}", "last"}));
 }
 
-BOOST_DATA_TEST_CASE(an_endless_line_is_told_as_soon_as_it_is_too_long, every_socket, kind) {
+BOOST_DATA_TEST_CASE(an_endless_line_is_reported_as_soon_as_it_is_too_long, every_socket, kind) {
     link_pair pair{kind, {.line = 5000}};
     scripted_peer peer{pair.io, to_string(pair.address())};
     pair.accept();

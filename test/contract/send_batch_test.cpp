@@ -112,7 +112,7 @@ BOOST_DATA_TEST_CASE(each_line_is_a_datagram_of_its_own, boost::unit_test::data:
     }
 }
 
-BOOST_AUTO_TEST_CASE(where_the_system_does_not_part_them_each_goes_alone) {
+BOOST_AUTO_TEST_CASE(where_the_system_does_not_split_them_each_is_sent_alone) {
     const int off = 1; // without checksums it is not possible
     BOOST_REQUIRE(::setsockopt(from.native_handle(), SOL_SOCKET, SO_NO_CHECK, &off, sizeof off) == 0);
     cles::transport::receive_batch::prepare(to);

@@ -56,20 +56,20 @@ struct fixture {
 
 BOOST_FIXTURE_TEST_SUITE(stream_dialler, fixture)
 
-BOOST_AUTO_TEST_CASE(takes_the_first_that_answers) {
+BOOST_AUTO_TEST_CASE(uses_the_first_that_accepts) {
     tcp::acceptor other{io, {loopback, 0}};
     BOOST_TEST(dial({listener.local_endpoint(), other.local_endpoint()}) == success);
 }
 
-BOOST_AUTO_TEST_CASE(goes_on_past_those_where_nobody_listens) {
+BOOST_AUTO_TEST_CASE(tries_the_next_where_there_is_no_listener) {
     BOOST_TEST(dial({nobody(), nobody(), listener.local_endpoint()}) == success);
 }
 
-BOOST_AUTO_TEST_CASE(fails_with_the_last_failure_where_nobody_answers) {
+BOOST_AUTO_TEST_CASE(fails_with_the_last_failure_if_none_accepts) {
     BOOST_TEST(dial({nobody(), nobody()}) == "Connection refused");
 }
 
-BOOST_AUTO_TEST_CASE(nothing_comes_after_it_was_given_up) {
+BOOST_AUTO_TEST_CASE(no_event_follows_cancellation) {
     bool called = false;
     const auto d = std::make_shared<dialler>(
         io.get_executor(), cles::limits{}, [](stream_socket&) { return cles::identity{}; },

@@ -55,12 +55,12 @@ boost::system::error_code listen_failure(asio::io_context& io, const cles::url& 
 
 } // namespace
 
-BOOST_AUTO_TEST_CASE(a_scheme_that_nobody_registered_has_no_transport) {
+BOOST_AUTO_TEST_CASE(an_unregistered_scheme_has_no_transport) {
     BOOST_TEST(cles::find_transport("smoke") == nullptr);
     BOOST_TEST(cles::find_transport("") == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, every_door, kind) {
+BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, listening_carriers, kind) {
     link_pair pair{kind};
     if (pair.address().scheme == "tcp" || pair.address().scheme == "udp") {
         BOOST_TEST(pair.address().port != 0);
@@ -70,7 +70,7 @@ BOOST_DATA_TEST_CASE(the_acceptor_knows_its_real_address, every_door, kind) {
     pair.open();
 }
 
-BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, every_door, kind) {
+BOOST_DATA_TEST_CASE(both_ends_know_who_the_other_is, listening_carriers, kind) {
     link_pair pair{kind};
     pair.connect();
     const auto far = pair.far.run([&] { return pair.far.link->peer(); });
@@ -115,7 +115,7 @@ BOOST_DATA_TEST_CASE(many_links_come_in_by_one_acceptor, every_carrier, kind) {
     }
 }
 
-BOOST_DATA_TEST_CASE(dialling_where_nobody_listens_is_refused_and_never_inside_the_call, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(dialling_without_a_listener_is_refused_and_never_inside_the_call, every_carrier, kind) {
     link_pair pair{kind};
     pair.stop_listening();
     dial_result result;
@@ -130,7 +130,7 @@ BOOST_DATA_TEST_CASE(dialling_where_nobody_listens_is_refused_and_never_inside_t
     BOOST_TEST(fits, result.code.message());
 }
 
-BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, every_door, kind) {
+BOOST_DATA_TEST_CASE(a_dial_that_was_given_up_never_calls_back, listening_carriers, kind) {
     link_pair pair{kind};
     dial_result result;
     const auto give_up =
@@ -193,14 +193,14 @@ BOOST_AUTO_TEST_CASE(a_unix_socket_whose_queue_is_full_is_an_error_and_no_link) 
     BOOST_TEST(dials.back()->made == nullptr);
 }
 
-BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, every_door, kind) {
+BOOST_DATA_TEST_CASE(an_address_in_use_is_refused, listening_carriers, kind) {
     link_pair pair{kind};
     asio::io_context other;
     BOOST_TEST(listen_failure(other, pair.address()) == asio::error::address_in_use);
     pair.open(); // and the first one is not affected
 }
 
-BOOST_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_gone, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_destroyed, every_carrier, kind) {
     link_pair pair{kind};
     pair.open();
     pair.stop_listening();
@@ -209,7 +209,7 @@ BOOST_DATA_TEST_CASE(an_address_is_free_again_after_its_acceptor_is_gone, every_
     pair.until([&] { return pair.far.lines() == 1; });
 }
 
-BOOST_DATA_TEST_CASE(nothing_comes_in_after_an_acceptor_was_closed, every_carrier, kind) {
+BOOST_DATA_TEST_CASE(nothing_is_accepted_after_an_acceptor_was_closed, every_carrier, kind) {
     link_pair pair{kind};
     dial_result result;
     pair.far.run([&] { // in one step, so that no connection arrives meanwhile
@@ -232,7 +232,7 @@ BOOST_AUTO_TEST_CASE(an_address_that_is_not_of_this_machine_is_refused) {
     }
 }
 
-BOOST_AUTO_TEST_CASE(a_host_name_that_nobody_knows_is_an_error) {
+BOOST_AUTO_TEST_CASE(an_unknown_host_name_is_an_error) {
     asio::io_context io;
     for (const std::string scheme : {"tcp", "udp"}) {
         BOOST_TEST(listen_failure(io, cles::parse_url(scheme + "://no.such.host.invalid:0")).failed());
@@ -280,7 +280,7 @@ struct socket_file {
 
 } // namespace
 
-BOOST_AUTO_TEST_CASE(a_socket_file_is_for_its_owner_alone_and_goes_with_its_acceptor) {
+BOOST_AUTO_TEST_CASE(a_socket_file_is_accessible_only_to_its_owner_and_removed_with_its_acceptor) {
     asio::io_context io;
     const socket_file file;
     const auto mask = ::umask(0);
@@ -293,7 +293,7 @@ BOOST_AUTO_TEST_CASE(a_socket_file_is_for_its_owner_alone_and_goes_with_its_acce
     BOOST_TEST(!file.exists());
 }
 
-BOOST_AUTO_TEST_CASE(a_socket_file_that_nobody_listens_at_is_replaced) {
+BOOST_AUTO_TEST_CASE(a_socket_file_without_a_listener_is_replaced) {
     asio::io_context io;
     const socket_file file;
     { const scripted_listener died{io, to_string(file.where)}; }

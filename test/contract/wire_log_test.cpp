@@ -65,7 +65,7 @@ struct fixture {
 
 BOOST_AUTO_TEST_SUITE(wire_log)
 
-BOOST_FIXTURE_TEST_CASE(whatever_is_asked_of_it_is_asked_of_the_link_inside, fixture) {
+BOOST_FIXTURE_TEST_CASE(every_call_is_forwarded_to_the_wrapped_link, fixture) {
     const auto owner = std::make_shared<link_recorder>();
     outside->start(owner);
     outside->pause(true);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Checks that every ```cpp and ```cmake block of the pages stands, line by line, in a file that is compiled or run.
+"""Checks that every ```cpp and ```cmake block of the pages occurs, line by line, in a file that is compiled or run.
 
     code_in_docs.py ROOT
 """

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs the part of the demonstration that shows a cluster: to its end, interrupted, and where it cannot work. It never
-leaves anything behind.
+"""Runs the part of the demonstration that shows a cluster: to its end, interrupted, and if it cannot work. It never
+leaves processes or files behind.
 
     demo_cluster_test.py SCRIPT FOLDER
 
@@ -19,16 +19,16 @@ import unittest
 from pathlib import Path
 
 SCRIPT, PROGRAMS = sys.argv[1], sys.argv[2]
-BOUND = 100  # seconds; it takes some two
+BOUND = 100  # seconds; it takes about two
 
 
 def members_of(session):
-    """The processes of a session, but those that have ended and only wait to be looked at."""
+    """The processes of a session, except those that have ended and have not been waited for."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             text = stat.read_text()
-        except OSError:  # it has gone meanwhile
+        except OSError:  # it has ended meanwhile
             continue
         state, _, _, its_session = text.rpartition(")")[2].split()[:4]
         if int(its_session) == session and state != "Z":
@@ -43,7 +43,7 @@ class Demo(unittest.TestCase):
         self.folder = Path(folder.name)
 
     def show(self, programs=PROGRAMS, interrupt=None, at="", **more):
-        """Exit code, stdout and stderr; with a signal as soon as a line with those words has come."""
+        """Exit code, stdout and stderr; with a signal as soon as a line with those words has been read."""
         files = self.folder / "files"
         files.mkdir(exist_ok=True)
         with tempfile.TemporaryFile("w+") as errors:
@@ -68,7 +68,7 @@ class Demo(unittest.TestCase):
         return code, said, complaint
 
     def test_it_shows_what_it_promises(self):
-        # What the user's own environment says to daemons and commands is not meant for these.
+        # Without the variables for daemons and commands in the user's own environment.
         code, said, complaint = self.show(CLES_LISTEN="tcp://127.0.0.1:1", CLES_SEEDS="nonsense", CLES_AT="nonsense")
         self.assertEqual((code, complaint), (0, ""), said)
         for name in ("sat1", "sat2", "sat3", "sat4"):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Checks that each numbered example can be copied out alone: it includes nothing that lies beside it.
+"""Checks that each numbered example can be copied alone: it includes no other file of its folder.
 
     examples_stand_alone.py ROOT
 """
@@ -9,7 +9,7 @@ import re
 import sys
 from pathlib import Path
 
-# Its idea is one file of tasks in three programs, so that it needs the file.
+# It shows one file of tasks in three programs, so it needs that file.
 SHARES_A_FILE = {"14_three_homes.cpp": ["three_homes/odometer.hpp"]}
 
 

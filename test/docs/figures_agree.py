@@ -4,7 +4,7 @@
 
     figures_agree.py ROOT
 
-Looked at are decimals in lines that speak of microseconds or of a p50 or p99, and all those of the README's comparison.
+It checks decimals in lines with microseconds, a p50 or a p99, and all those of the README's comparison.
 """
 
 import re

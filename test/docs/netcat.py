@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Stands for netcat where none is installed: sends its input, half-closes with -N, prints what comes back.
+"""Replaces netcat if it is not installed: sends its input, half-closes with -N, prints what it receives.
 
     netcat.py [-N] HOST PORT
     netcat.py [-N] -U PATH

@@ -12,7 +12,7 @@ FENCE = re.compile(r"^(?P<mark>```+)(?P<info>.*)$")
 class Block:
     line: int  # of its first line
     language: str
-    note: str  # what stands behind the language, as in "sh no-test: it needs two machines"
+    note: str  # what follows the language, as in "sh no-test: it needs two machines"
     lines: list[str] = field(default_factory=list)
 
     @property
@@ -21,7 +21,7 @@ class Block:
 
     @property
     def host(self) -> str:
-        """"1" or "2" of "console host-2 any-numbers"; empty where nothing is said."""
+        """"1" or "2" of "console host-2 any-numbers"; empty if there is none."""
         found = re.search(r"(?:^| )host-([12])(?: |$)", self.note)
         return found[1] if found else ""
 

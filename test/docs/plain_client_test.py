@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Takes the client out of docs/write_your_own_client.md and lets it talk to a node.
+"""Extracts the client from docs/write_your_own_client.md and runs it against a node.
 
     plain_client_test.py PAGE CLES
 """
@@ -44,7 +44,7 @@ def main(page: Path, cles: str) -> None:
         names: dict = {}
         exec(client_code, names)
 
-        # As the page uses it.
+        # As on the page.
         said = io.StringIO()
         with contextlib.redirect_stdout(said):
             exec(use_code.replace("25370", str(port)), names)
@@ -59,7 +59,7 @@ def main(page: Path, cles: str) -> None:
         expect(len(updates) == 3 and all(u[0] == "car1:localization" for u in updates), "BIND: three updates")
         expect(int(updates[0][1]) < int(updates[1][1]) < int(updates[2][1]), "BIND: in order")
 
-        # What the page says besides.
+        # Further statements of the page.
         car = names["Client"]("127.0.0.1", port)
         for noun, code in (("car1:nothing", "no_task"), ("car2:localization", "no_target")):
             try:

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Checks that the README stays short enough to be read: 900 words, counted as `wc -w` does.
+"""Checks that the README stays short: at most 900 words, counted as `wc -w` does.
 
     readme_length.py ROOT
 """

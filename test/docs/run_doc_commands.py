@@ -49,12 +49,12 @@ class Mistake(Exception):
 
 
 class Substitution:
-    """Between what the page says and what is run."""
+    """Translates between the page and what is run."""
 
     def __init__(self, build: Path, scratch: Path, own_ports: bool = False):
         self.build = str(build)
         self.scratch = str(scratch)
-        self.own_ports = own_ports  # the host is the page's own, so that its ports are free
+        self.own_ports = own_ports  # the host is used only by this page, so its ports are free
         self.ports: dict[str, str] = {}
 
     def to_run(self, command: str) -> str:
@@ -86,7 +86,7 @@ class Shell:
             stderr=subprocess.STDOUT)
 
     def run(self, command: str) -> tuple[int, str]:
-        """Its exit status, and what it printed."""
+        """Its exit status and output."""
         self._send(f"{{ {command}\n}} </dev/null\n")
         return self._finish(command)
 
@@ -135,7 +135,7 @@ class Shell:
 
 
 def commands_of(block: Block) -> list[tuple[int, str, list[str]]]:
-    """(line, command, what it prints), the last being empty for a block without outputs."""
+    """(line, command, output); the output is empty for a block without outputs."""
     result: list[tuple[int, str, list[str]]] = []
     goes_on = False
     for number, line in enumerate(block.lines, block.line):

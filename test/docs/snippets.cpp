@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// The pieces of code that the pages show, in one file that compiles. test/docs/code_in_docs.py looks for each of them
-// here and in the examples.
+// The code blocks of the pages, in one file that is compiled. test/docs/code_in_docs.py looks for each of them here and
+// in the examples.
 #include <cles/service.hpp>
 #include <cles/setting_error.hpp>
 

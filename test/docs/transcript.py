@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Compares what a program printed with what a page says it prints, where `...` stands for anything."""
+"""Compares the output of a program with the output that a page shows, where `...` stands for anything."""
 
 import difflib
 import re

@@ -26,12 +26,12 @@ BOOST_AUTO_TEST_CASE(nothing_near_the_best_is_better) {
     }
 }
 
-// Of two classes with the variance 1, d apart, the least error of a line is 1/4 / (1 + d^2/4).
+// For two classes with the variance 1, d apart, the minimum error of a line is 1/4 / (1 + d^2/4).
 BOOST_AUTO_TEST_CASE(the_best_is_as_good_as_theory_has_it) {
     const auto q = judge(data, least_squares(data));
     BOOST_TEST(q.mse == q.least_mse);
     BOOST_TEST(std::abs(q.least_mse - 0.25 / (1 + 49 / 4.0)) < 3e-4);
-    // Half the distance is 3.5 standard deviations, past which 0.023 % of a normal distribution lie.
+    // Half the distance is 3.5 standard deviations; 0.023 % of a normal distribution are beyond that.
     BOOST_TEST(q.wrong > 0);
     BOOST_TEST(q.wrong < 6e-4);
 }

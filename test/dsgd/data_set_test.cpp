@@ -20,7 +20,7 @@ BOOST_AUTO_TEST_CASE(a_recipe_gives_the_same_points_again) {
     }
 }
 
-// Where a machine or a library draws otherwise, its data would be other under the same recipe.
+// If a machine or a library generated other numbers, the same recipe would produce other data.
 BOOST_AUTO_TEST_CASE(the_points_are_those_of_all_machines) {
     const sgd::data_set data{sgd::recipe{.seed = 1, .per_class = 2}};
     BOOST_TEST(data[0].x == -2.0454215287689097, boost::test_tools::tolerance(1e-12));
@@ -47,7 +47,7 @@ BOOST_AUTO_TEST_CASE(each_class_is_normally_distributed_about_its_mean) {
             product += dx * dy;
             within += std::abs(dx) < 1 ? 1 : 0;
         }
-        // Some five standard errors.
+        // About five standard errors.
         BOOST_TEST(std::abs(x / 50'000) < 0.023);
         BOOST_TEST(std::abs(y / 50'000) < 0.023);
         BOOST_TEST(std::abs(squares / 100'000 - 1) < 0.023);

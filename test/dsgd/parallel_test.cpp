@@ -90,7 +90,7 @@ BOOST_AUTO_TEST_CASE(threads_give_what_one_after_the_other_gives) {
     }
 }
 
-// The shards' errors differ, so that their mean is nearer to the best line than they are.
+// The shards' errors differ, so their mean is closer to the best line than each of them.
 BOOST_AUTO_TEST_CASE(the_mean_is_better_than_its_parts) {
     const sgd::data_set data{sgd::recipe{.per_class = 10'000}};
     const auto parts = train_here(

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Distributed stochastic gradient descent as its users run it: daemons, and the manager as a process of its own. Whoever
-computes, the result is the same; whoever is killed, each shard's fate is told."""
+"""Distributed stochastic gradient descent as its users run it: daemons, and the manager as a separate process. The
+result does not depend on the workers; if a process is killed, the outcome of each shard is reported."""
 
 import functools
 import json
@@ -15,7 +15,7 @@ from support import PATIENCE, finish, wait_until
 
 DSGD = os.environ["DSGD"]
 PLUGIN = os.environ["SGD_PLUGIN"]
-LONG, ENDLESS = "600", "1000000"  # epochs: some tenths of a second for a shard, and more than anybody waits for
+LONG, ENDLESS = "600", "1000000"  # epochs: some tenths of a second for a shard, and longer than any test waits
 
 
 def node(name, *seeds, plugin=f"plugins: [{PLUGIN}]\n"):
@@ -125,7 +125,7 @@ class Manager(unittest.TestCase):
         self.assertRegex(out, r"(?m)^mse +0\.01\d{5}; best possible 0\.01\d{5}; 0\.0\d{3} % of the points")
         self.assertRegex(err, r"(?m)^cles-dsgd: [1-9]\d % of 2 shards$")
 
-    # -- who is killed ---------------------------------------------------------------------------------------------------
+    # -- processes that are killed -------------------------------------------------------------------------------------
 
     def test_a_lost_nodes_shards_are_delegated_again(self):
         with Cluster() as cluster:
@@ -174,7 +174,7 @@ class Manager(unittest.TestCase):
             wait_until_running(cluster.sat2, 2)
             manager.kill()
             manager.communicate(timeout=PATIENCE)
-            wait_until_running(cluster.sat1, 0)  # nobody waits for what they were doing
+            wait_until_running(cluster.sat1, 0)  # their results are no longer needed
             wait_until_running(cluster.sat2, 0)
             report, _ = self.check(["--at", cluster.sat1.url, "-e", "5"])
             self.assertEqual(self.fates(report), ["done"] * 4)

@@ -7,7 +7,7 @@
 
 BOOST_AUTO_TEST_SUITE(random_source)
 
-// The first numbers from 1234567, as the authors' own code gives them.
+// The first numbers from 1234567, as the authors' code produces them.
 BOOST_AUTO_TEST_CASE(it_is_splitmix64) {
     sgd::random_source chance{1234567};
     BOOST_TEST(chance.next() == 6457827717110365317U);

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs the measurement of the paper's Table 2 in its quick form, and looks at what it says.
+"""Runs the measurement of the paper's Table 2 in its quick form, and checks its output.
 
     table_test.py FOLDER PROGRAMS
 

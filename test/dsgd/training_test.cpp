@@ -22,7 +22,7 @@ sgd::classifier trained(sgd::shard part, const sgd::schedule& how, const sgd::cl
 
 BOOST_AUTO_TEST_SUITE(training)
 
-// Algorithm 1, written down once more.
+// A second implementation of algorithm 1.
 BOOST_AUTO_TEST_CASE(each_step_goes_against_the_gradient_at_a_drawn_point) {
     sgd::random_source chance{5};
     sgd::classifier c;

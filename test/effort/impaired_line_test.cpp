@@ -22,7 +22,7 @@ bad_line::frame frame_of(std::size_t size, int mark = 0) { return bad_line::fram
 
 double milliseconds(clock_type::duration time) { return std::chrono::duration<double, std::milli>(time).count(); }
 
-/// When each of so many frames arrives, sent with so much time in between.
+/// The arrival time of each of this many frames, sent at this interval.
 std::vector<clock_type::time_point> arrivals(bad_line& line, int frames, clock_type::duration interval) {
     std::vector<clock_type::time_point> found;
     for (int i = 0; i < frames; ++i) {
@@ -68,7 +68,7 @@ BOOST_AUTO_TEST_CASE(each_frame_takes_the_line_for_its_length) {
     bad_line line{{.delay = 1ms, .bits_per_s = 64'000}, 1}; // 8 bytes a millisecond
     line.send(start, frame_of(80));
     line.send(start, frame_of(160));
-    line.send(start + 1s, frame_of(8)); // the line has been free for long: nothing is saved up
+    line.send(start + 1s, frame_of(8)); // the line has been idle for long: unused capacity is not saved
     const auto next = [&] {
         const auto at = line.next_arrival();
         BOOST_REQUIRE(at.has_value());
@@ -83,7 +83,7 @@ BOOST_AUTO_TEST_CASE(each_frame_takes_the_line_for_its_length) {
 BOOST_AUTO_TEST_CASE(jitter_has_its_mean_and_keeps_the_order) {
     bad_line line{{.delay = 2ms, .jitter = 1ms}, 1};
     const int frames = 20'000;
-    const auto interval = 100ms; // far enough apart that none holds up the next
+    const auto interval = 100ms; // long enough that no frame delays the next
     const auto found = arrivals(line, frames, interval);
     BOOST_REQUIRE(found.size() == std::size_t{frames});
     double sum = 0;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs the measurement of the paper's Fig. 3 in its quick form, and looks at what it says.
+"""Runs the measurement of the paper's Fig. 3 in its quick form, and checks its output.
 
     latency_test.py FOLDER PROGRAMS
 
@@ -29,8 +29,8 @@ KINDS = list(latency.KINDS)
 
 @contextlib.contextmanager
 def foreign_node():
-    """Somebody's node on this host, which must not take part: in the default group on loopback, it has the name of the node
-    that is measured, and publishes the same."""
+    """An unrelated node on this host, which must not take part: in the default group on loopback, it has the name of
+    the node that is measured, and publishes the same."""
     with subprocess.Popen([f"{PROGRAMS}/cles", "serve", "--name", "car1", "--listen", "tcp://127.0.0.1:0", "--multicast", "lo",
                            "--allow-clash", "--rate", "20"], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
                           stderr=subprocess.DEVNULL, text=True) as process:
@@ -118,7 +118,7 @@ class Latency(unittest.TestCase):
             try:
                 self.assertNotIn(self.mark.encode(), (folder / "environ").read_bytes().split(b"\0"))
             except OSError:
-                continue  # it has ended meanwhile, or is none of ours
+                continue  # it has ended meanwhile, or is not ours
 
 
 class Statistics(unittest.TestCase):
@@ -128,7 +128,7 @@ class Statistics(unittest.TestCase):
         self.assertEqual(interval.quantile([7.0], 0.99), 7.0)
 
     def test_an_interval_over_rounds_holds_the_statistic_and_keeps_rounds_whole(self):
-        # Two exchanges that a disturbance slows alike: each varies, their ratio does not.
+        # Two exchanges that a disturbance slows equally: each varies, their ratio does not.
         rounds = [{"a": 10.0 * i, "b": 20.0 * i} for i in range(1, 20)]
         low, high = interval.interval_over(rounds, lambda some: sum(one["a"] for one in some) / len(some))
         self.assertTrue(low < 100 < high, (low, high))

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""The exchange by CLES takes at most as many lines as the paper's (section 4.1), and counting counts what it says.
+"""The exchange by CLES takes at most as many lines as the paper's (section 4.1), and the counting is correct.
 
     lines_test.py FOLDER
 """

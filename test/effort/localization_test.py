@@ -19,7 +19,7 @@ VALUES = re.compile(r"\d+ 48\.137154 11\.576124 27\.31 -0\.12\n")
 
 
 def read_line(process):
-    """The next line, or a failure where none comes. Reads past Python's buffer."""
+    """The next line, or a failure if none arrives. Bypasses Python's buffer."""
     line = b""
     end = time.monotonic() + PATIENCE
     while not line.endswith(b"\n"):
@@ -57,7 +57,7 @@ class Client:
         return read_line(self.process)
 
     def end(self):
-        """The exit code, and what it said of errors."""
+        """The exit code and its error output."""
         _, errors = self.process.communicate(timeout=PATIENCE)
         return self.process.returncode, errors.decode()
 
@@ -92,7 +92,7 @@ class Peer:
                 try:
                     self.act(client, client.recv(4096), self.over)
                 except OSError:
-                    pass  # the client has gone
+                    pass  # the client has disconnected
 
     def __enter__(self):
         return self
@@ -108,23 +108,23 @@ def silent(_client, _request, over):
 
 
 class Behaviour:
-    """What both programs keep to; a subclass says how each speaks."""
+    """The requirements for both programs; a subclass defines the format of each."""
 
     program = None
 
     def reply(self, request):
-        """A right reply to these bytes."""
+        """A valid reply to these bytes."""
         raise NotImplementedError
 
     def wrong_replies(self, request):
-        """Replies that are none, each with what it is."""
+        """Invalid replies, each with a description."""
         raise NotImplementedError
 
     wrong_requests = ()
     half_request = b""
 
     def run_against(self, act):
-        """One question to a scripted server: exit code, errors, seconds."""
+        """One request to a scripted server: exit code, errors, seconds."""
         with Peer(act) as peer:
             began = time.monotonic()
             done = subprocess.run([self.program, "client", f"127.0.0.1:{peer.port}"], input=b"\n", capture_output=True,
@@ -150,7 +150,7 @@ class Behaviour:
             self.assertEqual(client.end(), (0, ""))
 
     def test_a_scripted_reply_is_understood(self):
-        # So that what follows fails for what it says, and not for a script that is wrong.
+        # So that the following failures have the expected cause, and not an error in the script.
         code, errors, _ = self.run_against(lambda client, request, over: client.sendall(self.reply(request)))
         self.assertEqual((code, errors, self.last_output), (0, "", "1700000000 1.000000 -2.000000 3.50 0.00\n"))
 
@@ -202,7 +202,7 @@ class Behaviour:
         def act(client, request, over):
             for byte in self.reply(request):
                 client.sendall(bytes([byte]))
-                over.wait(0.2)  # all of it would take several times the limit
+                over.wait(0.2)  # the complete run would take several times the limit
 
         self.fails(act)
 
@@ -240,7 +240,7 @@ class Behaviour:
                     except TimeoutError:
                         raise
                     except OSError:
-                        pass  # it hung up, as it may
+                        pass  # it disconnected, which is allowed
             abrupt = socket.create_connection(("127.0.0.1", server.port))
             abrupt.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
             abrupt.sendall(self.half_request)

@@ -6,14 +6,14 @@
 #include <string>
 #include <string_view>
 
-/// What every target defines, and what it says with.
+/// What every target defines, and its functions for failures.
 
 namespace cles::fuzz {
 
-/// Does with the input what the target is for, and ends the program where it finds what must not be.
+/// Processes the input, and ends the program if an invariant is violated.
 void run(std::string_view input);
 
-/// Ends the program, saying why, unless it holds.
+/// Ends the program with this reason unless the condition holds.
 inline void require(bool holds, std::string_view what, std::string_view about = {}) {
     if (!holds) {
         const std::string text = "\nit does not hold that " + std::string{what} +

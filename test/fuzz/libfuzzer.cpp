@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Where libFuzzer hands over what it has thought of.
+// The entry point of libFuzzer for generated inputs.
 #include "fuzz/fuzz.hpp"
 
 #include <cstddef>

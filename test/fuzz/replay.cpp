@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Runs inputs that lie in files, without a fuzzer: what was once found is tried again in every build.
+// Runs inputs from files, without a fuzzer: inputs that once revealed a fault are repeated in every build.
 //
 //     fuzz_replay_TARGET FOLDER|FILE...
 #include "fuzz/fuzz.hpp"
@@ -41,7 +41,7 @@ int main(int argc, char** argv) {
             return 1;
         }
         const std::string input{std::istreambuf_iterator<char>{file}, {}};
-        std::fprintf(stderr, "%s\n", path.filename().c_str()); // the last one named is the one that fails
+        std::fprintf(stderr, "%s\n", path.filename().c_str()); // the last one printed is the one that fails
         cles::fuzz::run(input);
     }
     std::fprintf(stderr, "%zu inputs\n", files.size());

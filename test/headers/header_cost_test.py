@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Checks what the public headers make their users compile.
+"""Checks how much code the public headers add to the compilation of their users.
 
     header_cost_test.py --compiler CXX --headers DIR --define NAME... --scratch DIR
 

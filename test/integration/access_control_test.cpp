@@ -165,7 +165,7 @@ BOOST_AUTO_TEST_CASE(what_was_opened_before_a_listener_failed_is_closed_again) {
     BOOST_TEST(works.endpoints().size() == 1U);
 }
 
-BOOST_AUTO_TEST_CASE(names_that_no_node_may_bear_are_refused) {
+BOOST_AUTO_TEST_CASE(invalid_node_names_are_refused) {
     for (const std::string& name : {std::string{}, std::string{"self"}, std::string{"any"}, std::string{"all"},
                                     std::string{"car 1"}, std::string{"car/1"}, std::string{"c\xC3\xA4r"},
                                     std::string(65, 'x'), std::string{"car:1"}, std::string{"car\n"}}) {

@@ -87,7 +87,7 @@ BOOST_DATA_TEST_CASE(async_update_waits_for_a_peer_that_does_not_read, every_soc
     run_until(io, [&] { return publisher.done == count; });
 }
 
-BOOST_DATA_TEST_CASE(async_update_ends_with_its_service_and_goes_on_without_a_lost_binder, every_socket, kind) {
+BOOST_DATA_TEST_CASE(async_update_ends_with_its_service_and_continues_without_a_lost_subscriber, every_socket, kind) {
     boost::asio::io_context io;
     auto car = std::make_unique<cles::service>(io, listening("car1", kind));
     car->on_bind("place");
@@ -115,7 +115,7 @@ BOOST_DATA_TEST_CASE(async_update_ends_with_its_service_and_goes_on_without_a_lo
 }
 
 // Many waiting publications continue in one turn.
-BOOST_AUTO_TEST_CASE(who_publishes_holds_up_nobody_who_publishes_too) {
+BOOST_AUTO_TEST_CASE(publishers_do_not_delay_each_other) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", carrier::inproc)};
     std::vector<std::unique_ptr<steady_publisher>> all;
@@ -209,7 +209,7 @@ BOOST_AUTO_TEST_CASE(publishers_of_a_noun_go_on_in_their_order) {
     BOOST_TEST(feed.missed() == 0U);
 }
 
-BOOST_DATA_TEST_CASE(the_last_update_goes_out_before_the_service_ends, every_socket, kind) {
+BOOST_DATA_TEST_CASE(the_last_update_is_sent_before_the_service_ends, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     cles::service tower{io, knowing("tower", car)};
@@ -235,7 +235,7 @@ BOOST_AUTO_TEST_CASE(what_was_published_before_the_end_was_published) {
     run_until(io, [&] { return good == 3; });
 }
 
-BOOST_DATA_TEST_CASE(a_slow_binder_harms_nobody_and_gets_the_newest, every_socket, kind) {
+BOOST_DATA_TEST_CASE(a_slow_subscriber_delays_no_other_and_gets_the_newest, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind)};
     cles::service tower{io, knowing("tower", car)};
@@ -336,7 +336,7 @@ BOOST_DATA_TEST_CASE(small_limits_hold_back_and_let_go, carriers, kind) {
     BOOST_TEST(std::none_of(all.begin(), all.end(), [](const auto& a) { return a->code.failed(); }));
 }
 
-BOOST_DATA_TEST_CASE(past_the_limit_of_links_the_next_is_told_busy_and_closed, every_socket, kind) {
+BOOST_DATA_TEST_CASE(past_the_limit_of_links_the_next_is_refused_as_busy_and_closed, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind, {.links = 3})};
     std::vector<scripted_peer> peers;

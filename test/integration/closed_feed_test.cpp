@@ -80,7 +80,7 @@ BOOST_FIXTURE_TEST_SUITE(closed_feed, closed_feed_test::fixture)
 using namespace closed_feed_test;
 namespace data = boost::unit_test::data;
 
-BOOST_DATA_TEST_CASE(a_callback_is_told, data::make(every_how), h) {
+BOOST_DATA_TEST_CASE(a_callback_is_called, data::make(every_how), h) {
     feed one;
     shut(one, h);
     BOOST_TEST(!one.is_open());
@@ -131,7 +131,7 @@ BOOST_AUTO_TEST_CASE(a_handler_without_an_executor_runs_on_the_services) {
     run_until(io, [&] { return calls == 1; });
 }
 
-BOOST_AUTO_TEST_CASE(closing_and_destroying_call_nobody) {
+BOOST_AUTO_TEST_CASE(closing_and_destroying_call_no_handler) {
     int calls = 0;
     const auto take = [&](boost::system::error_code failed, const item&) {
         BOOST_TEST(failed == errc::cancelled);

@@ -98,7 +98,7 @@ asio::awaitable<void> await_deferred_kept(cles::service& tower) {
     co_await operation;
 }
 
-BOOST_AUTO_TEST_CASE(tokens_that_throw_give_the_peers_words) {
+BOOST_AUTO_TEST_CASE(tokens_that_throw_contain_the_peers_message) {
     nodes n;
     const auto thrown = [&](auto token) { return thrown_by(n.io, await_with(n.tower, std::move(token))); };
     const auto executor = n.io.get_executor();
@@ -187,7 +187,7 @@ BOOST_AUTO_TEST_CASE(what_succeeds_gives_its_value_all_the_same) {
     BOOST_TEST(thrown_by(n.io, take_values(n.tower)) == "nothing");
 }
 
-BOOST_AUTO_TEST_CASE(futures_throw_the_peers_words) {
+BOOST_AUTO_TEST_CASE(futures_throw_the_peers_message) {
     side_thread home;
     std::unique_ptr<nodes> n;
     home.run([&] { n = std::make_unique<nodes>(); });

@@ -183,7 +183,7 @@ BOOST_DATA_TEST_CASE(a_closed_feed_is_unbound_at_the_publisher, carriers, kind) 
     run_until(n.io, [&] { return again.items.size() == 1; });
 }
 
-BOOST_DATA_TEST_CASE(a_bind_that_is_refused_fails_with_the_publishers_words, carriers, kind) {
+BOOST_DATA_TEST_CASE(a_bind_that_is_refused_fails_with_the_publishers_message, carriers, kind) {
     nodes n{kind};
     feed_log none;
     none.bind(*n.tower, "car1:altitude");
@@ -212,7 +212,7 @@ BOOST_DATA_TEST_CASE(every_thins_without_gaps, carriers, kind) {
     BOOST_TEST(feed.count(feed_event::gap) == 0U);
 }
 
-BOOST_DATA_TEST_CASE(a_feed_that_nobody_fetches_keeps_the_newest_and_shows_a_gap, carriers, kind) {
+BOOST_DATA_TEST_CASE(a_feed_that_is_not_fetched_keeps_the_newest_and_shows_a_gap, carriers, kind) {
     nodes n{kind};
     n.tower = std::make_unique<cles::service>(n.io, knowing("tower", *n.car, {.feed = 10}));
     feed_log feed;
@@ -229,7 +229,7 @@ BOOST_DATA_TEST_CASE(a_feed_that_nobody_fetches_keeps_the_newest_and_shows_a_gap
     BOOST_TEST(feed.count(feed_event::update) == 10U);
 }
 
-BOOST_DATA_TEST_CASE(a_publisher_that_is_lost_and_comes_back_is_bound_again, carriers, kind) {
+BOOST_DATA_TEST_CASE(a_publisher_that_is_lost_and_returns_is_bound_again, carriers, kind) {
     nodes n{kind};
     n.car->update("place", 1);
     feed_log feed;
@@ -266,7 +266,7 @@ BOOST_DATA_TEST_CASE(a_feed_keeps_trying_while_the_publisher_is_away, two_carrie
     run_until(n.io, [&] { return feed.count(feed_event::rebound) == 1; });
 }
 
-BOOST_DATA_TEST_CASE(a_publisher_that_comes_back_without_the_task_is_tried_again, two_carriers, kind) {
+BOOST_DATA_TEST_CASE(a_publisher_that_returns_without_the_task_is_tried_again, two_carriers, kind) {
     nodes n{kind};
     feed_log feed;
     n.until_bound(feed);

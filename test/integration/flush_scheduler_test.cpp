@@ -136,7 +136,7 @@ BOOST_AUTO_TEST_CASE(a_publication_that_waits_for_capacity_is_written_in_its_cal
     done.get();
 }
 
-BOOST_AUTO_TEST_CASE(what_a_handler_publishes_goes_behind_its_answer) {
+BOOST_AUTO_TEST_CASE(what_a_handler_publishes_follows_its_reply) {
     publishing p;
     const auto answer = [&](const cles::request&) {
         p.car.update("speed", 1);

@@ -115,7 +115,7 @@ BOOST_FIXTURE_TEST_CASE(a_node_that_leaves_is_forgotten_and_answers_until_it_sto
     BOOST_TEST(!knows(*seed, "car2"));
 }
 
-BOOST_FIXTURE_TEST_CASE(a_node_that_knows_nothing_of_gossip_takes_part, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_node_without_gossip_takes_part, fixture) {
     const auto plain = make("plain", {}, false);
     const auto car1 = make("car1", {at(*plain)});
     until([&] { return knows(*car1, "plain"); });
@@ -167,7 +167,7 @@ BOOST_FIXTURE_TEST_CASE(a_seed_that_is_no_url_is_refused, fixture) {
     BOOST_CHECK_THROW(car1->set_gossip(cles::gossip({"nothing"})), cles::error);
 }
 
-BOOST_FIXTURE_TEST_CASE(where_gossip_is_off_what_is_told_is_refused, fixture) {
+BOOST_FIXTURE_TEST_CASE(where_gossip_is_off_tables_are_refused, fixture) {
     const auto plain = make("plain", {}, false);
     answer<> got;
     plain->async_push("self:cles/peers", cles::json_text{R"({"peers":[]})"}, got.options(), got.take());

@@ -165,7 +165,7 @@ BOOST_AUTO_TEST_CASE(handlers_that_only_move_serve_every_verb) {
 
 // -- types ---------------------------------------------------------------------------------------------------------
 
-BOOST_AUTO_TEST_CASE(types_of_the_standard_library_travel_both_ways) {
+BOOST_AUTO_TEST_CASE(types_of_the_standard_library_are_sent_and_received) {
     nodes n;
     using either = std::variant<double, note>;
     n.car.on_delegate("double", [](std::chrono::milliseconds x) { return x * 2; });

@@ -78,7 +78,7 @@ asio::awaitable<void> wait_for_ever() {
     co_await never.async_wait(asio::use_awaitable);
 }
 
-BOOST_AUTO_TEST_CASE(what_a_handler_throws_becomes_the_answer_and_names_no_file) {
+BOOST_AUTO_TEST_CASE(an_exception_from_a_handler_becomes_the_reply_and_names_no_file) {
     nodes n;
     n.car->on_pull("plain", [](const cles::request& r) { fail_in_some_way(r); });
     n.car->on_pull("coroutine", fail_later);
@@ -131,7 +131,7 @@ BOOST_AUTO_TEST_CASE(a_request_to_publish_that_its_handler_refuses_publishes_not
     BOOST_TEST(peer.ask("UPDATE self:notice {\"error\":\"x\"}").starts_with(R"({"error":"bad_request")"));
 }
 
-BOOST_DATA_TEST_CASE(a_handler_that_never_ends_is_answered_at_its_deadline_and_told_to_stop, carriers, kind) {
+BOOST_DATA_TEST_CASE(the_request_of_an_endless_handler_fails_at_its_deadline_and_it_is_told_to_stop, carriers, kind) {
     nodes n{kind};
     std::vector<cles::responder> kept;
     n.car->on_delegate("responder", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });
@@ -149,7 +149,7 @@ BOOST_DATA_TEST_CASE(a_handler_that_never_ends_is_answered_at_its_deadline_and_t
     run_ready(n.io);
 }
 
-BOOST_AUTO_TEST_CASE(the_peer_is_told_that_the_deadline_has_passed) {
+BOOST_AUTO_TEST_CASE(the_peer_is_notified_that_the_deadline_has_passed) {
     nodes n;
     n.car->on_delegate("coroutine", wait_for_ever);
     auto peer = n.peer();
@@ -160,7 +160,7 @@ BOOST_AUTO_TEST_CASE(the_peer_is_told_that_the_deadline_has_passed) {
     BOOST_TEST(peer.line().starts_with(R"({"node")"));
 }
 
-BOOST_DATA_TEST_CASE(a_service_goes_while_its_handlers_still_run, carriers, kind) {
+BOOST_DATA_TEST_CASE(a_service_is_destroyed_while_its_handlers_still_run, carriers, kind) {
     nodes n{kind};
     std::vector<cles::responder> kept;
     n.car->on_delegate("responder", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });

@@ -67,7 +67,7 @@ BOOST_DATA_TEST_CASE(a_foreign_loop_polls, carriers, kind) {
     BOOST_TEST(a.value == 42);
 }
 
-BOOST_AUTO_TEST_CASE(a_service_that_is_closed_answers_what_it_has_begun_and_says_that_it_leaves) {
+BOOST_AUTO_TEST_CASE(a_service_that_is_closed_completes_running_requests_and_announces_that_it_leaves) {
     asio::io_context io;
     cles::service car{io, listening("car1", carrier::tcp4)};
     std::optional<cles::responder> job;
@@ -134,7 +134,7 @@ BOOST_AUTO_TEST_CASE(a_service_that_is_closed_waits_for_its_handlers_no_longer_t
     BOOST_TEST((third.code == boost::system::errc::connection_refused));
 }
 
-BOOST_AUTO_TEST_CASE(a_service_that_is_stopped_while_it_closes_says_so) {
+BOOST_AUTO_TEST_CASE(a_service_that_is_stopped_while_it_closes_reports_that) {
     asio::io_context io;
     cles::service car{io, listening("car1", carrier::tcp4)};
     std::optional<cles::responder> job;

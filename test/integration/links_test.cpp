@@ -57,7 +57,7 @@ bool is_busy(const std::string& line) { return line.starts_with(R"({"error":"bus
 // -- peers that vanish ---------------------------------------------------------------------------------------------
 
 // The system still accepts such a connection, but can no longer tell the peer's address.
-BOOST_DATA_TEST_CASE(a_peer_that_is_gone_before_it_is_accepted_harms_nobody, tcp_and_unix, kind) {
+BOOST_DATA_TEST_CASE(a_peer_that_disconnects_before_it_is_accepted_is_harmless, tcp_and_unix, kind) {
     node n{kind};
     n.own = n.metric("links_open");
     for (int i = 0; i < 20; ++i) {
@@ -89,7 +89,7 @@ BOOST_DATA_TEST_CASE(links_that_close_free_capacity_and_end_their_bindings, tcp_
     }
 }
 
-BOOST_AUTO_TEST_CASE(a_binder_that_ended_its_stream_and_reads_on_is_sent_empty_lines_and_lives_on) {
+BOOST_AUTO_TEST_CASE(a_half_closed_subscriber_that_reads_is_probed_with_empty_lines_and_stays_bound) {
     node n{carrier::tcp4, {.probe = 10ms}};
     auto peer = n.peer();
     BOOST_TEST(peer.ask("BIND self:notice") == "{}");
@@ -105,7 +105,7 @@ BOOST_AUTO_TEST_CASE(a_binder_that_ended_its_stream_and_reads_on_is_sent_empty_l
     BOOST_TEST(!peer.ended());
 }
 
-BOOST_AUTO_TEST_CASE(whoever_waits_for_an_answer_is_probed_too) {
+BOOST_AUTO_TEST_CASE(a_peer_that_waits_for_a_reply_is_probed_too) {
     node n{carrier::tcp4, {.probe = 20ms}};
     {
         auto gone = n.peer();
@@ -180,7 +180,7 @@ BOOST_DATA_TEST_CASE(a_link_that_brings_no_whole_line_in_time_is_closed, tcp_and
     BOOST_TEST(talks.ask("PULL self:speed") == R"({"value":42})"); // may be silent from then on
 }
 
-BOOST_AUTO_TEST_CASE(silent_links_give_way_to_newcomers_and_are_told_why) {
+BOOST_AUTO_TEST_CASE(silent_links_are_evicted_for_new_ones_and_receive_the_reason) {
     node n{carrier::tcp4, {.links = 3}};
     std::vector<scripted_peer> silent;
     for (int i = 0; i < 3; ++i) {
@@ -221,7 +221,7 @@ BOOST_AUTO_TEST_CASE(an_address_beyond_its_share_gives_way_to_another) {
 
 // -- nodes at their limit ------------------------------------------------------------------------------------------
 
-BOOST_DATA_TEST_CASE(who_is_refused_gets_the_line_whatever_he_has_sent, tcp_and_unix, kind) {
+BOOST_DATA_TEST_CASE(a_refused_peer_receives_the_line_independently_of_its_input, tcp_and_unix, kind) {
     node n{kind, {.links = 1}};
     auto inside = n.peer();
     BOOST_TEST(inside.ask("BIND self:notice") == "{}");

@@ -158,7 +158,7 @@ BOOST_FIXTURE_TEST_CASE(many_requests_wait_together, fixture) {
     until([&] { return std::all_of(all.begin(), all.end(), [](const auto& r) { return r->ended && !r->code; }); });
 }
 
-BOOST_FIXTURE_TEST_CASE(a_feed_is_bound_by_name_and_again_where_the_node_has_gone, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_feed_is_bound_by_name_and_again_where_the_node_has_moved, fixture) {
     auto car1 = serving("car1");
     car1->update("position", 1);
     cles::service asker{here, in_group("asker")};
@@ -203,7 +203,7 @@ BOOST_FIXTURE_TEST_CASE(what_waits_for_a_name_can_be_withdrawn_and_ends_with_the
     BOOST_TEST((waits->code == errc::stopped));
 }
 
-BOOST_FIXTURE_TEST_CASE(what_was_configured_goes_before_what_is_announced, fixture) {
+BOOST_FIXTURE_TEST_CASE(configured_addresses_precede_announced_ones, fixture) {
     const auto car1 = serving("car1");
     const auto other = serving("other");
     auto options = in_group("asker");
@@ -238,7 +238,7 @@ BOOST_FIXTURE_TEST_CASE(what_is_urgent_stays_so_while_it_waits_for_a_name, fixtu
     BOOST_TEST(line.find(" urgent=yes") != std::string::npos, line);
 }
 
-BOOST_FIXTURE_TEST_CASE(nodes_know_each_other_and_say_whom_they_know, fixture) {
+BOOST_FIXTURE_TEST_CASE(nodes_know_each_other_and_list_their_peers, fixture) {
     const auto car1 = serving("car1");
     const auto car2 = serving("car2", "udp://127.0.0.1:0");
     until([&] { return knows(*car1, "car2") && knows(*car2, "car1"); });
@@ -262,7 +262,7 @@ BOOST_FIXTURE_TEST_CASE(a_node_that_listens_nowhere_is_not_announced, fixture) {
     until([&] { return knows(*car1, "asker"); });
 }
 
-BOOST_FIXTURE_TEST_CASE(without_multicast_nobody_is_known, fixture) {
+BOOST_FIXTURE_TEST_CASE(without_multicast_no_node_is_known, fixture) {
     const auto car1 = serving("car1");
     cles::service alone{here, {.name = "alone"}};
     const auto answer = pulled(alone, "car1:who");

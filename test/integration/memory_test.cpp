@@ -36,7 +36,7 @@ constexpr std::size_t budget = 16 * mebi;
 
 std::uint64_t memory(cles::service& of, const std::string& name) { return metric(of, name, "memory"); }
 
-BOOST_DATA_TEST_CASE(many_large_results_that_nobody_reads_stay_within_it, every_socket, kind) {
+BOOST_DATA_TEST_CASE(many_large_unread_results_stay_within_it, every_socket, kind) {
     boost::asio::io_context io;
     cles::service car{io, listening("car1", kind, {.memory = budget})};
     std::vector<cles::responder> asked;
@@ -140,7 +140,7 @@ BOOST_AUTO_TEST_CASE(many_large_requests_to_a_stopped_node_stay_within_its_forwa
     run_until(io, [&] { return memory(hub, "used") == 0; });
 }
 
-BOOST_AUTO_TEST_CASE(large_requests_of_a_program_to_a_peer_that_takes_none_are_busy) {
+BOOST_AUTO_TEST_CASE(large_requests_of_a_program_to_a_peer_that_reads_none_are_busy) {
     boost::asio::io_context io;
     const stopped_node stopped{io};
     auto options = listening("car1", carrier::tcp4, {.memory = budget});

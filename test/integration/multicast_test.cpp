@@ -74,13 +74,13 @@ using cles::feed_event;
 namespace {
 
 /// A member of the group that is not a node: receives everything, and sends what a test specifies.
-struct stranger final : cles::core::group_listener {
-    stranger(boost::asio::io_context& io, const cles::multicast_options& where)
+struct plain_member final : cles::core::group_listener {
+    plain_member(boost::asio::io_context& io, const cles::multicast_options& where)
         : port(std::make_shared<cles::transport::group_port>(io.get_executor(),
                                                              cles::transport::find_interface(where.interface), where)) {
         port->start(*this);
     }
-    ~stranger() { port->close(); }
+    ~plain_member() { port->close(); }
     void on_datagram(const cles::core::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
     void on_writable() override {}
     void say(std::string_view line) { port->send(line); }
@@ -136,7 +136,7 @@ const cles::bind_options by_group = cles::bind_options{}.multicast();
 
 } // namespace
 
-BOOST_FIXTURE_TEST_CASE(a_feed_of_all_hears_every_publisher, network) {
+BOOST_FIXTURE_TEST_CASE(a_feed_of_all_receives_every_publisher, network) {
     const auto car1 = node("car1");
     const auto car2 = node("car2");
     const auto tower = node("tower");
@@ -154,7 +154,7 @@ BOOST_FIXTURE_TEST_CASE(a_feed_of_all_hears_every_publisher, network) {
 }
 
 BOOST_FIXTURE_TEST_CASE(one_datagram_serves_eight_binders, network) {
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     const auto car = node("car1");
     std::vector<std::unique_ptr<cles::service>> towers;
     std::vector<std::unique_ptr<feed_log>> feeds;
@@ -241,7 +241,7 @@ BOOST_FIXTURE_TEST_CASE(other_types_are_read_by_each_feed, network) {
     run_until(io, [&] { return legs == 6; });
 }
 
-BOOST_FIXTURE_TEST_CASE(the_last_value_of_one_node_comes_at_once, network) {
+BOOST_FIXTURE_TEST_CASE(the_last_value_of_one_node_arrives_at_once, network) {
     const auto car = node("car1");
     const auto tower = node("tower");
     car->update("place", 7);
@@ -264,11 +264,11 @@ BOOST_FIXTURE_TEST_CASE(a_feed_that_was_there_first_gets_the_first_update, netwo
     BOOST_TEST(updates(feed).front() == "car1 1");
 }
 
-BOOST_FIXTURE_TEST_CASE(a_node_neither_hears_itself_nor_binds_itself, network) {
+BOOST_FIXTURE_TEST_CASE(a_node_neither_receives_itself_nor_binds_itself, network) {
     const auto car = node("car1");
     feed_log feed;
     until_bound(feed, *car, "all:place");
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     car->update("place", 1);
     run_ready(io);
     BOOST_TEST(feed.items.empty());
@@ -280,9 +280,9 @@ BOOST_FIXTURE_TEST_CASE(a_node_neither_hears_itself_nor_binds_itself, network) {
     BOOST_TEST((own.code == errc::no_target));
 }
 
-BOOST_FIXTURE_TEST_CASE(a_lease_runs_out_when_its_binder_dies_without_a_word, network) {
+BOOST_FIXTURE_TEST_CASE(a_lease_expires_when_its_subscriber_fails_silently, network) {
     const auto car = node("car1");
-    stranger binder{io, where};
+    plain_member binder{io, where};
     binder.say("BIND all:place lease=100\n");
     run_until(io, [&] { return metric(*car, "group_leases") == 1; });
     run_until(io, [&] { return metric(*car, "leases_expired") == 1; });
@@ -297,7 +297,7 @@ BOOST_FIXTURE_TEST_CASE(renewals_keep_a_binding_beyond_its_lease, network) {
     bounds.lease = 3000ms;
     const auto car = node("car1");
     const auto tower = node("tower", bounds);
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     feed_log feed;
     until_bound(feed, *tower, "all:place");
     run_until(io, [&] { return sniffer.count("BIND all:place lease=3000") >= 5; });
@@ -306,10 +306,10 @@ BOOST_FIXTURE_TEST_CASE(renewals_keep_a_binding_beyond_its_lease, network) {
     run_until(io, [&] { return !feed.items.empty(); });
 }
 
-BOOST_FIXTURE_TEST_CASE(closing_the_last_feed_and_stopping_say_goodbye, network) {
+BOOST_FIXTURE_TEST_CASE(closing_the_last_feed_and_stopping_withdraw_the_binding, network) {
     const auto car = node("car1");
     const auto tower = node("tower");
-    stranger sniffer{io, where};
+    plain_member sniffer{io, where};
     feed_log one;
     feed_log two;
     until_bound(one, *tower, "all:place");
@@ -329,9 +329,9 @@ BOOST_FIXTURE_TEST_CASE(closing_the_last_feed_and_stopping_say_goodbye, network)
     BOOST_TEST((three.code == errc::stopped));
 }
 
-BOOST_FIXTURE_TEST_CASE(gaps_and_repeats_are_told_for_each_publisher, network) {
+BOOST_FIXTURE_TEST_CASE(gaps_and_repetitions_are_reported_for_each_publisher, network) {
     const auto tower = node("tower");
-    stranger publisher{io, where};
+    plain_member publisher{io, where};
     feed_log feed;
     until_bound(feed, *tower, "all:place");
     for (const auto* line : {"UPDATE a:place seq=1 epoch=00000001 {}\n", "UPDATE b:place seq=7 epoch=00000002 {}\n",
@@ -347,7 +347,7 @@ BOOST_FIXTURE_TEST_CASE(gaps_and_repeats_are_told_for_each_publisher, network) {
     BOOST_TEST(metric(*tower, "updates_dropped") == 1U);
 }
 
-BOOST_FIXTURE_TEST_CASE(an_update_over_1200_bytes_is_told_to_its_publisher, network) {
+BOOST_FIXTURE_TEST_CASE(an_update_over_1200_bytes_is_reported_to_its_publisher, network) {
     const auto car = node("car1");
     const auto tower = node("tower");
     feed_log feed;
@@ -390,7 +390,7 @@ BOOST_FIXTURE_TEST_CASE(what_the_group_cannot_carry_is_refused, network) {
     BOOST_TEST((code_of("car1:place", both) == errc::bad_request));
 }
 
-BOOST_FIXTURE_TEST_CASE(an_interface_that_is_none_is_named, network) {
+BOOST_FIXTURE_TEST_CASE(the_error_names_an_invalid_interface, network) {
     where.interface = "nowhere0";
     try {
         node("car1");
@@ -406,7 +406,7 @@ BOOST_FIXTURE_TEST_CASE(an_interface_that_is_none_is_named, network) {
     car->update("place", 1);
 }
 
-BOOST_FIXTURE_TEST_CASE(a_group_that_is_none_is_named, network) {
+BOOST_FIXTURE_TEST_CASE(the_error_names_an_invalid_group, network) {
     where.group = "10.0.0.1";
     try {
         node("car1");

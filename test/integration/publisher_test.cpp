@@ -81,7 +81,7 @@ BOOST_AUTO_TEST_CASE(they_arrive_in_their_order) {
     }
 }
 
-BOOST_AUTO_TEST_CASE(past_the_limit_the_oldest_go_and_that_is_told) {
+BOOST_AUTO_TEST_CASE(past_the_limit_the_oldest_are_removed_and_that_is_reported) {
     node->on_bind("count");
     bind(65536);
     constexpr int too_many = 5000;
@@ -107,7 +107,7 @@ BOOST_AUTO_TEST_CASE(large_ones_are_limited_by_their_bytes_but_the_newest_gets_t
     BOOST_TEST(node->request("PULL self:cles/metrics").find(R"("updates_published":4,)") != std::string::npos);
 }
 
-BOOST_AUTO_TEST_CASE(what_the_service_refuses_is_told_in_its_log) {
+BOOST_AUTO_TEST_CASE(what_the_service_refuses_is_logged) {
     updates.update("not a noun", 1);
     updates.update("cles", 1);
     run_ready(io);
@@ -115,7 +115,7 @@ BOOST_AUTO_TEST_CASE(what_the_service_refuses_is_told_in_its_log) {
     BOOST_TEST(was_said("an update of 'cles' was refused: the task 'cles' is reserved"));
 }
 
-BOOST_AUTO_TEST_CASE(after_the_service_has_gone_they_go_nowhere) {
+BOOST_AUTO_TEST_CASE(after_the_service_is_destroyed_they_have_no_effect) {
     updates.update("count", 1);
     node.reset();
     updates.update("count", 2);

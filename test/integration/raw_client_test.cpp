@@ -96,7 +96,7 @@ BOOST_DATA_TEST_CASE(after_a_half_close_all_is_answered_and_then_the_link_ends, 
     BOOST_TEST(!peer.was_reset());
 }
 
-BOOST_DATA_TEST_CASE(a_half_close_withdraws_what_bears_an_id, every_socket, kind) {
+BOOST_DATA_TEST_CASE(a_half_close_withdraws_requests_with_an_id, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     peer.send("DELEGATE self:drive id=5\n");
@@ -120,7 +120,7 @@ BOOST_DATA_TEST_CASE(a_reset_withdraws_everything, every_socket, kind) {
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(a_bind_lives_on_after_a_half_close_until_a_write_fails, every_socket, kind) {
+BOOST_DATA_TEST_CASE(a_binding_remains_after_a_half_close_until_a_write_fails, every_socket, kind) {
     node n{kind};
     n.car.update("place", 1);
     auto peer = n.peer();
@@ -136,7 +136,7 @@ BOOST_DATA_TEST_CASE(a_bind_lives_on_after_a_half_close_until_a_write_fails, eve
 
 // -- malformed lines in sequence: each gets its error, and the link stays open -------------------------------------
 
-BOOST_DATA_TEST_CASE(what_is_malformed_is_told_and_harms_nobody, every_socket, kind) {
+BOOST_DATA_TEST_CASE(malformed_lines_are_reported_and_affect_nothing_else, every_socket, kind) {
     node n{kind};
     auto peer = n.peer();
     const std::string deep = std::string(33, '[') + std::string(33, ']');
@@ -179,7 +179,7 @@ BOOST_DATA_TEST_CASE(what_is_malformed_is_told_and_harms_nobody, every_socket, k
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(a_number_that_does_not_fit_is_told_with_its_place, every_socket, kind) {
+BOOST_DATA_TEST_CASE(a_number_that_does_not_fit_is_reported_with_its_position, every_socket, kind) {
     node n{kind};
     n.car.on_push("small", [](std::uint8_t value) { return value; });
     n.car.on_push("whole", [](std::int64_t value) { return value; });
@@ -277,7 +277,7 @@ BOOST_DATA_TEST_CASE(a_web_page_that_posts_is_turned_away_unanswered, every_sock
     BOOST_TEST(n.serves());
 }
 
-BOOST_DATA_TEST_CASE(an_answer_over_the_limit_says_that_the_handler_ran, every_socket, kind) {
+BOOST_DATA_TEST_CASE(a_reply_over_the_limit_reports_that_the_handler_ran, every_socket, kind) {
     node n{kind, {.line = 1000}};
     n.car.on_pull("much", [] { return std::string(1000, 'x'); });
     auto peer = n.peer();

@@ -110,7 +110,7 @@ struct trusting : fixture {
 } // namespace
 
 // This takes much less than a second.
-BOOST_FIXTURE_TEST_CASE(a_stranger_gets_less_than_64_KiB_whatever_port_he_asks_from, fixture) {
+BOOST_FIXTURE_TEST_CASE(an_unverified_address_gets_less_than_64_KiB_from_all_its_ports, fixture) {
     const auto one = arrive("udp://192.0.2.7:4000");
     const auto two = arrive("udp://192.0.2.7:4001");
     for (int i = 0; i < 200; ++i) {

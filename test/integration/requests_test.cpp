@@ -177,7 +177,7 @@ BOOST_DATA_TEST_CASE(many_requests_in_flight_are_each_answered_once, carriers, k
     }
 }
 
-BOOST_DATA_TEST_CASE(failures_come_with_the_peers_own_words, carriers, kind) {
+BOOST_DATA_TEST_CASE(failures_contain_the_peers_message, carriers, kind) {
     two_nodes n{kind};
     answer<> unknown_task;
     answer<> wrong_body;
@@ -273,7 +273,7 @@ BOOST_DATA_TEST_CASE(the_next_request_after_a_loss_makes_a_new_link, carriers, k
     BOOST_TEST(second.value == 43);
 }
 
-BOOST_AUTO_TEST_CASE(a_name_that_nobody_knows_is_no_target) {
+BOOST_AUTO_TEST_CASE(an_unknown_name_is_no_target) {
     boost::asio::io_context io;
     cles::service tower{io, {.name = "tower"}};
     for (const auto* noun : {"nobody:speed", "any:speed", "all:speed"}) {
@@ -314,7 +314,7 @@ BOOST_AUTO_TEST_CASE(at_sends_a_request_anywhere) {
     BOOST_TEST(nowhere.code == errc::unknown_scheme);
 }
 
-BOOST_AUTO_TEST_CASE(set_peer_says_where_a_node_is_now) {
+BOOST_AUTO_TEST_CASE(set_peer_changes_the_address_of_a_node) {
     boost::asio::io_context io;
     cles::service one{io, listening("one")};
     cles::service two{io, listening("two", carrier::unix_file)};
@@ -346,7 +346,7 @@ BOOST_AUTO_TEST_CASE(set_peer_says_where_a_node_is_now) {
 }
 
 // As with Asio's own operations: an exception from a handler leaves the context's run, and affects nothing else.
-BOOST_DATA_TEST_CASE(a_completion_handler_that_throws_harms_no_other, carriers, kind) {
+BOOST_DATA_TEST_CASE(a_completion_handler_that_throws_affects_no_other, carriers, kind) {
     two_nodes n{kind};
     struct thrown_by_test {};
     int thrown = 0;

@@ -92,7 +92,7 @@ struct nodes {
 
 BOOST_FIXTURE_TEST_SUITE(responder, nodes)
 
-BOOST_AUTO_TEST_CASE(a_job_asks_another_node_and_answers_with_what_it_heard) {
+BOOST_AUTO_TEST_CASE(a_job_asks_another_node_and_replies_with_the_result) {
     begin = [](const cles::responder& answer) {
         answer.delegate("PULL tower:wind", [answer](auto code, std::string_view json, std::string_view) {
             BOOST_TEST(!code);
@@ -184,7 +184,7 @@ BOOST_AUTO_TEST_CASE(what_its_callback_throws_is_its_answer) {
     BOOST_TEST(user_answer.words == "car: too windy");
 }
 
-BOOST_AUTO_TEST_CASE(the_peers_words_reach_it_and_what_cannot_be_asked_is_told) {
+BOOST_AUTO_TEST_CASE(it_receives_the_peers_message_and_errors_of_invalid_requests) {
     std::vector<std::string> all;
     begin = [&](const cles::responder& answer) {
         for (const auto* command : {"PULL tower:rain", "PULL nobody:wind", "BIND tower:wind", "nonsense"}) {
@@ -221,7 +221,7 @@ BOOST_AUTO_TEST_CASE(progress_passes_through_it) {
     until([&] { return user_answer.done(); });
 }
 
-BOOST_AUTO_TEST_CASE(a_service_that_goes_ends_what_its_jobs_asked) {
+BOOST_AUTO_TEST_CASE(destroying_a_service_ends_the_requests_of_its_jobs) {
     begin = [this](const cles::responder& answer) { answer.delegate("DELEGATE tower:plan", heard()); };
     ask();
     until([&] { return plans.size() == 1; });

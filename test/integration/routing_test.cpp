@@ -151,7 +151,7 @@ BOOST_FIXTURE_TEST_CASE(progress_and_cancellation_pass_the_hub, fixture) {
     BOOST_TEST((late->code == errc::deadline));
 }
 
-BOOST_FIXTURE_TEST_CASE(a_node_whose_listener_is_gone_is_unavailable_at_once, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_node_whose_listener_is_closed_is_unavailable_at_once, fixture) {
     auto car = serving("car1", false);
     const auto where_it_was = car->endpoints().front();
     car.reset();
@@ -194,7 +194,7 @@ BOOST_FIXTURE_TEST_CASE(all_are_asked_and_who_is_lost_is_among_the_errors, fixtu
     BOOST_TEST(failed.text.starts_with(R"({"results":{},"errors":{"car2":{"error":"failed")"), failed.text);
 }
 
-BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_node_dies, fixture) {
+BOOST_FIXTURE_TEST_CASE(any_continues_with_another_when_a_node_fails, fixture) {
     const auto one = serving("car1");
     auto two = serving("car2");
     start_hub();
@@ -211,7 +211,7 @@ BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_node_dies, fixture) {
 }
 
 // The chosen node has reached its limit of links and reports that in a line that replies to no request.
-BOOST_FIXTURE_TEST_CASE(any_goes_on_to_another_when_a_full_node_refuses_the_link, fixture) {
+BOOST_FIXTURE_TEST_CASE(any_continues_with_another_when_a_full_node_refuses_the_link, fixture) {
     cles::service_options loaded;
     loaded.load = [] { return cles::node_load{.queued = 50, .running = 1, .workers = 1}; };
     const auto second = serving("car2", true, std::move(loaded));
@@ -362,7 +362,7 @@ BOOST_FIXTURE_TEST_CASE(a_binding_of_all_has_each_publisher_and_later_ones_too, 
     feed.reset();
 }
 
-BOOST_FIXTURE_TEST_CASE(a_nodes_load_is_what_its_user_says, fixture) {
+BOOST_FIXTURE_TEST_CASE(a_nodes_load_is_what_its_program_reports, fixture) {
     cles::service_options options{.name = "car1"};
     options.listen = {"tcp://127.0.0.1:0"};
     options.multicast = where;

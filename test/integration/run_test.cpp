@@ -59,7 +59,7 @@ BOOST_DATA_TEST_CASE(lets_out_what_a_handler_throws_and_goes_on_when_called_agai
     BOOST_TEST(ran == 1);
 }
 
-BOOST_AUTO_TEST_CASE(takes_the_priority_it_is_told_and_gives_it_back) {
+BOOST_AUTO_TEST_CASE(sets_the_requested_priority_and_restores_it) {
     asio::io_context io;
     int policy = -1;
     asio::post(io, [&] { policy = ::sched_getscheduler(0); });

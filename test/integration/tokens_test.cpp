@@ -117,7 +117,7 @@ BOOST_AUTO_TEST_CASE(a_coroutine_awaits_every_verb) {
     run_to_end(n.io, ask_everything(n.tower));
 }
 
-BOOST_AUTO_TEST_CASE(a_coroutine_is_told_of_failures_by_an_exception_with_the_peers_words) {
+BOOST_AUTO_TEST_CASE(a_coroutine_receives_failures_as_an_exception_with_the_peers_message) {
     nodes n;
     run_to_end(n.io, meet_failures(n.tower));
 }

@@ -154,7 +154,7 @@ BOOST_AUTO_TEST_CASE(what_is_no_network_is_refused_when_the_service_is_made) {
                           [](const cles::error& e) { return e.code() == errc::invalid_url; });
 }
 
-BOOST_AUTO_TEST_CASE(what_is_too_large_says_to_use_tcp_and_nothing_is_cut_up) {
+BOOST_AUTO_TEST_CASE(what_is_too_large_fails_with_a_hint_to_tcp_and_is_not_split) {
     nodes n;
     answer<> reply;
     answer<> request;
@@ -227,7 +227,7 @@ BOOST_AUTO_TEST_CASE(a_request_is_withdrawn_by_its_cancellation_slot) {
     BOOST_TEST(result.code == errc::cancelled);
 }
 
-BOOST_AUTO_TEST_CASE(nobody_there_ends_with_the_deadline) {
+BOOST_AUTO_TEST_CASE(without_a_listener_the_deadline_ends_it) {
     nodes n;
     n.car.reset();
     answer<> result;
@@ -236,7 +236,7 @@ BOOST_AUTO_TEST_CASE(nobody_there_ends_with_the_deadline) {
     BOOST_TEST(result.code == errc::deadline);
 }
 
-BOOST_AUTO_TEST_CASE(a_node_that_comes_back_in_time_answers_what_was_sent_before) {
+BOOST_AUTO_TEST_CASE(a_node_that_returns_in_time_replies_to_what_was_sent_before) {
     nodes n;
     const auto where = n.url();
     n.car.reset();
@@ -277,7 +277,7 @@ BOOST_AUTO_TEST_CASE(a_renewals_answer_may_be_as_deep_as_the_first) {
     BOOST_TEST(metric(*n.car, "leases_expired") == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(a_binder_that_is_gone_is_unbound_when_its_lease_runs_out) {
+BOOST_AUTO_TEST_CASE(a_failed_subscriber_is_unbound_when_its_lease_expires) {
     nodes n{carrier::udp4, {.lease = 100ms}};
     feed_log feed;
     feed.bind(*n.tower, "car1:place");

@@ -122,7 +122,7 @@ BOOST_DATA_TEST_CASE(a_handler_may_do_it_when_it_is_destroyed, data::make(every_
 }
 
 // A progress function is destroyed with its request.
-BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
+BOOST_DATA_TEST_CASE(a_progress_function_may_act_when_it_is_destroyed, data::make(every_place) * every_deed, where,
                      does) {
     if (does == deed::throws) { // destructors do not throw
         return;
@@ -134,7 +134,7 @@ BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_it_when_it_is_destroyed, data:
     w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
     w.run_what_is_ready();
     w.acted = 1;
-    w.check_that_it_lives(does);
+    w.check_that_it_works(does);
     BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
 }
 

@@ -65,7 +65,7 @@ void check_answers(world& w, scripted_peer& peer, deed does, int quick) {
         BOOST_TEST(quick == 1);
     }
     w.acted = does == deed::throws ? 0 : 1;
-    w.check_that_it_lives(does);
+    w.check_that_it_works(does);
 }
 
 /// Starts three operations, each with a separate handler and cancellation slot: the second handler acts.
@@ -157,7 +157,7 @@ BOOST_DATA_TEST_CASE(a_publisher_that_waits_may_do_anything, data::make(every_de
     }
 }
 
-BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_deed), does) {
+BOOST_DATA_TEST_CASE(a_progress_function_may_do_anything, data::make(every_deed), does) {
     world w;
     int reports = 0;
     answer<int> a;
@@ -175,7 +175,7 @@ BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_dee
     w.jobs[0].done(1);
     w.jobs[1].done(2);
     w.until([&] { return a.done() && b.done(); });
-    w.check_that_it_lives(does);
+    w.check_that_it_works(does);
     const bool ended = does == deed::stops_service || does == deed::destroys_service;
     BOOST_TEST(reports == (ended ? 1 : 2));
     BOOST_TEST(a.code.failed() == ended);
@@ -185,7 +185,7 @@ BOOST_DATA_TEST_CASE(who_hears_of_progress_may_do_anything, data::make(every_dee
 }
 
 // It is destroyed with its operation, or after it; never inside a call of the library.
-BOOST_DATA_TEST_CASE(what_hears_of_progress_may_do_it_when_it_is_destroyed, data::make(every_place) * every_deed, where,
+BOOST_DATA_TEST_CASE(a_progress_callback_may_act_when_it_is_destroyed, data::make(every_place) * every_deed, where,
                      does) {
     if (does == deed::throws) { // destructors do not throw
         return;
@@ -235,11 +235,11 @@ BOOST_DATA_TEST_CASE(what_hears_of_progress_may_do_it_when_it_is_destroyed, data
             w.until([&] { return w.acted == 1; });
         }
         BOOST_TEST(calls == 1);
-        w.check_that_it_lives(does);
+        w.check_that_it_works(does);
     }
 }
 
-BOOST_DATA_TEST_CASE(who_is_told_to_stop_may_do_anything, data::make(every_deed), does) {
+BOOST_DATA_TEST_CASE(a_stop_callback_may_do_anything, data::make(every_deed), does) {
     for (const auto where : {place::deadline, place::lost, place::cancelled, place::stop}) {
         BOOST_TEST_CONTEXT("at " << where) {
             world w;
@@ -334,7 +334,7 @@ BOOST_DATA_TEST_CASE(a_handler_whose_request_has_waited_may_do_anything,
                 BOOST_TEST((peer.line().find(does == deed::throws ? "failed" : "value") != std::string::npos));
             }
             w.acted = does == deed::throws ? 0 : 1;
-            w.check_that_it_lives(does);
+            w.check_that_it_works(does);
         }
     }
 }
@@ -364,7 +364,7 @@ BOOST_DATA_TEST_CASE(a_service_that_is_stopped_while_it_chooses_begins_nothing,
             w.until([&] { return w.acted == 1; });
             w.run_what_is_ready();
             BOOST_TEST(begun == 0);
-            w.check_that_it_lives(does);
+            w.check_that_it_works(does);
         }
     }
 }
@@ -433,7 +433,7 @@ BOOST_DATA_TEST_CASE(the_functions_of_the_options_may_do_anything, data::make(ev
                 BOOST_TEST((other.ask("PULL self:speed").find("value") != std::string::npos));
             }
             w.acted = does == deed::throws ? 0 : 1;
-            w.check_that_it_lives(does);
+            w.check_that_it_works(does);
         }
     }
 }
@@ -471,7 +471,7 @@ BOOST_DATA_TEST_CASE(the_log_of_a_deadline_may_do_anything, data::make(every_dee
                 w.until([&] { return each->ended(); });
             }
             w.acted = does == deed::throws ? 0 : 1;
-            w.check_that_it_lives(does);
+            w.check_that_it_works(does);
         }
     }
 }

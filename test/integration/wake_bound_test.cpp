@@ -52,12 +52,12 @@ bool is_kept_by_the_host(std::chrono::microseconds asked, std::int32_t expected)
     }
 }
 
-BOOST_AUTO_TEST_CASE(holds_as_long_as_it_lives) {
+BOOST_AUTO_TEST_CASE(holds_until_it_is_destroyed) {
     BOOST_TEST(is_kept_by_the_host(7us, 7));
     BOOST_TEST(!holds_open(device_path));
 }
 
-BOOST_AUTO_TEST_CASE(is_never_less_than_nothing_or_more_than_the_device_takes) {
+BOOST_AUTO_TEST_CASE(is_never_negative_or_more_than_the_device_accepts) {
     BOOST_TEST(is_kept_by_the_host(-5us, 0));
     BOOST_TEST(is_kept_by_the_host(100h, std::numeric_limits<std::int32_t>::max()));
     BOOST_TEST(!holds_open(device_path));

@@ -34,7 +34,7 @@ BOOST_AUTO_TEST_CASE(against_one_target_there_is_one_order) {
     BOOST_TEST(c.select_target(10)->id == 2U);
     c.ordered(*c.select_target(10));
     BOOST_TEST(!c.select_target(10));
-    auto other = picture_of({{.id = 1, .age = 20}}); // another node's first is another target
+    auto other = picture_of({{.id = 1, .age = 20}}); // the first target of another node is a different one
     other.by = "sat2";
     c.set_picture(other);
     BOOST_TEST(c.select_target(10).has_value());

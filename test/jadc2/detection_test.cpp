@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// What all of it together is to reach, on scenes whose truth it is not told: of 100 vehicles in a frame 90 are found,
-// and in ten frames there is one false track at most.
+// What the whole algorithm has to achieve, on scenes whose ground truth it does not get: of 100 vehicles in a frame it
+// finds 90, and in ten frames there is at most one false track.
 #include "fmv/stream.hpp"
 #include "jadc2/scene.hpp"
 #include "jadc2/score.hpp"
@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::uint64_t frames = 80;
 constexpr std::uint64_t scenes = CLES_DETECTION_IS_SLOW ? 2 : 20;
-// It learns what stands still, and has to see a target some times.
+// It learns the background, and has to see a target several times.
 constexpr std::uint64_t settled = fmv::background::learning + 10;
 
 void judge(std::uint64_t seed, jadc2::score& total) {

@@ -12,7 +12,7 @@ namespace {
 constexpr fmv::extent size{.width = 160, .height = 120};
 constexpr double noise = 4;
 
-// The sum of twelve is nearly normal.
+// The sum of twelve is approximately normal.
 fmv::grey noisy(std::uint64_t seed) {
     sgd::random_source chance{seed};
     fmv::grey frame(size.pixels());
@@ -45,7 +45,7 @@ BOOST_AUTO_TEST_CASE(noise_is_estimated_and_is_no_target) {
     for (std::uint64_t seed = 1; seed <= 20; ++seed) {
         fmv::detector look{size};
         BOOST_TEST(look.look(noisy(seed), flat).empty());
-        // A mean of nine, of values that were rounded.
+        // A mean of nine rounded values.
         BOOST_TEST(std::abs(look.noise() - std::sqrt(noise * noise + 1.0 / 12) / 3) < 0.1);
     }
 }

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""What plays joint command leaves nothing behind, also where it is ended while it starts.
+"""The script that runs joint command leaves nothing behind, even if it is stopped while it starts.
 
     fleet_test.py PROGRAMS
 """
@@ -43,7 +43,7 @@ class LeavesNothing(unittest.TestCase):
             programs.mkdir()
             files.mkdir()
             os.mkfifo(told)
-            for name in ("clesd", "cles", "cles-jadc2"):  # says nothing, as one that hangs
+            for name in ("clesd", "cles", "cles-jadc2"):  # prints nothing, like a process that hangs
                 (programs / name).write_text(f"#!/bin/sh\necho $$ > {told}\nexec sleep 300\n", encoding="utf-8")
                 (programs / name).chmod(0o755)
             reader = os.open(told, os.O_RDONLY | os.O_NONBLOCK)

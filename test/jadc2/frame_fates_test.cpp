@@ -30,7 +30,7 @@ BOOST_AUTO_TEST_CASE(where_it_is_lost_any_is_asked) {
         BOOST_TEST(all.failed(why));
         BOOST_TEST(all.target() == "any");
         all.captured();
-        BOOST_TEST(!all.failed(why)); // no news
+        BOOST_TEST(!all.failed(why)); // nothing new
         all.captured();
         BOOST_TEST(all.done("sat2"));
         BOOST_TEST(all.error().empty());

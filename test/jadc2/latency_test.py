@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs the measurement of strike orders in its quick form, and looks at what it says and leaves.
+"""Runs the measurement of strike orders in its quick form, and checks its output and that it leaves nothing behind.
 
     latency_test.py FOLDER PROGRAMS
 
@@ -49,7 +49,7 @@ class Latency(unittest.TestCase):
             programs.mkdir()
             files.mkdir()
             os.mkfifo(told)
-            (programs / "clesd").write_text(f"#!/bin/sh\necho $$ > {told}\nexec sleep 300\n", encoding="utf-8")  # as one that hangs
+            (programs / "clesd").write_text(f"#!/bin/sh\necho $$ > {told}\nexec sleep 300\n", encoding="utf-8")  # hangs
             (programs / "clesd").chmod(0o755)
             reader = os.open(told, os.O_RDONLY | os.O_NONBLOCK)
             with subprocess.Popen([sys.executable, "-B", f"{FOLDER}/strike_latency.py", "--programs", programs],

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Each role of joint command is killed in turn: the work goes where another offers it, or it shows that nobody does;
-nothing is struck twice, and each job has a fate.
+"""Each role of joint command is killed in turn: another node that offers its work takes over, or the failure is
+reported; no target is struck twice, and each job has an outcome.
 
     losses_test.py PROGRAMS
 """
@@ -30,11 +30,11 @@ class Losses(unittest.TestCase):
         return frames
 
     def recon(self, satellites, *arguments, **more):
-        """One whose frames do not fail because the machine has much else to do."""
+        """One whose frames do not fail on a busy machine."""
         return self.fleet.recon(satellites, "--fps", "30", "--deadline", "20000", *arguments, **more)
 
     def mission_by_hand(self, recon, strikers, strikes=1, deadline=20000):
-        """A mission centre that decides nothing until it is told to, so that something can be lost before."""
+        """A mission centre that decides nothing until it is told to, so that a loss can occur before."""
         return self.fleet.mission(recon, strikers, "--operator", "--strikes", str(strikes), "--deadline", str(deadline),
                                   "--duration", "60", stdin=subprocess.PIPE)
 
@@ -129,7 +129,7 @@ class Losses(unittest.TestCase):
         self.assertEqual(strikers[0].pull("strike1:strike")["orders"], [])
 
     def strike_by_hand(self, strikers, **more):
-        """A mission centre whose operator has ordered one strike of all, which is done: so it knows who strikes."""
+        """A mission centre whose operator has ordered one strike, which is done: so it knows which aircraft strikes."""
         mission = self.mission_by_hand(self.recon([self.fleet.satellite()]), strikers, **more)
         mission.order_by_hand()
         self.assertEqual(mission.wait_for("strike")["data"]["fate"], "done")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""What joint command says where something is missing: nobody there, no plugin, a port that is taken, wrong usage.
+"""The messages of joint command if something is missing: no other node, no plugin, a port in use, wrong usage.
 
     missing_test.py PROGRAMS
 """
@@ -52,7 +52,7 @@ class Missing(unittest.TestCase):
         self.assertEqual(mission.end(), 3)
         self.assertRegex(mission.all("trouble")[0]["text"],
                          f"^no tracks: .*: is cles-jadc2 recon running at {at} \\(--recon\\)\\?$")
-        self.assertEqual(len(mission.all("trouble")), 1)  # told once
+        self.assertEqual(len(mission.all("trouble")), 1)  # reported once
         self.assertEqual(mission.all("report")[0]["data"]["given"], 0)
 
     def check_refused(self, strikers, words):

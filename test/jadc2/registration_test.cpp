@@ -9,7 +9,7 @@ namespace {
 
 constexpr fmv::extent size{.width = 96, .height = 80};
 
-// A texture without end, of which pictures show a part.
+// An unlimited texture, of which pictures show a part.
 std::uint8_t ground(int x, int y) {
     sgd::random_source chance{static_cast<std::uint64_t>((y + 50) / 3 * 1000 + (x + 50) / 3)};
     return static_cast<std::uint8_t>(60 + chance.below(120));

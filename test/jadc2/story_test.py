@@ -34,8 +34,7 @@ class Story(unittest.TestCase):
 
     def run_story(self, fleet):
         satellite, striker = fleet.satellite(), fleet.striker()
-        # A machine that has much else to do is no reason for a frame to fail. Under a sanitizer most would be skipped, and
-        # too few of them judged.
+        # Frames must not fail on a busy machine. Under a sanitizer most would be skipped, and too few of them evaluated.
         recon = fleet.recon([satellite], "--fps", "30" if PATIENCE <= 30 else "6", "--deadline", "20000")
         mission = fleet.mission(recon, [striker], "--strikes", "2", "--duration", "60")
         self.assertEqual(mission.end(), 0, mission.events)
@@ -44,7 +43,7 @@ class Story(unittest.TestCase):
         self.assertEqual(len(mission.all("assessed")), 2)
         self.assertTrue(all(one["data"]["missed_by"] < 320 for one in mission.all("assessed")))
 
-        # Each job's fate, at both of its ends.
+        # The outcome of each job, at both of its ends.
         self.assertEqual(mission.all("report")[0]["data"],
                          {"given": 2, "done": 2, "refused": 0, "failed": 0, "unknown": 0, "open": 0})
         self.assertEqual(striker.pull("strike1:strike")["orders"], sorted(told["order"] for told in strikes))
@@ -59,7 +58,7 @@ class Story(unittest.TestCase):
         self.assertGreater(report["judged"], 0)
         self.assertGreater(report["recall"], 0)
 
-        # Who knows whom: nobody beyond his links.
+        # No node knows others than those of its links.
         self.assertEqual(satellite.peers(), set())
         self.assertEqual(striker.peers(), set())
         return satellite, recon, striker
@@ -93,7 +92,7 @@ class Story(unittest.TestCase):
                 mission.process.stdin.flush()
 
             mission.wait_for("picture")
-            self.assertEqual(mission.all("decided"), [])  # nobody but the operator does
+            self.assertEqual(mission.all("decided"), [])  # only the operator does
             type_in("strike")
             mission.wait_for("operator", "'strike' is not an order")
             type_in("strike 999999")

@@ -49,7 +49,7 @@ BOOST_AUTO_TEST_CASE(an_order_is_carried_out) {
 BOOST_AUTO_TEST_CASE(it_is_aimed_at_where_the_target_will_be) {
     auto what = order("o1");
     what.vx = 20;
-    what.utc -= 10; // so long ago was it there
+    what.utc -= 10; // the time since it was seen there
     const auto out = cles::from_json<strike::outcome>(give(what));
     BOOST_TEST(std::abs(out.aim_x - (300 + 20 * (10 + out.flight_s))) < 2); // the time that this takes
     BOOST_TEST(std::abs(std::hypot(out.aim_x, out.aim_y) - 100 * out.flight_s) < 1e-6);

@@ -11,7 +11,7 @@ namespace {
 
 fmv::detection at(double x, double y) { return {.centre = {x, y}, .area = 20}; }
 
-// So many looks at one that moves evenly.
+// This many observations of a target that moves uniformly.
 void follow(fmv::tracker& all, int looks, double from, double speed) {
     for (int i = 0; i < looks; ++i) {
         const std::vector seen{at(from + speed * i, 50)};

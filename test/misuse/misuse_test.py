@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Compiles programs that use the library wrongly, and checks that the compiler says so in one readable line.
+"""Compiles programs that use the library wrongly, and checks that the compiler reports it in one readable line.
 
     misuse_test.py --compiler CXX --include DIR... --define NAME... --scratch DIR
 
@@ -51,7 +51,7 @@ def coroutine(text: str) -> str:
     return f"asio::awaitable<void> f(cles::service& node) {{ {text} }}"
 
 
-# name: (the program, what the first error says)
+# name: (the program, the text of the first error)
 WRONG = {
     # Handlers.
     "auto_parameter": (handler("[](auto body) { return body; }"), "the handler's arguments are not known"),
@@ -125,7 +125,7 @@ WRONG = {
     ),
 }
 
-# The same, of g++ 12 alone.
+# The same, only for g++ 12.
 WRONG_HERE = {
     "temporary_push": (coroutine('co_await node.async_push("w:note", note{.text = "long"});'), TEMPORARY),
     "temporary_delegate": (
@@ -151,7 +151,7 @@ WRONG_HERE = {
     ),
 }
 
-# What is right, and near to what is wrong.
+# Correct programs that are similar to wrong ones.
 RIGHT = {
     "bodies": coroutine(
         """
@@ -198,7 +198,7 @@ RIGHT = {
     """,
 }
 
-LONGEST = 400  # characters of a line that somebody reads
+LONGEST = 400  # characters of a readable line
 
 
 def compile_one(arguments, name: str, program: str, standard: str = "c++20") -> list[str]:

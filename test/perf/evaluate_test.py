@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Runs `scripts/evaluate --quick`: checks that it works, not how fast anything is. Sections whose scripts have a test of
+"""Runs `scripts/evaluate --quick`: checks that it works, not the figures. Sections whose scripts have a test of
 their own, which runs them with the same options, are left to it.
 
     evaluate_test.py ROOT BUILD

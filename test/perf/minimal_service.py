@@ -18,7 +18,7 @@ MAX_SIZE = 1_000_000
 MAX_PRIVATE = 1 << 20
 MAX_RESIDENT = 4 << 20
 REQUESTS = 2_000
-# The system's own: the C and C++ libraries, the loader, and what the kernel maps.
+# Those of the system: the C and C++ libraries, the loader, and what the kernel maps.
 ALLOWED = re.compile(r"^(libc|libm|libstdc\+\+|libgcc_s)\.so\.|^ld-linux.*\.so\.|^linux-(vdso|gate)\.so\.")
 
 failures = []

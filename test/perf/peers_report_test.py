@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
 """Runs the measurement of all peers on programs that replay what was recorded of the real ones, so that it needs none
-of them installed; and looks at the table and the JSON.
+of them installed; and checks the table and the JSON.
 
     peers_report_test.py FOLDER
 

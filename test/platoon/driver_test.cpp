@@ -12,7 +12,7 @@ using platoon::role;
 
 constexpr double period = 0.04;
 
-/// v2 behind v1 behind v0, all at 25 m/s. Others tell what they are made to tell.
+/// v2 behind v1 behind v0, all at 25 m/s. The others report what the test sets.
 struct road {
     platoon::driver v2{{.name = "v2", .ahead = "v1", .start = {.x = -30, .v = 25, .a = 0}}, 0};
     platoon::state v0{.mode = role::lead, .lead = "v0", .v = 25};
@@ -87,7 +87,7 @@ BOOST_AUTO_TEST_CASE(it_falls_back_when_three_updates_of_the_one_ahead_are_misse
     BOOST_TEST(all.v2.command() < 0);
     all.drive(1);
     BOOST_TEST(all.v2.command() == -4);
-    BOOST_TEST(all.v2.report().lead == "v2"); // those behind are to stop with it
+    BOOST_TEST(all.v2.report().lead == "v2"); // those behind have to stop with it
     all.drive(12);
     BOOST_TEST(all.v2.position().v == 0);
     BOOST_TEST((all.v2.report().mode == role::fallback));
@@ -111,7 +111,7 @@ BOOST_AUTO_TEST_CASE(without_the_leader_it_follows_the_one_ahead) {
     all.silent = {"v0"};
     all.drive(4 * period);
     BOOST_TEST((all.v2.mode() == role::degraded));
-    all.v0.u = -5; // which it cannot know
+    all.v0.u = -5; // unknown to it
     all.drive(2);
     BOOST_TEST((all.v2.mode() == role::degraded));
     BOOST_TEST(std::abs(all.v2.command()) < 0.01);
@@ -126,7 +126,7 @@ BOOST_AUTO_TEST_CASE(behind_one_that_falls_back_it_does_not_heed_the_leader) {
     all.drive(0.5);
     BOOST_TEST((all.v2.mode() == role::degraded));
     BOOST_TEST(all.v2.command() < -1);
-    all.v1.lead = "v1"; // it leads those behind to a halt
+    all.v1.lead = "v1"; // as the lead, it stops those behind
     all.v1.behind = 0;
     all.drive(0.5);
     BOOST_TEST((all.v2.mode() == role::follow));

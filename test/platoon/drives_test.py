@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""A platoon as its users run it, each vehicle a process: what vehicles hear of each other, and some that join or leave."""
+"""A platoon as its users run it, each vehicle a process: what vehicles receive from each other, joining, leaving."""
 
 import json
 import os
@@ -20,7 +20,7 @@ class Drive(DriveTest):
             with open(file, encoding="utf-8") as record:
                 self.assertEqual(json.load(record), found)
         self.assertTrue(found["steady"], found["events"])
-        self.assertGreater(found["verdict"]["error"][0], 0.01)  # it brakes, so that there is something to see
+        self.assertGreater(found["verdict"]["error"][0], 0.01)  # it brakes, so that there is an error
         self.assertLess(max(found["verdict"]["error"]), 2)
         self.assertGreater(found["latency"]["count"], 4 * 50)
         self.assertGreater(found["latency"]["p50_us"], 0)
@@ -37,7 +37,7 @@ class Drive(DriveTest):
         self.assertIsNone(course["error"][0])
         errors = [e for e in course["error"] if e is not None]
         self.assertGreater(max(errors), 15)
-        self.assertLess(abs(errors[-1]), max(errors) - 4)  # it catches up, with time
+        self.assertLess(abs(errors[-1]), max(errors) - 4)  # it catches up gradually
 
     def test_one_leaves_and_the_gap_is_closed(self):
         found = self.drive("--vehicles", 4, "--seconds", 9, "--leave", "2@0.5")

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""The evaluation, short, and its plots: that all there is to be told is told.
+"""A short evaluation and its plots: that the report is complete.
 
     evaluation_test.py SCRIPTS PROGRAMS
 """

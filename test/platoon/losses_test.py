@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""A platoon as its users run it, each vehicle a process: one of them, or who watches them, is killed or interrupted."""
+"""A platoon as its users run it, each vehicle a process: one of them, or the observer, is killed or interrupted."""
 
 import os
 import signal
@@ -46,13 +46,13 @@ class Killed(DriveTest):
     def test_interrupted_it_ends_well(self):
         watcher = start("run", "--multicast", free_group(), "--vehicles", 2, "--seconds", 60, start_new_session=True)
         self.addCleanup(ended, watcher)
-        for _ in range(3):  # after which they have heard each other
+        for _ in range(3):  # after which they have received each other
             self.assertRegex(watcher.stdout.readline(), r"\d s  2 vehicles")
         vehicles = children_of(watcher.pid)
         os.killpg(watcher.pid, signal.SIGINT)  # as a terminal does
         out, err = watcher.communicate(timeout=PATIENCE)
         self.assertEqual((watcher.returncode, err), (0, ""))
-        self.assertRegex(out, r"(?m)^spacing   \d")  # nobody has left before its time
+        self.assertRegex(out, r"(?m)^spacing   \d")  # no vehicle has left early
         self.assertRegex(out, r"(?m)^latency   p50 \d")
         self.assertFalse(any(map(is_running, vehicles)))
 

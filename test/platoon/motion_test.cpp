@@ -29,7 +29,7 @@ BOOST_AUTO_TEST_CASE(many_small_steps_are_one_large_one, *boost::unit_test::tole
     BOOST_TEST(small.a == large.a);
 }
 
-// The equations, integrated by steps that are too small to matter.
+// The equations, integrated in steps so small that their error does not matter.
 BOOST_AUTO_TEST_CASE(it_does_what_the_equations_say, *boost::unit_test::tolerance(1e-5)) {
     platoon::motion euler{.x = 0, .v = 20, .a = 1};
     constexpr int steps = 1'000'000;

@@ -37,7 +37,7 @@ def run(*arguments):
 
 
 def ended(process):
-    """Sees to it that nothing is left of it."""
+    """Ensures that no process is left."""
     process.kill()
     process.wait()
     for pipe in (process.stdout, process.stderr):

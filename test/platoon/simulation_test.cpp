@@ -61,9 +61,9 @@ BOOST_AUTO_TEST_CASE(late_updates_do_no_harm) {
     BOOST_TEST(result.least_gap > 8);
 }
 
-// Whoever falls silent, and whenever: those behind come to a halt, those ahead drive on, and none of them runs into
-// another. What the one without a driver runs into while those ahead of it brake harder than its own brakes do by
-// themselves is in nobody's hands.
+// If any vehicle falls silent at any time, those behind it stop, those ahead continue, and none of them collides with
+// another. A vehicle without a driver may collide if those ahead brake harder than its own brakes do by themselves;
+// that is not tested.
 BOOST_AUTO_TEST_CASE(whoever_vanishes_nobody_with_a_driver_collides) {
     for (const std::ptrdiff_t who : {0, 1, 5, 8, 9}) {
         for (const double at : {2.0, 5.5, 7.0, 12.0}) {

@@ -33,21 +33,21 @@ BOOST_AUTO_TEST_CASE(a_command_that_changes_steadily_is_carried_on, *boost::unit
     platoon::track other{lag};
     other.receive(told(0, {.x = 0, .v = 25, .a = 0}, -1, -5), 0);
     BOOST_TEST(other.command_at(0.1) == -1.5);
-    BOOST_TEST(other.command_at(10) == other.command_at(0.3)); // nothing changes at one pace for long
+    BOOST_TEST(other.command_at(10) == other.command_at(0.3)); // a change is extrapolated for a short time only
 }
 
 BOOST_AUTO_TEST_CASE(silence_is_counted_by_local_time) {
     platoon::track other{lag};
     other.receive(told(1e6, {}, 0), 5);
     BOOST_TEST(other.silence(5.25) == 0.25);
-    other.receive(told(1e6 + 0.001, {}, 0), 6); // whatever the sender's clock says
+    other.receive(told(1e6 + 0.001, {}, 0), 6); // independent of the sender's clock
     BOOST_TEST(other.silence(6.5) == 0.5);
 }
 
 BOOST_AUTO_TEST_CASE(one_that_comes_late_is_known_to_be_late, *boost::unit_test::tolerance(1e-3)) {
     platoon::track other{lag};
     const platoon::motion start{.x = 0, .v = 20, .a = 0};
-    other.receive(told(50, start, 0), 0);                                // as fast as any
+    other.receive(told(50, start, 0), 0);                                // the minimum delay
     other.receive(told(50.1, {.x = 2, .v = 20, .a = 0}, 0), 0.1 + 0.05); // 50 ms late
     BOOST_TEST(other.at(0.15).x == 3.0);
 }

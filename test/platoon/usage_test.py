@@ -73,7 +73,7 @@ class Usage(unittest.TestCase):
 
     def test_a_drive_is_told_even_if_its_record_cannot_be_written(self):
         where = ("run", "--multicast", free_group(), "--vehicles", 2, "--seconds", 3, "--record")
-        self.assertEqual(run(*where, "/nowhere/record.json"),  # which is known before it begins
+        self.assertEqual(run(*where, "/nowhere/record.json"),  # known before it starts
                          (5, "", "cles-platoon: cannot write /nowhere/record.json: No such file or directory\n"))
         code, out, err = run(*where, "/dev/full")
         self.assertEqual((code, err), (5, "cles-platoon: cannot write /dev/full: No space left on device\n"))

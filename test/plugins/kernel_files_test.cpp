@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What the kernel's files say, from samples of them.
+// Parsing of the kernel's files, from samples of them.
 #include "system/cpu_use.hpp"
 #include "system/disk.hpp"
 #include "system/load.hpp"
@@ -49,10 +49,10 @@ BOOST_AUTO_TEST_CASE(use_of_the_cores_is_what_was_between_two_readings_that_lie_
     BOOST_TEST(use.take({.busy = 250, .all = 1000}, start) == 0.25); // since the machine started
     BOOST_TEST(use.take({.busy = 260, .all = 1010}, start + 10ms) == 260.0 / 1010);
     BOOST_TEST(use.take({.busy = 350, .all = 1200}, start + 200ms) == 0.5);
-    // Soon after: still against the reading before.
+    // Soon after: still relative to the reading before.
     BOOST_TEST(use.take({.busy = 351, .all = 1201}, start + 210ms) == 101.0 / 201);
     BOOST_TEST(use.take({.busy = 350, .all = 1300}, start + 400ms) == 0);
-    BOOST_TEST(use.take({.busy = 340, .all = 1400}, start + 600ms) == 0); // some kernels go back
+    BOOST_TEST(use.take({.busy = 340, .all = 1400}, start + 600ms) == 0); // some kernels count backwards
     BOOST_TEST(use.take({.busy = 340, .all = 1400}, start + 800ms) == 0);
 }
 
@@ -99,7 +99,7 @@ BOOST_AUTO_TEST_CASE(disks_are_counted_whole_and_in_bytes) {
     BOOST_TEST(all[2].device == "nvme0n12");
 }
 
-BOOST_AUTO_TEST_CASE(interfaces_are_counted_both_ways) {
+BOOST_AUTO_TEST_CASE(interfaces_are_counted_in_both_directions) {
     const auto n =
         sysinfo::parse_network("Inter-|   Receive                                                |  Transmit\n"
                                " face |bytes    packets errs drop fifo frame compressed multicast|bytes    packets "
@@ -121,7 +121,7 @@ BOOST_AUTO_TEST_CASE(interfaces_are_counted_both_ways) {
     BOOST_TEST(alias.sent.dropped == 4U);
 }
 
-BOOST_AUTO_TEST_CASE(a_process_is_read_whatever_its_name) {
+BOOST_AUTO_TEST_CASE(a_process_with_any_name_is_parsed) {
     const auto p =
         sysinfo::parse_process("42 (a (b) c) S 1 42 42 0 -1 4194560 100 200 300 400 150 50 11 12 20 0 7 0 12345 "
                                "1000000 250 18446744073709551615 1 1\n",
@@ -135,7 +135,7 @@ BOOST_AUTO_TEST_CASE(a_process_is_read_whatever_its_name) {
     BOOST_TEST(p->memory == 250U * 4096);
 }
 
-BOOST_AUTO_TEST_CASE(what_is_no_such_file_is_harmless) {
+BOOST_AUTO_TEST_CASE(files_of_another_format_are_harmless) {
     for (const std::string_view text :
          {"", "\n", "42", "42 (a", "42 )a(", "42 (a) ", "\xFF\xFE:::", ":", "a:b", "/dev/"}) {
         BOOST_TEST(!sysinfo::parse_process(text, {}).has_value());

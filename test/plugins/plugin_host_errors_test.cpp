@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Libraries that cannot be used: each is told by one clear line, and harms nobody.
+// Libraries that cannot be used: each is reported in one clear line, and affects nothing else.
 #include <cles/service.hpp>
 
 #include "plugins/plugin_host.hpp"
@@ -31,7 +31,7 @@ struct fault {
 };
 std::ostream& operator<<(std::ostream& out, const fault& f) { return out << f.library; }
 
-// What is said, without the path before it.
+// The message, without the path before it.
 constexpr std::array faults{
     fault{"bad_tasks", "PULL 'nothing' has no handler"},
     fault{"crashes_in_check", "its settings check ends the process by signal 6"},
@@ -82,7 +82,7 @@ std::string sound_path() { return std::string{MADE_PLUGINS} + "/sound.so"; }
 
 BOOST_FIXTURE_TEST_SUITE(plugin_host_errors, fixture)
 
-BOOST_DATA_TEST_CASE(each_fault_is_told_in_one_line_that_begins_with_the_path, boost::unit_test::data::make(faults),
+BOOST_DATA_TEST_CASE(each_fault_is_reported_in_one_line_that_begins_with_the_path, boost::unit_test::data::make(faults),
                      wrong) {
     fixture f;
     const auto path = std::string{wrong.library} + ".so";
@@ -91,7 +91,7 @@ BOOST_DATA_TEST_CASE(each_fault_is_told_in_one_line_that_begins_with_the_path, b
     BOOST_TEST(said.find(wrong.said) != std::string::npos, said);
     BOOST_TEST(said.find('\n') == std::string::npos, said);
     BOOST_TEST(f.host.plugins().empty());
-    // The host is as good as before.
+    // The host still works.
     BOOST_TEST(f.load("sound.so") == "");
     BOOST_TEST(f.ask("PULL self:number") == R"({"value":42})");
 }
@@ -114,7 +114,7 @@ BOOST_AUTO_TEST_CASE(a_trial_ends_with_its_process_and_not_with_its_output) {
     plugin_host hasty{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 3s}};
     hasty.load("leaves_a_process.so", "{}", node);
     BOOST_TEST(hasty.plugins().size() == 1U);
-    // Nothing is left of its output, and it goes on.
+    // Its output is discarded, and it continues.
     plugin_host hastier{{.node = "node", .folders = {MADE_PLUGINS}, .trial = 200ms}};
     BOOST_CHECK_EXCEPTION(
         hastier.load("closes_output_and_hangs.so", "{}", node), plugin_error, [](const plugin_error& e) {
@@ -133,7 +133,7 @@ BOOST_AUTO_TEST_CASE(the_setting_that_is_to_blame_is_named) {
         }
         return std::string{"loaded"};
     };
-    for (const auto trial : {10'000ms, 0ms}) { // by the check in a process of its own, and by the start
+    for (const auto trial : {10'000ms, 0ms}) { // by the check in a separate process, and by the start
         BOOST_TEST(blamed("sound.so", R"({"number":"many"})", trial) == "number");
         BOOST_TEST(blamed("sound.so", R"({"numer":7})", trial) == "numer");
         BOOST_TEST(blamed("sound.so", R"({"number":1001})", trial) == "number");
@@ -142,7 +142,7 @@ BOOST_AUTO_TEST_CASE(the_setting_that_is_to_blame_is_named) {
     BOOST_TEST(blamed("refuses_setting.so", "{}", 10'000ms) == "cameras[1].rate");
 }
 
-BOOST_AUTO_TEST_CASE(what_is_no_library_is_told) {
+BOOST_AUTO_TEST_CASE(a_file_that_is_not_a_library_is_reported) {
     const auto folder = std::filesystem::temp_directory_path() / ("cles_plugins_" + std::to_string(::getpid()));
     std::filesystem::create_directories(folder);
     const auto text = (folder / "text.so").string();
@@ -151,7 +151,7 @@ BOOST_AUTO_TEST_CASE(what_is_no_library_is_told) {
     BOOST_TEST(load(text).find("it cannot be loaded: ") != std::string::npos);
     BOOST_TEST(load((folder / "empty.so").string()).find("it cannot be loaded: ") != std::string::npos);
     BOOST_TEST(load(folder.string()).find("it cannot be loaded: ") != std::string::npos);
-    // Without the trial too.
+    // Also without the trial.
     plugin_host untried{{.node = "node", .folders = {}, .trial = 0ms}};
     BOOST_CHECK_EXCEPTION(untried.load(text, "{}", node), plugin_error, [](const plugin_error& e) {
         return std::string{e.what()}.find("it cannot be loaded: /") != std::string::npos;
@@ -159,21 +159,21 @@ BOOST_AUTO_TEST_CASE(what_is_no_library_is_told) {
     std::filesystem::remove_all(folder);
 }
 
-BOOST_AUTO_TEST_CASE(a_file_that_is_not_there_is_told_with_the_folders) {
+BOOST_AUTO_TEST_CASE(a_missing_file_is_reported_with_the_folders) {
     BOOST_TEST(load("nowhere.so") ==
                std::string{"nowhere.so: there is no such file in /nowhere/at/all, "} + MADE_PLUGINS);
     BOOST_TEST(load("./nowhere.so") == "./nowhere.so: there is no such file");
     BOOST_TEST(load("") == "'': the path is empty");
 }
 
-BOOST_AUTO_TEST_CASE(the_same_library_is_not_loaded_twice_by_whatever_path) {
+BOOST_AUTO_TEST_CASE(the_same_library_is_not_loaded_twice_by_any_path) {
     BOOST_TEST(load("sound.so") == "");
     BOOST_TEST(load(sound_path()) == sound_path() + ": it is already loaded");
     BOOST_TEST(ask("PULL self:number") == R"({"value":42})");
 }
 
-BOOST_AUTO_TEST_CASE(a_task_that_another_plugin_has_is_told_with_its_name_and_none_is_registered) {
-    // The same library as a file of its own is another plugin.
+BOOST_AUTO_TEST_CASE(a_task_of_another_plugin_is_reported_with_its_name_and_none_is_registered) {
+    // A copy of the library in another file is another plugin.
     const auto copy = std::filesystem::temp_directory_path() / ("cles_sound_" + std::to_string(::getpid()) + ".so");
     std::filesystem::copy_file(sound_path(), copy, std::filesystem::copy_options::overwrite_existing);
     BOOST_TEST(load("sound.so") == "");
@@ -183,14 +183,14 @@ BOOST_AUTO_TEST_CASE(a_task_that_another_plugin_has_is_told_with_its_name_and_no
     std::filesystem::remove(copy);
 }
 
-BOOST_AUTO_TEST_CASE(a_task_that_the_service_has_is_told) {
+BOOST_AUTO_TEST_CASE(a_task_that_the_service_has_is_reported) {
     node.on_pull("number", [] { return 1; });
     BOOST_TEST(load("sound.so").find("PULL 'number'") != std::string::npos);
     BOOST_TEST(ask("PULL self:number") == R"({"value":1})");
     BOOST_TEST(host.plugins().empty());
 }
 
-BOOST_AUTO_TEST_CASE(a_cpp_plugin_says_what_its_function_threw) {
+BOOST_AUTO_TEST_CASE(a_cpp_plugin_reports_what_its_function_threw) {
     const auto said = [](const std::string& how) {
         fixture f;
         return f.refusal_of_sound(how);
@@ -210,7 +210,7 @@ BOOST_AUTO_TEST_CASE(a_refused_plugin_may_be_loaded_after_it_was_mended) {
     BOOST_TEST(ask("PULL self:number") == R"({"value":42})");
 }
 
-BOOST_AUTO_TEST_CASE(settings_that_do_not_fit_are_told) {
+BOOST_AUTO_TEST_CASE(settings_that_do_not_fit_are_reported) {
     const auto said = [](const std::string& config) {
         fixture f;
         return f.load("sound.so", config);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What plugins may do, and what they must not and do all the same, by a service that calls them in line.
+// What plugins may do, and what they must not do, with a service that calls them inline.
 #include <cles/service.hpp>
 
 #include "plugins/plugin_host.hpp"
@@ -53,7 +53,7 @@ struct fixture {
             return e.what();
         }
     }
-    // Sends it, and leaves it.
+    // Sends it, and does not wait.
     answer<>& send(const std::string& command) {
         auto& a = answers.emplace_back();
         node.async_request(command, a.options(), a.take());
@@ -131,20 +131,20 @@ BOOST_AUTO_TEST_CASE(a_job_whose_responders_go_without_an_answer_has_failed) {
     BOOST_TEST(host->figures().jobs == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(a_job_is_told_when_its_time_is_over) {
+BOOST_AUTO_TEST_CASE(a_job_is_notified_when_its_time_is_over) {
     BOOST_TEST(ask("DELEGATE self:until_stopped deadline=20").starts_with("deadline: "));
     BOOST_TEST(ask("DELEGATE self:polls deadline=20").starts_with("deadline: "));
-    run_until(io, [&] { return host->figures().jobs == 0; }); // both have ended
+    run_until(io, [&] { return host->figures().jobs == 0; }); // both have completed
     BOOST_TEST(host->figures().answered_twice == 0U);
 }
 
-BOOST_AUTO_TEST_CASE(a_job_asks_others_and_goes_on_with_the_answer) {
+BOOST_AUTO_TEST_CASE(a_job_asks_others_and_continues_with_the_reply) {
     BOOST_TEST(ask("DELEGATE self:asks/pull") == R"({"value":42})");
     BOOST_TEST(ask("DELEGATE self:asks/nobody") == "no_task: node has no DELEGATE 'nobody'");
     BOOST_TEST(ask("DELEGATE self:asks_and_throws") == "failed: node: did not like it");
 }
 
-BOOST_AUTO_TEST_CASE(a_job_asks_from_another_thread_and_hears_of_progress) {
+BOOST_AUTO_TEST_CASE(a_job_asks_from_another_thread_and_receives_progress) {
     std::vector<double> parts;
     auto& a = answers.emplace_back();
     node.async_request("DELEGATE self:asks_elsewhere",
@@ -187,7 +187,7 @@ BOOST_AUTO_TEST_CASE(its_bind_handler_decides_and_what_it_publishes_arrives) {
     BOOST_TEST(words == "node: ticks have no parameters");
 }
 
-BOOST_AUTO_TEST_CASE(at_the_stop_jobs_are_answered_and_told_and_no_further_one_begins) {
+BOOST_AUTO_TEST_CASE(at_the_stop_jobs_are_completed_and_notified_and_no_further_one_starts) {
     auto& told = send("DELEGATE self:until_stopped");
     auto& polls = send("DELEGATE self:polls");
     BOOST_TEST(host->stop(20s).late.empty());
@@ -198,7 +198,7 @@ BOOST_AUTO_TEST_CASE(at_the_stop_jobs_are_answered_and_told_and_no_further_one_b
     BOOST_TEST(polls.code == cles::make_error_code(errc::unavailable));
     BOOST_TEST(ask("PULL self:number") == "unavailable: node: the plugin 'sound' has stopped");
     BOOST_TEST(ask("BIND self:ticks").find("async_bind") != std::string::npos);
-    BOOST_TEST(host->stop(20s).late.empty()); // once is enough
+    BOOST_TEST(host->stop(20s).late.empty()); // once is sufficient
 }
 
 BOOST_FIXTURE_TEST_CASE(a_job_is_answered_once_however_often_its_plugin_tries, rough) {
@@ -209,12 +209,12 @@ BOOST_FIXTURE_TEST_CASE(a_job_is_answered_once_however_often_its_plugin_tries, r
     BOOST_TEST(host->figures().jobs == 0U);
 }
 
-BOOST_FIXTURE_TEST_CASE(handles_that_never_were_harm_nobody, rough) {
+BOOST_FIXTURE_TEST_CASE(invalid_handles_are_harmless, rough) {
     BOOST_TEST(ask("DELEGATE self:invented") == R"({"value":true})");
     BOOST_TEST(was_said("rough: of no job"));
 }
 
-BOOST_FIXTURE_TEST_CASE(what_a_handler_throws_out_of_the_plugin_is_caught_and_told, rough) {
+BOOST_FIXTURE_TEST_CASE(exceptions_from_a_handler_are_caught_and_reported, rough) {
     BOOST_TEST(ask("DELEGATE self:throws") == "failed: node: the handler failed");
     BOOST_TEST(was_said("rough: throws: its handler threw 'out of the plugin' out of the plugin"));
     BOOST_TEST(ask("DELEGATE self:throws_anything") == "failed: node: the handler failed");
@@ -232,13 +232,13 @@ BOOST_FIXTURE_TEST_CASE(what_is_no_json_is_not_passed_on, rough) {
 
 BOOST_FIXTURE_TEST_CASE(a_job_that_is_forgotten_ends_at_its_deadline, rough) {
     BOOST_TEST(ask("DELEGATE self:forgets deadline=20").starts_with("deadline: "));
-    BOOST_TEST(host->figures().jobs == 1U); // its plugin may still answer
+    BOOST_TEST(host->figures().jobs == 1U); // its plugin may still reply
     BOOST_TEST(host->stop(20s).late.empty());
     BOOST_TEST(host->figures().jobs == 0U);
     BOOST_TEST(was_said("rough: its stop threw"));
 }
 
-// However short the limit is.
+// Even with a very short limit.
 BOOST_FIXTURE_TEST_CASE(an_on_stop_callback_that_blocks_does_not_keep_its_plugin_from_stopping, rough) {
     send("DELEGATE self:blocks_when_stopped");
     const auto left = host->stop(200ms);

@@ -17,7 +17,7 @@ namespace {
 using cles::responder;
 using cles::runtime::plugin_callback;
 
-// What a responder is told, and on which thread.
+// The calls that a responder receives, and on which thread.
 class recorder final : public cles::detail::call_control {
   public:
     explicit recorder(boost::asio::io_context& io) : io_(io) {}
@@ -99,7 +99,7 @@ BOOST_AUTO_TEST_CASE(from_elsewhere_or_later_the_answer_is_posted) {
     BOOST_TEST(record->told == (std::vector<std::string>{"done 1", "done 1"}), boost::test_tools::per_element());
 }
 
-BOOST_AUTO_TEST_CASE(what_comes_twice_is_counted_and_dropped) {
+BOOST_AUTO_TEST_CASE(duplicates_are_counted_and_dropped) {
     const auto job = open();
     BOOST_TEST(jobs.finish(job, done));
     BOOST_TEST(!jobs.finish(job, done));
@@ -111,7 +111,7 @@ BOOST_AUTO_TEST_CASE(what_comes_twice_is_counted_and_dropped) {
     BOOST_TEST(jobs.stopped(job));
 }
 
-BOOST_AUTO_TEST_CASE(a_job_is_stopped_once_and_told) {
+BOOST_AUTO_TEST_CASE(a_job_is_stopped_once_and_notified) {
     counted c;
     const auto job = open();
     BOOST_TEST(!jobs.stopped(job));
@@ -125,7 +125,7 @@ BOOST_AUTO_TEST_CASE(a_job_is_stopped_once_and_told) {
     jobs.on_stop(job, late.callback());
     BOOST_TEST(late.calls == 1);
     BOOST_TEST(late.drops == 1);
-    BOOST_TEST(jobs.finish(job, done)); // it may still answer
+    BOOST_TEST(jobs.finish(job, done)); // it may still reply
 }
 
 BOOST_AUTO_TEST_CASE(a_callback_is_dropped_uncalled_when_its_job_is_answered_or_gone_or_another_takes_its_place) {
@@ -144,7 +144,7 @@ BOOST_AUTO_TEST_CASE(a_callback_is_dropped_uncalled_when_its_job_is_answered_or_
     }
 }
 
-// A job on a pool, whose responder any thread may use.
+// A job on a pool, whose responder may be used on any thread.
 class pooled_recorder final : public cles::detail::call_control {
   public:
     void done(std::string_view) override { ++answers; }
@@ -170,7 +170,7 @@ BOOST_AUTO_TEST_CASE(a_job_on_a_pool_is_answered_where_it_answers_and_stops_when
     jobs.on_stop(job, c.callback());
     pooled->is_stopped = true;
     BOOST_TEST(jobs.stopped(job));
-    // It answers before it is told; it is told all the same, once, though the end would tell it too.
+    // It replies before it is told to stop; it is told nevertheless, once, although the end would also tell it.
     elsewhere([&] { BOOST_TEST(jobs.finish(job, done)); });
     BOOST_TEST(pooled->answers == 1);
     BOOST_TEST(c.drops == 0);

@@ -43,7 +43,7 @@ BOOST_AUTO_TEST_CASE(a_path_is_taken_as_it_is) {
     BOOST_TEST(find_plugin(path, {folder / "first"}) == path);
 }
 
-BOOST_AUTO_TEST_CASE(what_is_not_there_is_told_with_the_folders) {
+BOOST_AUTO_TEST_CASE(what_is_missing_is_reported_with_the_folders) {
     const auto said = [](const std::string& path, const std::vector<fs::path>& folders) -> std::string {
         try {
             return find_plugin(path, folders).string();

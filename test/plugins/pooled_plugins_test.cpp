@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Plugins on a pool of workers, as the daemon runs them.
+// Plugins on a pool of workers, as in the daemon.
 #include "plugins/plugin_host.hpp"
 #include "runtime/jobs/pooled_node.hpp"
 
@@ -20,7 +20,7 @@ struct fixture : pooled_node {
     explicit fixture(unsigned workers = 2) : pooled_node({.workers = workers}) {}
     void load(const std::string& plugin, const std::string& config = "{}") { host.load(plugin, config, *tasks); }
 
-    // So long all but one in a hundred requests take at most.
+    // 99 of 100 requests take at most this long.
     std::chrono::nanoseconds p99(scripted_peer& client, const std::string& line) {
         constexpr std::size_t count = 500;
         std::vector<std::chrono::nanoseconds> took;
@@ -33,7 +33,7 @@ struct fixture : pooled_node {
         return took[count * 99 / 100];
     }
 
-    // Ends before the node and its pool.
+    // Destroyed before the node and its pool.
     cles::runtime::plugin_host host{{.node = "car1", .folders = {MADE_PLUGINS, PLUGINS}, .log = {}, .trial = 0ms}};
 };
 
@@ -72,19 +72,19 @@ BOOST_AUTO_TEST_CASE(a_pull_that_hangs_does_not_slow_another_task_down) {
     auto client = peer();
     auto hung = peer();
     bool good = false;
-    for (int attempt = 0; attempt < 10 && !good; ++attempt) { // others use this machine too
+    for (int attempt = 0; attempt < 10 && !good; ++attempt) { // other programs use this machine too
         const auto before = p99(client, "PULL self:show");
         hung.send("PULL self:hangs id=1 deadline=60000\n");
         const auto meanwhile = p99(client, "PULL self:show");
         good = meanwhile <= 2 * before;
-        wait_for([&] { return pool->load().running == 1; }); // the last answer may have been first
+        wait_for([&] { return pool->load().running == 1; }); // the last reply may have been first
         BOOST_TEST(client.ask("PUSH self:release") == "{}");
         BOOST_TEST(hung.line() == R"(id=1 {"value":"released"})");
     }
     BOOST_TEST(good);
 }
 
-BOOST_AUTO_TEST_CASE(a_bind_whose_handler_hangs_holds_up_nobody_else) {
+BOOST_AUTO_TEST_CASE(a_bind_whose_handler_hangs_delays_no_other) {
     load("rough.so");
     auto binder = peer();
     auto other = peer();
@@ -97,7 +97,7 @@ BOOST_AUTO_TEST_CASE(a_bind_whose_handler_hangs_holds_up_nobody_else) {
     BOOST_TEST(binder.line() == "id=1 {}");
 }
 
-BOOST_AUTO_TEST_CASE(a_job_may_refuse_and_say_when_to_ask_again) {
+BOOST_AUTO_TEST_CASE(a_job_may_refuse_with_a_retry_time) {
     load("sound.so");
     BOOST_TEST(peer().ask("DELEGATE self:full") ==
                R"({"error":"busy","message":"car1: the dock is full","retry_ms":250})");
@@ -108,7 +108,7 @@ BOOST_AUTO_TEST_CASE(a_job_may_refuse_by_the_bare_entry_point_from_any_thread_an
     load("rough.so");
     BOOST_TEST(peer().ask("DELEGATE self:full") ==
                R"({"error":"busy","message":"car1: the dock is full","retry_ms":250})");
-    wait_for([&] { return host.figures().answered_twice == 1; }); // the second try may still be on its way
+    wait_for([&] { return host.figures().answered_twice == 1; }); // the second attempt may still be in transit
 }
 
 BOOST_AUTO_TEST_CASE(an_answer_that_is_not_json_is_not_passed_on) {
@@ -117,7 +117,7 @@ BOOST_AUTO_TEST_CASE(an_answer_that_is_not_json_is_not_passed_on) {
                R"({"error":"failed","message":"car1: the plugin's answer is not JSON"})");
 }
 
-BOOST_AUTO_TEST_CASE(a_job_that_waits_for_others_is_told_once_that_the_node_stops) {
+BOOST_AUTO_TEST_CASE(a_job_that_waits_for_others_is_notified_once_that_the_node_stops) {
     cles::service other{io, listening("other")};
     std::vector<cles::responder> kept;
     other.on_delegate("never", [&](const cles::request&, cles::responder r) { kept.push_back(std::move(r)); });

@@ -24,7 +24,7 @@ struct fixture : cles::test::asked_node {
 
 BOOST_FIXTURE_TEST_SUITE(primes, fixture)
 
-BOOST_AUTO_TEST_CASE(they_are_told_and_counted) {
+BOOST_AUTO_TEST_CASE(they_are_reported_and_counted) {
     BOOST_TEST(ask("PULL self:prime/97") == R"({"value":true})");
     BOOST_TEST(ask("PULL self:prime/98") == R"({"value":false})");
     BOOST_TEST(ask("PULL self:prime/x") == "bad_request: node: parameter 1 is not a valid number");
@@ -56,7 +56,7 @@ BOOST_AUTO_TEST_CASE(a_part_that_fails_fails_the_whole) {
                           });
 }
 
-BOOST_AUTO_TEST_CASE(progress_is_told_with_what_has_been_found) {
+BOOST_AUTO_TEST_CASE(progress_is_reported_with_what_has_been_found) {
     double last = 0;
     std::string found;
     cles::test::answer<> a;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// probe PLUGIN CONFIG COMMAND...: loads a plugin as clesd does, and prints what its tasks answer.
+// probe PLUGIN CONFIG COMMAND...: loads a plugin as clesd does, and prints the replies of its tasks.
 #include <cles/service.hpp>
 
 #include "plugins/plugin_host.hpp"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The system's tasks, in an application's service, on this machine.
+// The tasks of `system`, in an application's service, on this machine.
 #include <cles/service.hpp>
 
 #include "support/run_until.hpp"
@@ -71,7 +71,7 @@ BOOST_AUTO_TEST_CASE(this_machine_makes_sense) {
     BOOST_TEST(own->state.size() == 1U);
 }
 
-BOOST_DATA_TEST_CASE(each_noun_is_published_once_somebody_is_bound, boost::unit_test::data::make(nouns), noun) {
+BOOST_DATA_TEST_CASE(each_noun_is_published_once_it_has_a_subscriber, boost::unit_test::data::make(nouns), noun) {
     fixture f;
     int updates = 0;
     using json_feed = cles::feed<cles::json_text>;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// The tasks of the example 14 answer alike wherever they live.
+// The tasks of example 14 reply identically in a service, a test and a plugin.
 #include <cles/service.hpp>
 
 #include "../../apps/examples/three_homes/odometer.hpp"
@@ -54,7 +54,7 @@ BOOST_AUTO_TEST_CASE(an_application_a_test_and_a_plugin_answer_alike) {
     BOOST_TEST(here.at(2) == R"({"value":6})");
 }
 
-BOOST_AUTO_TEST_CASE(settings_for_a_plugin_that_has_none_are_told) {
+BOOST_AUTO_TEST_CASE(settings_for_a_plugin_without_any_are_reported) {
     boost::asio::io_context io;
     cles::service daemon{io, {.name = "node"}};
     cles::runtime::plugin_host host{{.node = "node", .folders = {}}};

@@ -56,13 +56,13 @@ class gossip_network::member final : public place,
           others_known(said.node, epoch, deadlines, most_known),
           gossip({said.node, protocol::epoch_text(epoch)}, *this, others_known, counts, deadlines, most_known,
                  static_cast<std::uint32_t>(owner.dice_.next())),
-          mouth(*this, deadlines, static_cast<std::uint32_t>(owner.dice_.next())) {
+          announcer(*this, deadlines, static_cast<std::uint32_t>(owner.dice_.next())) {
         said.load.workers = 4;
         others_known.watch(this);
     }
 
     void begin() {
-        mouth.start(now());
+        announcer.start(now());
         deadlines.expire(now()); // it announces itself before it sends requests
         gossip.set_seeds(net.seeds_, now());
         gossip.start(now());
@@ -128,7 +128,7 @@ class gossip_network::member final : public place,
     core::deadline_queue deadlines;
     core::membership others_known;
     core::gossip gossip;
-    core::announcer mouth;
+    core::announcer announcer;
 };
 
 gossip_network::gossip_network(std::uint64_t seed, gossip_weather weather, planted fault)

@@ -35,7 +35,7 @@ class network {
         member(network& n, std::string called, std::uint32_t number)
             : owner(n), said{.node = std::move(called), .endpoints = {"tcp://0.0.0.0:25370"}},
               epoch(number), from{0x0A000000U + number, 40000}, others_known(said.node, number, n.deadlines_, 2000),
-              mouth(*this, n.deadlines_, number * 7919) {}
+              announcer(*this, n.deadlines_, number * 7919) {}
 
         void announce(std::chrono::milliseconds interval) override {
             said.interval = interval;
@@ -55,22 +55,22 @@ class network {
         cles::core::group_source from;
         bool alive = true;
         cles::core::membership others_known;
-        cles::core::announcer mouth;
+        cles::core::announcer announcer;
     };
 
     member& start(std::string name) {
         auto& made = *members_.emplace_back(std::make_unique<member>(*this, std::move(name), next_++));
         for (const auto& other : members_) { // BIND all:cles
             if (other->alive && other.get() != &made && arrives()) {
-                other->mouth.solicited(clock_.now());
+                other->announcer.solicited(clock_.now());
             }
         }
-        made.mouth.start(clock_.now());
+        made.announcer.start(clock_.now());
         return made;
     }
     void kill(member& m) {
         m.alive = false;
-        m.mouth.stop();
+        m.announcer.stop();
     }
     void stop(member& m) {
         m.said.leaving = true;

@@ -15,7 +15,7 @@ namespace cles::test {
 /// A source in the group that is not the node under test.
 constexpr core::group_source source_at(std::uint16_t port) { return {.address = 0x7f000001, .port = port}; }
 
-/// Records what a node sends to its group, as far as the test lets it.
+/// Records what a node sends to its group.
 class group_recorder final : public core::group_port {
   public:
     explicit group_recorder(const core::group_source& self = source_at(4000)) : self_(self) {}

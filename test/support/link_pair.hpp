@@ -23,17 +23,17 @@ namespace cles::test {
 /// All kinds of links.
 enum class carrier { tcp4, tcp6, unix_file, unix_abstract, inproc, inproc_threads, udp4, udp6 };
 
-/// The streams, all of which meet the same contract.
+/// The streams, all of which fulfil the same contract.
 inline constexpr std::array every_carrier{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
                                           carrier::unix_abstract, carrier::inproc, carrier::inproc_threads};
 inline constexpr std::array every_socket{carrier::tcp4, carrier::tcp6, carrier::unix_file, carrier::unix_abstract};
 
-/// Those that carry each line as one datagram.
+/// Those that send each line as one datagram.
 inline constexpr std::array every_datagram{carrier::udp4, carrier::udp6};
 /// All of them, for tests of listening and dialling.
-inline constexpr std::array every_door{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
-                                       carrier::unix_abstract, carrier::inproc, carrier::inproc_threads,
-                                       carrier::udp4,          carrier::udp6};
+inline constexpr std::array listening_carriers{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
+                                               carrier::unix_abstract, carrier::inproc, carrier::inproc_threads,
+                                               carrier::udp4,          carrier::udp6};
 
 std::ostream& operator<<(std::ostream& out, carrier kind);
 
@@ -44,7 +44,7 @@ std::string fresh_address(carrier kind);
 struct link_end {
     std::shared_ptr<link_recorder> events = std::make_shared<link_recorder>();
     link_ptr link{};
-    side_thread* home = nullptr; ///< the thread on which it lives, if not the test's
+    side_thread* home = nullptr; ///< the thread on which it runs, if not the test's
 
     /// Uses the link or its owner on their thread.
     template <class F>

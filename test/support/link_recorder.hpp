@@ -15,7 +15,7 @@ namespace cles::test {
 /// An owner of a link that records its calls.
 class link_recorder final : public link_events {
   public:
-    // A letter per call, in order: (l)ine, (b)atch, (o)verlong, (e)nd, lo(x)st, (r)oom.
+    // A letter per call, in order: (l)ine, (b)atch, (o)verlong, (e)nd, lo(x)st, w(r)itable.
     std::string calls{};
     std::vector<std::string> lines{};
     std::string head{};
@@ -31,7 +31,7 @@ class link_recorder final : public link_events {
     [[nodiscard]] bool lost() const { return has('x'); }
     [[nodiscard]] bool over() const { return has('e') || lost(); }
 
-    /// Whether the calls had the order that `link_events` promises.
+    /// Whether the calls had the order that `link_events` guarantees.
     [[nodiscard]] bool in_order() const {
         const auto last_word = calls.find_first_of("oe");
         const auto lines_end = calls.rfind('l');

@@ -41,9 +41,9 @@ class recording_line_sink : public core::line_sink {
         held_.resize(0);
         return std::exchange(urgent_, {}) + std::exchange(text_, {});
     }
-    /// The size of the output that has not been taken.
+    /// The size of the output that has not been sent.
     [[nodiscard]] std::size_t unsent() const { return text_.size() + urgent_.size(); }
-    /// What a link does after each batch: accounts for what the peer has not taken.
+    /// What a link does after each batch: accounts for what the peer has not accepted.
     void settle() { held_.resize(unsent()); }
     /// The same, line by line and without LF. A last line without LF appears as "... <no LF>".
     std::vector<std::string> take_lines() {

@@ -11,7 +11,7 @@
 
 namespace cles::test {
 
-/// A subscriber that takes updates as long as the test lets it.
+/// A subscriber that accepts a number of updates that the test sets.
 class recording_subscriber final : public core::subscriber {
   public:
     [[nodiscard]] bool takes_updates() const override { return capacity != 0; }
@@ -22,7 +22,7 @@ class recording_subscriber final : public core::subscriber {
     }
     std::string take() { return std::exchange(text_, {}); }
 
-    /// How many more times it takes updates.
+    /// How many more updates it accepts.
     std::size_t capacity = std::numeric_limits<std::size_t>::max();
     std::size_t puts = 0;
 

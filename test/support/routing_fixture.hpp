@@ -34,7 +34,7 @@ struct routing_fixture {
     static std::string task(const std::string& verb, const std::string& name, bool idempotent = false) {
         return R"({"verb":")" + verb + R"(","task":")" + name + (idempotent ? R"(","idempotent":true})" : "\"}");
     }
-    /// Another node announces itself and its tasks, with a digest of its own.
+    /// Another node announces itself and its tasks, with a different digest.
     void offer(const std::string& name, const std::string& tasks, node_load load = {}) {
         hear(name, "of " + name, load);
         ways.to(name).answers(description(name, tasks));

@@ -13,7 +13,7 @@
 
 namespace cles::test {
 
-/// Small ones hold little, so that an unread stream fills up soon.
+/// Small ones have little capacity, so that an unread stream fills up soon.
 enum class buffers { usual, small };
 
 /// A plain socket with which a test plays the peer of a link byte by byte. While it waits, it runs the link's context;
@@ -24,7 +24,7 @@ class scripted_peer {
 
     /// Connects to a listener.
     scripted_peer(boost::asio::io_context& io, std::string_view url, buffers size = buffers::usual);
-    /// Takes over a connected socket.
+    /// Takes ownership of a connected socket.
     scripted_peer(boost::asio::io_context& io, int descriptor) noexcept : io_(&io), descriptor_(descriptor) {}
     scripted_peer(scripted_peer&& other) noexcept;
     scripted_peer& operator=(scripted_peer&& other) noexcept;
@@ -32,7 +32,7 @@ class scripted_peer {
 
     /// Sends all of it.
     void send(std::string_view bytes, const place& where = place::current());
-    /// Sends what the socket takes at once; returns how much that was.
+    /// Sends what the socket accepts at once; returns the number of bytes.
     std::size_t send_some(std::string_view bytes);
     /// The next line, without its LF.
     std::string line(const place& where = place::current());

@@ -85,7 +85,7 @@ void world::run_what_is_ready() {
     }
 }
 
-void world::check_that_it_lives(deed d) {
+void world::check_that_it_works(deed d) {
     if (!tower) {
         run_what_is_ready();
     } else {
@@ -117,8 +117,8 @@ void world::check_that_it_lives(deed d) {
 
 void check_that_three_are_called(world& w, deed does, const std::array<int, 3>& calls) {
     w.until([&] { return calls[0] != 0 && calls[1] != 0 && calls[2] != 0; });
-    w.acted = 1; // the bystanders did nothing
-    w.check_that_it_lives(does);
+    w.acted = 1; // the others did nothing
+    w.check_that_it_works(does);
     BOOST_TEST(calls == (std::array{1, 1, 1}), boost::test_tools::per_element());
 }
 

@@ -19,7 +19,7 @@
 #include <source_location>
 #include <vector>
 
-/// User code that misbehaves, and what it must not harm.
+/// User code that misbehaves, and what must not be affected.
 namespace cles::test::user_code_fixture {
 
 /// What user code does.
@@ -41,17 +41,17 @@ inline std::ostream& operator<<(std::ostream& out, place p) { return out << plac
 
 struct thrown_by_test {};
 
-/// A service whose user code misbehaves, with others to talk to.
+/// A service whose user code misbehaves, and peers for it.
 struct world {
     explicit world(service_options own = {});
     ~world();
     world(const world&) = delete;
     world& operator=(const world&) = delete;
 
-    /// What user code does where it is called.
+    /// The action of user code when it is called.
     void act(deed d);
 
-    /// Runs, and calls again what was thrown out of.
+    /// Runs, and calls run again after an exception.
     template <class Condition>
     void until(Condition holds, const std::source_location& where = std::source_location::current()) {
         for (;;) {
@@ -65,8 +65,8 @@ struct world {
     }
     void run_what_is_ready();
 
-    /// The service lives on: it is answered, and its timer is armed. Meanwhile, what is ready is run.
-    void check_that_it_lives(deed d);
+    /// The service still works: it replies, and its timer is armed. Meanwhile, what is ready is run.
+    void check_that_it_works(deed d);
 
     boost::asio::io_context io;
     scripted_listener silent{io};
@@ -74,8 +74,8 @@ struct world {
     std::unique_ptr<service> friendly = std::make_unique<service>(io, listening("car3"));
     std::vector<responder> jobs;
     std::vector<responder> endless;
-    boost::asio::cancellation_signal patient_signal; // of what waits all the time
-    boost::asio::cancellation_signal first;          // of what ends beside the one that acts
+    boost::asio::cancellation_signal patient_signal; // of operations that wait all the time
+    boost::asio::cancellation_signal first;          // of operations that end next to the one that acts
     boost::asio::cancellation_signal second;
     boost::asio::cancellation_signal third;
     answer<> patient;
@@ -87,7 +87,7 @@ struct world {
     std::unique_ptr<service> tower;
 };
 
-/// A completion handler that does something.
+/// A completion handler that performs an action.
 struct handler {
     world* in;
     int* calls;
@@ -100,7 +100,7 @@ struct handler {
     }
 };
 
-/// Does something when it is destroyed.
+/// Performs an action when it is destroyed.
 struct doer {
     doer(world& w, deed d) noexcept : in(w), does(d) {}
     doer(const doer&) = delete;
@@ -110,7 +110,7 @@ struct doer {
     deed does;
 };
 
-/// Runs until all three have been called, and checks that each was called once and that the service lives on.
+/// Runs until all three have been called, and checks that each was called once and that the service still works.
 void check_that_three_are_called(world& w, deed does, const std::array<int, 3>& calls);
 
 } // namespace cles::test::user_code_fixture

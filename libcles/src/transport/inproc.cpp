@@ -73,8 +73,8 @@ class inproc_link final : public link, public std::enable_shared_from_this<inpro
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }
     void flush() override;
-    [[nodiscard]] std::size_t unsent() const noexcept override { return output_.size() + on_its_way(); }
-    [[nodiscard]] std::uint64_t sent() const noexcept override { return flushed_ - on_its_way(); }
+    [[nodiscard]] std::size_t unsent() const noexcept override { return output_.size() + excess_in_transit(); }
+    [[nodiscard]] std::uint64_t sent() const noexcept override { return flushed_ - excess_in_transit(); }
     [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
     void pause(bool stop) override;
     void finish() override;
@@ -101,7 +101,7 @@ class inproc_link final : public link, public std::enable_shared_from_this<inpro
     void lose();
     [[nodiscard]] bool drained() const noexcept { return read_at_ >= text_.size() && inbox_.empty(); }
     // This much may be in transit before it counts as unsent, like data in the buffers of a socket.
-    [[nodiscard]] std::size_t on_its_way() const noexcept {
+    [[nodiscard]] std::size_t excess_in_transit() const noexcept {
         return in_transit_ > capacity ? in_transit_ - capacity : 0;
     }
 
@@ -188,9 +188,9 @@ void inproc_link::flush() {
 }
 
 void inproc_link::consumed(std::size_t bytes) {
-    const bool was_full = on_its_way() != 0;
+    const bool was_full = excess_in_transit() != 0;
     in_transit_ -= bytes;
-    if (!was_full || on_its_way() != 0) {
+    if (!was_full || excess_in_transit() != 0) {
         return;
     }
     if (state_ == state::finishing) {
@@ -337,7 +337,7 @@ void inproc_link::finish() {
     post_to_peer([](inproc_link& other) { other.on_other_finished(); });
     if (ended_ || peer_closed_) {
         lose_later();
-    } else if (on_its_way() == 0) {
+    } else if (excess_in_transit() == 0) {
         wait_for_peer_close();
     }
 }

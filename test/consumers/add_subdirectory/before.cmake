@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: BSL-1.0
-# Takes down how this project stands, for after.cmake.
+# Records the settings of this project, for after.cmake.
 
 set(settings
     BOOST_ROOT

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Announcements of nodes, a line each: what is read stays within its bounds, and what is written is what was read. The
-// table of nodes takes them from two sources, with time passing.
+// Announcements of nodes, one a line: parsed values stay within their limits, and what is written is what was read. The
+// table of nodes receives them from two sources, with time passing.
 
 #include "node/membership/announcement.hpp"
 
@@ -53,7 +53,7 @@ void check_written(const core::announcement& said, const protocol::request_line&
 
 void check_reachable(const core::announcement& said, const core::group_source& from) {
     for (const auto& endpoint : core::reachable_endpoints(said.endpoints, core::observed_source::of(from))) {
-        const auto where = parse_url(endpoint); // throws where it is none
+        const auto where = parse_url(endpoint); // throws if it is not a URL
         require(where.scheme != "inproc", "nobody is sent into another process", endpoint);
         require(from.is_loopback() ||
                     (where.scheme != "unix" && !where.host.starts_with("127.") && where.host != "::1"),

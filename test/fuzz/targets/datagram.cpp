@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Datagrams from several sources, arbitrary ones and repeated ones, while time goes by, the node publishes, its
-// handlers answer late and it asks on its own. One step a line:
+// Datagrams from several sources, arbitrary and repeated ones, while time passes, the node publishes, its handlers
+// reply late and it sends requests itself. One step a line:
 //
 //     a PUSH car1:store id=7 {"x":1}   source a (to d) sends this; \n is an LF, \\ a backslash
 //     +250                             so many milliseconds go by
@@ -9,9 +9,9 @@
 //     ~busy                            the same, with a failure
 //     ?a                               the node asks source a
 //
-// Whatever comes: what goes out is a message of its size, nothing is answered that was not asked, no effect comes twice
-// within a minute, a repeat gets the same answer, what the node asks ends once and in time, and when all is quiet
-// nothing is kept.
+// For every input: each output is a message within its size, there is no reply without a request, no effect occurs
+// twice within a minute, a repetition gets the same reply, the node's requests complete once and in time, and without
+// activity nothing is kept.
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
 
@@ -55,7 +55,7 @@ limits small_limits() {
     return bounds;
 }
 
-/// A request of the node's own: ends once, by its deadline.
+/// A request of the node itself: completes once, by its deadline.
 class asked final : public detail::pending {
   public:
     asked(test::test_node& node, std::size_t& open) : node_(node), open_(open), due_(node.clock.now() + asked_for) {
@@ -181,7 +181,7 @@ class watched_node {
         settle();
     }
 
-    /// Time goes by until nothing is kept any more.
+    /// Advances the time until nothing is kept any more.
     void end() {
         for (const auto& running : std::exchange(node_.started, {})) {
             running->call->done("{}");
@@ -217,7 +217,7 @@ class watched_node {
         return out;
     }
 
-    // Each deadline at its time, as a timer would have it.
+    // Each deadline expires at its time, as with a timer.
     void pass(milliseconds span) {
         const auto end = node_.clock.now() + span;
         auto& deadlines = node_.host->deadlines;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// What a node hears in its multicast group: a script, a line for each step.
+// What a node receives in its multicast group: a script, one step a line.
 //
 //   1BIND all:speed      a datagram of source 1 (a digit; 0 is the node itself)
 //   !speed {"v":1}       the node publishes
@@ -7,8 +7,8 @@
 //   *0                   its feed 0, 1 or 2 is opened, or closed if it is open
 //   -                    the socket is not writable, or is again
 //
-// Whatever is heard, the node says nothing but BINDs of its feeds and updates of its own, each in one datagram, no more
-// of them than there is reason for, and keeps within its bounds.
+// For every input, the node sends only BINDs of its feeds and its own updates, each in one datagram, no more of them
+// than necessary, and stays within its limits.
 #include <cles/error.hpp>
 #include <cles/json_reader.hpp>
 
@@ -163,7 +163,7 @@ class watched_group {
         try {
             node_.published.publish_body(protocol::canonical_path(noun, scratch), body);
             ++published_;
-        } catch (const error&) { // past a limit
+        } catch (const error&) { // a limit is exceeded
             return;
         }
         core::send_updates(node_.unsent, node_.published, clock_.now());

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// JSON: our reader, our check and Boost.JSON agree on what is JSON and what it says; what we write reads back the same.
+// JSON: our reader, our validation and Boost.JSON agree on what is valid and what it means; what we write is read back
+// unchanged.
 #include <cles/convert.hpp>
 #include <cles/json_value.hpp>
 
@@ -64,7 +65,7 @@ std::size_t depth_of(const json::value& v) {
     return deepest_inside + 1;
 }
 
-/// Boost's reader is not exact: the last digits of its doubles are its own. And it takes -0 for an integer.
+/// Boost's reader is not exact: its doubles may differ in the last digits. And it reads -0 as an integer.
 bool nearly_same(const json::value& ours, const json::value& theirs) {
     if (ours.kind() != theirs.kind()) {
         return ours.is_double() && ours.get_double() == 0 && theirs == 0;
@@ -72,7 +73,7 @@ bool nearly_same(const json::value& ours, const json::value& theirs) {
     if (ours.is_double()) {
         const auto a = ours.get_double();
         const auto b = theirs.get_double();
-        constexpr double tiny = 1e-290; // where there are few digits left to agree in
+        constexpr double tiny = 1e-290; // below this, few digits are left to compare
         return a == b || std::fabs(a - b) <= 1e-12 * std::fabs(a) || (std::fabs(a) < tiny && std::fabs(b) < tiny) ||
                !std::isfinite(b);
     }
@@ -106,7 +107,7 @@ void check_value(std::string_view text, const json::value* theirs) {
     std::string compact;
     append_compact_json(written, compact);
     require(compact == written, "what is written has no white space", written);
-    // JSON does not tell 3.0 from 3, so that the trees' texts are compared, not their kinds of numbers.
+    // JSON does not distinguish 3.0 from 3, so the texts of the trees are compared, not their kinds of numbers.
     json::value again;
     require(from_json(written, again), "what is written can be read", written);
     require(to_json(again) == written, "it is written the same", written);

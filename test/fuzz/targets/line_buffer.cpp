@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
-// Lines from a stream: however it is cut into reads, the same lines come out.
+// Lines from a stream: they do not depend on how it is split into reads.
 //
-// The input's first four bytes choose the limit, how often the rest is repeated, and two numbers that the cuts are
-// drawn from.
+// The input's first four bytes select the limit, how often the rest is repeated, and two numbers that determine the
+// splits.
 #include "fuzz/fuzz.hpp"
 #include "protocol/line.hpp"
 
@@ -23,7 +23,7 @@ struct outcome {
     bool operator==(const outcome&) const = default;
 };
 
-/// The same by other means.
+/// A second, simpler implementation.
 outcome expected(std::string_view stream, std::size_t limit) {
     outcome result;
     while (!stream.empty()) {
@@ -44,7 +44,7 @@ outcome expected(std::string_view stream, std::size_t limit) {
     return result;
 }
 
-/// Hands the stream over in pieces of at most so many bytes.
+/// Delivers the stream in pieces of at most this many bytes.
 template <class Cut>
 outcome buffered(std::string_view stream, std::size_t limit, Cut next_cut) {
     constexpr std::size_t read_ahead = 65536;

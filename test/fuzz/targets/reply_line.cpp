@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A line of a reply, failures included: what is read is what is written, and a failure is always valid JSON.
+// A reply line, including failures: what is read is what is written, and a failure is always valid JSON.
 #include "protocol/reply_line.hpp"
 
 #include <cles/json_reader.hpp>

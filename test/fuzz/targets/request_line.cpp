@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A line of a request: what is read is what is written, whatever stands there.
+// A request line: what is read is what is written, for any content.
 #include "protocol/request_line.hpp"
 
 #include "fuzz/fuzz.hpp"
@@ -113,7 +113,7 @@ void run(std::string_view input) {
     const auto again = p::trim(std::string_view{text}.substr(0, text.size() - 1));
     p::request_line second;
     require(p::parse_request(again, second, malformed), "what is written can be read", text);
-    // What these verbs are not asked for is not read, so that it is not written for others.
+    // Adverbs that do not apply to these verbs are not read, so they are not written for others.
     check_same(request, second, line);
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// A conversation: a script as those in test/golden, of which only the steps count. Whatever is said, in whatever order,
-// and whenever time goes by: what the node says is well-formed, no more than was asked for, and within its limits.
+// A conversation: a script like those in test/golden, of which only the steps count. For any steps, in any order and at
+// any time: the node's output is well-formed, no more than was requested, and within its limits.
 #include <cles/json_reader.hpp>
 
 #include "fuzz/fuzz.hpp"
@@ -17,7 +17,7 @@ namespace cles::fuzz {
 namespace {
 
 constexpr std::size_t most_steps = 150;
-constexpr std::size_t deep = 64; // deeper than any body that a handler gives back
+constexpr std::size_t deep = 64; // deeper than any body that a handler returns
 
 // Small, so that a short script reaches them.
 limits small_limits() {
@@ -43,7 +43,7 @@ class watched_conversation {
         const auto what = line.substr(named ? 1 : 0);
         const bool ends = what.starts_with("@ overlong") || what.starts_with("@ end");
         const bool comes = what.starts_with('>') || ends;
-        // A transport hands nothing over that it was asked to keep, nor after the end (cles/link.hpp).
+        // A transport delivers nothing while it is paused, nor after the end (cles/link.hpp).
         if (what.starts_with("@ limits") || link.closed || (comes && (link.paused || link.ended))) {
             return;
         }
@@ -52,7 +52,7 @@ class watched_conversation {
         try {
             talk_.perform(line);
         } catch (const test::script_error&) {
-            // Not every script makes sense.
+            // Not every script is valid.
         }
         link.closed = link.closed || what.starts_with("@ lost");
         for (const auto& event : talk_.take()) {
@@ -120,7 +120,7 @@ class watched_conversation {
         require(talk_.node()->counts().handlers_running <= bounds.running, "handlers are no more than may run");
         require(talk_.node()->host->deadlines.size() < 1000, "deadlines are no more than what waits");
         for (const auto& [name, link] : talk_.links()) {
-            // What waits for its turn may be an answer already, which counts by its bytes.
+            // What waits for its turn may already be a reply, which counts with its bytes.
             require(link->session().serving().in_flight() <= bounds.in_flight + bounds.waiting / 2 + 2,
                     "what is in flight is bounded");
             require(link->session().serving().bindings() <= bounds.bindings, "bindings are bounded");

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-// Tables of nodes, a line each, that others tell: what is taken stays within its bounds, what is told in turn can be
-// read, and one who asks again and again for what is new ends up with all that there is.
+// Tables of nodes from other nodes, one a line: what is accepted stays within its limits, what is sent in turn can be
+// read, and a node that repeatedly asks for changes finally receives everything.
 
 #include <cles/json_reader.hpp>
 
@@ -19,7 +19,7 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t most_peers = 4;
 
-// Reads a table and applies it to `table`. Returns false if it is none.
+// Reads a table and applies it to `table`. Returns false if it is not valid.
 bool learn(core::membership& table, std::string_view text, std::size_t most, time_point now, core::peer_table& read) {
     const bool good = core::read_table(text, most, core::usual_interval, read);
     for (const auto& r : read.reports) {
@@ -37,7 +37,7 @@ bool learn(core::membership& table, std::string_view text, std::size_t most, tim
     return good;
 }
 
-// Of another node that asks this one until there is no more.
+// For another node that asks this one until there is nothing more.
 void check_told(const core::membership& table, time_point now) {
     core::deadline_queue deadlines;
     core::membership other{"other", 2, deadlines, most_peers * 2};

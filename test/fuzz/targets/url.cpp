@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A link's address: what is read can be written and read again, and is then the same.
+// A link's address: what is read can be written, and read again with the same result.
 #include <cles/error.hpp>
 #include <cles/url.hpp>
 

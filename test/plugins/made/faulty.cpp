@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// Plugins that are wrong in one way each, which FAULT_... names, written against the bare C entry point.
+// Plugins with one fault each, selected by FAULT_..., written against the bare C entry point.
 #include <cles/plugin_abi.h>
 
 #include <csignal>
@@ -20,14 +20,14 @@ constexpr cles_text text_of(const char* text, size_t size) { return {text, size}
     }
 }
 
-// Uses more of the stack than there is.
+// Exhausts the stack.
 [[maybe_unused]] int deeper(int depth) { // NOLINT(misc-no-recursion)
     volatile char frame[4096] = {};
     frame[depth % 4096] = 1;
     return depth < 0 ? 0 : deeper(depth + 1) + frame[0];
 }
 
-// Whether this is a process that only tries the library, and dies with its parent.
+// Whether this process only tries the library, and ends with its parent.
 [[maybe_unused]] bool is_tried() {
     int with_parent = 0;
     return ::prctl(PR_GET_PDEATHSIG, &with_parent) == 0 && with_parent == SIGKILL;
@@ -46,7 +46,7 @@ constexpr cles_text text_of(const char* text, size_t size) { return {text, size}
     std::abort();
 #elif defined(FAULT_LEAVES_A_PROCESS)
     (void)host;
-    if (is_tried() && ::fork() == 0) { // which keeps stdout open
+    if (is_tried() && ::fork() == 0) { // keeps stdout open
         ::alarm(20);
         hang();
     }
@@ -102,7 +102,7 @@ constexpr cles_text text_of(const char* text, size_t size) { return {text, size}
     }
     task = {};
     task.size = 4;
-    if (host->add_task(host, &task) != CLES_BAD_TASK) { // no name, since the size says so
+    if (host->add_task(host, &task) != CLES_BAD_TASK) { // no name, according to the size
         return 4;
     }
     return 1;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A plugin whose jobs do what they must not, written against the bare C entry point.
+// A plugin whose jobs violate the rules, written against the bare C entry point.
 #include <cles/plugin_abi.h>
 
 #include <atomic>
@@ -48,7 +48,7 @@ void invented(void*, cles_job job, const cles_request*) {
         answers += string(code) == "cancelled" && std::this_thread::get_id() != here ? 1 : 2;
     };
     the_host->delegate(the_host, 12345, text("PULL self:cles"), &ask);
-    while (answers == 0) { // later, and on another thread, also where there is nothing to ask
+    while (answers == 0) { // later, and on another thread, even if there is nothing to ask
         std::this_thread::yield();
     }
     const int drops = *static_cast<int*>(callback.user);
@@ -80,7 +80,7 @@ std::condition_variable changed;
 int releases = 0;
 bool over = false;
 
-// Holds its worker until the plugin is stopped or `release` is asked for.
+// Blocks its worker until the plugin is stopped or `release` is requested.
 void hangs(void*, cles_job job, const cles_request*) {
     {
         std::unique_lock lock{mutex};
@@ -93,7 +93,7 @@ void set_over(bool value) {
     over = value;
     changed.notify_all();
 }
-// Its callback holds its thread until the plugin is stopped.
+// Its callback blocks its thread until the plugin is stopped.
 void blocks_when_stopped(void*, cles_job job, const cles_request*) {
     const cles_callback callback{[](void*) {
                                      std::unique_lock lock{mutex};
@@ -110,7 +110,7 @@ void release(void*, cles_job job, const cles_request*) {
     changed.notify_all();
     the_host->done(the_host, job, text(""));
 }
-// Asks somebody who never answers, and writes down what it is told.
+// Sends a request to a node that never replies, and records the result.
 std::mutex told_mutex;
 std::string told;
 void asks(void*, cles_job job, const cles_request*) {
@@ -140,7 +140,7 @@ void too_late(void*, cles_job job, const cles_request*) {
     the_host->done(the_host, job, text(the_host->add_task(the_host, &late) == CLES_TOO_LATE ? "true" : "false"));
 }
 
-// Everything that it was asked, as it came.
+// All requests that it received, unchanged.
 void show(void*, cles_job job, const cles_request* asked) {
     std::string out =
         "{\"task\":\"" + string(asked->task) + "\",\"node\":\"" + string(asked->node) + "\",\"parameters\":[";
@@ -189,7 +189,7 @@ int32_t start(const cles_host* host, cles_text) {
     add(host, "undecided", undecided, CLES_BIND, CLES_TASK_INLINE_OK);
     add(host, "unwelcoming", unwelcoming, CLES_BIND, CLES_TASK_INLINE_OK);
     add(host, "patient", hangs, CLES_BIND);
-    add(host, "idle", nullptr, CLES_PULL); // refused, and does without
+    add(host, "idle", nullptr, CLES_PULL); // refused, and the plugin continues without it
     return 0;
 }
 

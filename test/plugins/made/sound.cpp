@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-// A plugin in C++ that does all that a plugin may, and on demand refuses to start.
+// A plugin in C++ that uses everything that a plugin may use, and refuses to start if requested.
 #include <cles/coroutine_handler.hpp>
 #include <cles/plugin.hpp>
 
@@ -33,7 +33,7 @@ struct sum {
 };
 BOOST_DESCRIBE_STRUCT(sum, (), (a, b))
 
-// A thread that lives as long as the handlers that hold it.
+// A thread that exists as long as the handlers that own it.
 class worker {
   public:
     ~worker() {

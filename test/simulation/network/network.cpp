@@ -25,8 +25,8 @@ std::string to_string(const endpoint& where) {
 }
 
 std::string url_of(unsigned host, carrier by) {
-    return by == carrier::datagram ? "udp://" + to_string(endpoint{host, datagram_door})
-                                   : "tcp://" + to_string(endpoint{host, stream_door});
+    return by == carrier::datagram ? "udp://" + to_string(endpoint{host, datagram_listen_port})
+                                   : "tcp://" + to_string(endpoint{host, stream_listen_port});
 }
 
 endpoint endpoint_of(const url& where) {
@@ -94,7 +94,7 @@ unsigned network::free_port(unsigned host) {
 }
 
 void network::close_doors(unsigned host) {
-    doors_.erase({host, stream_door});
+    doors_.erase({host, stream_listen_port});
     std::erase_if(ports_, [host](const auto& each) { return each.first.host == host; });
 }
 

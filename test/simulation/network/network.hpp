@@ -39,8 +39,8 @@ std::string to_string(const endpoint& where);
 /// A host's IPv4 address.
 constexpr std::uint32_t address_of(unsigned host) noexcept { return 0x0A000001U + host; }
 
-inline constexpr unsigned stream_door = 1;   ///< the port on which nodes listen
-inline constexpr unsigned datagram_door = 2; ///< the same for datagrams
+inline constexpr unsigned stream_listen_port = 1;   ///< the port on which nodes listen
+inline constexpr unsigned datagram_listen_port = 2; ///< the same for datagrams
 
 /// How a request travels.
 enum class carrier : std::uint8_t {

@@ -229,7 +229,7 @@ void stream_half::write_rest() {
         return;
     }
     if (state_ == state::finishing) {
-        say_goodbye();
+        end_sending();
     } else if (const auto owner = owner_) {
         owner->on_writable();
     }
@@ -300,11 +300,11 @@ void stream_half::finish() {
     }
     state_ = state::finishing;
     if (sending_.empty()) {
-        say_goodbye();
+        end_sending();
     }
 }
 
-void stream_half::say_goodbye() {
+void stream_half::end_sending() {
     state_ = state::discarding;
     transmit_end();
     if (const auto home = home_.lock()) {

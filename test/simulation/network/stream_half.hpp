@@ -67,7 +67,7 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     void reset_peer();
     [[nodiscard]] std::size_t free_window() const noexcept { return window - std::min(window, in_flight_); }
     void write_rest();
-    void say_goodbye();
+    void end_sending();
     void lose();
     void tamper();
     [[nodiscard]] time_point in_order(time_point when) noexcept { return last_ = std::max(last_, when); }

@@ -28,7 +28,7 @@ std::string run_text(std::string_view node, std::uint32_t epoch) {
     return std::string{node} + " (" + protocol::epoch_text(epoch) + ")";
 }
 
-std::string door_of(unsigned host) { return url_of(host, carrier::stream); }
+std::string listener_of(unsigned host) { return url_of(host, carrier::stream); }
 
 class neighbouring final : public part {
   public:
@@ -194,7 +194,7 @@ class neighbouring final : public part {
 
   private:
     /// What a node has received from an incarnation of another one.
-    struct heard_run {
+    struct received_run {
         std::string node;
         std::uint64_t seq = 0;
         time_point at{};
@@ -203,7 +203,7 @@ class neighbouring final : public part {
     };
     /// What a node has received and reported.
     struct account {
-        std::map<std::uint32_t, heard_run> runs;                  // by epoch
+        std::map<std::uint32_t, received_run> runs;               // by epoch
         std::map<std::string, std::uint32_t, std::less<>> owners; // of names: their epochs
         std::set<std::string, std::less<>> silent;
         std::set<std::string, std::less<>> clashes;
@@ -213,7 +213,7 @@ class neighbouring final : public part {
     void begin_namesake(unsigned of) {
         auto& n = namesakes_[of];
         if (!n) {
-            n = world_.begin_stranger(world::name_of(of), world_.hosts() + of, ++namesake_runs_);
+            n = world_.begin_namesake(world::name_of(of), world_.hosts() + of, ++namesake_runs_);
             record_begin(*n);
         }
     }
@@ -233,7 +233,7 @@ class neighbouring final : public part {
     // -- checks ----------------------------------------------------------------------------------------------------
 
     // Silence counts from the last announcement, or from when the receiver was back.
-    [[nodiscard]] static time_point last_chance(const node_run& n, const heard_run& r) {
+    [[nodiscard]] static time_point last_chance(const node_run& n, const received_run& r) {
         return std::max(r.at, n.back_since());
     }
 
@@ -310,7 +310,7 @@ class neighbouring final : public part {
                     complain(rule::others_known, n,
                              "does not " + std::string{when} + " know " + name + " as it is" +
                                  (known ? ", but as " + run_text(name, known->epoch) : std::string{}));
-                } else if (known->where != door_of(other) || others.address_of(name) != door_of(other)) {
+                } else if (known->where != listener_of(other) || others.address_of(name) != listener_of(other)) {
                     complain(rule::others_known, n, "takes " + name + " to be at " + std::string{known->where});
                 }
             }

@@ -35,7 +35,7 @@ class talker final : public place, public link_events {
 
     void start() {
         const auto self = shared_from_this();
-        net_.dial(self, {how_.to, stream_door}, bounds_,
+        net_.dial(self, {how_.to, stream_listen_port}, bounds_,
                   [this](boost::system::error_code code, std::shared_ptr<stream_half> made) {
                       if (code) {
                           over_ = true;

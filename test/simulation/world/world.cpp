@@ -72,7 +72,7 @@ void world::start(unsigned host) {
     each(&part::on_start, n);
 }
 
-std::shared_ptr<node_run> world::begin_stranger(const std::string& name, unsigned host, unsigned run) {
+std::shared_ptr<node_run> world::begin_namesake(const std::string& name, unsigned host, unsigned run) {
     auto n = make(name, host, run);
     watcher_.saw(name, "has a namesake", n->node()->epoch);
     n->start();

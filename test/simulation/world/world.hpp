@@ -53,7 +53,7 @@ class world final : public node_hosts, private part {
     };
     [[nodiscard]] const departure& departure_of(unsigned host) { return departures_[host]; }
     /// Starts a second node of that name, on an additional host.
-    std::shared_ptr<node_run> begin_stranger(const std::string& name, unsigned host, unsigned run);
+    std::shared_ptr<node_run> begin_namesake(const std::string& name, unsigned host, unsigned run);
     void end_run(node_run& n) override;
     [[nodiscard]] bool has_group() const noexcept { return plan_.group; }
 

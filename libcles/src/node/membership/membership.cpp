@@ -29,7 +29,7 @@ membership::verdict membership::apply_gossip(const peer_report& report, const ob
 
 membership::verdict membership::apply_gossip(const peer_heartbeat& beat, time_point asked, time_point now) {
     const auto announced_at = asked - beat.age;
-    const auto second_says = [&](const incarnation& r, auto&& take) {
+    const auto with_contender = [&](const incarnation& r, auto&& take) {
         auto said = r.announced;
         said.interval = beat.interval;
         said.load.queued = beat.queued;
@@ -40,8 +40,8 @@ membership::verdict membership::apply_gossip(const peer_heartbeat& beat, time_po
         return verdict::own;
     }
     if (own_name_conflict_ && own_name_conflict_->contender.epoch == beat.epoch) {
-        return second_says(own_name_conflict_->contender,
-                           [&](const sighting& w) { return take_own_name_sighting(w, now); });
+        return with_contender(own_name_conflict_->contender,
+                              [&](const sighting& w) { return take_own_name_sighting(w, now); });
     }
     auto* const at = by_epoch_.find(beat.epoch);
     if (at == nullptr) {
@@ -49,8 +49,8 @@ membership::verdict membership::apply_gossip(const peer_heartbeat& beat, time_po
     }
     auto& e = at->second;
     if (e.owner.epoch != beat.epoch) {
-        const auto result = second_says(e.second->contender,
-                                        [&](const sighting& w) { return take_conflicting_sighting(e.second, w, now); });
+        const auto result = with_contender(
+            e.second->contender, [&](const sighting& w) { return take_conflicting_sighting(e.second, w, now); });
         if (result == verdict::taken) {
             freshen(*at);
         }

@@ -44,9 +44,9 @@ struct place {
     int rank = 0;
 };
 
-int rank_of(const url& where, std::string_view heard_from) {
+int rank_of(const url& where, std::string_view received_from) {
     const int scheme = where.scheme == "tcp" ? 0 : where.scheme == "unix" ? 1 : where.scheme == "udp" ? 2 : 3;
-    return scheme * 2 + (where.host == heard_from ? 0 : 1);
+    return scheme * 2 + (where.host == received_from ? 0 : 1);
 }
 
 std::optional<url> url_of(std::string_view text) {

@@ -163,7 +163,7 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
                 return;
             }
             if (why_not != nullptr) {
-                c->fail(why_not->told);
+                c->fail(why_not->reported);
                 return;
             }
             try {

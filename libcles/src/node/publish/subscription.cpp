@@ -42,11 +42,11 @@ sequence_tracker& publisher_sequences::of(std::string_view publisher) {
     auto at = sources_.find(publisher);
     if (at == sources_.end()) {
         if (sources_.size() >= max_entries_) {
-            sources_.erase(std::ranges::min_element(sources_, {}, [](const auto& s) { return s.second.heard; }));
+            sources_.erase(std::ranges::min_element(sources_, {}, [](const auto& s) { return s.second.last_update; }));
         }
         at = sources_.emplace(std::string{publisher}, source{}).first;
     }
-    at->second.heard = ++heard_;
+    at->second.last_update = ++updates_received_;
     return at->second.order;
 }
 

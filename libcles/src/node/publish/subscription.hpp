@@ -55,12 +55,12 @@ class publisher_sequences {
   private:
     struct source {
         sequence_tracker order;
-        std::uint64_t heard = 0; // when, counted in updates
+        std::uint64_t last_update = 0; // when, counted in updates
     };
 
     std::size_t max_entries_;
     std::map<std::string, source, std::less<>> sources_;
-    std::uint64_t heard_ = 0;
+    std::uint64_t updates_received_ = 0;
 };
 
 /// A node's binding on one link or in the multicast group, at the subscriber. Accepts updates, and drops those that are

@@ -81,7 +81,7 @@ void all_binding::follow() {
         });
     }
     joining_ = false;
-    answer_when_whole();
+    reply_when_complete();
 }
 
 void all_binding::join(const std::string& node) {
@@ -91,13 +91,13 @@ void all_binding::join(const std::string& node) {
                                                               const std::optional<update_mark>& mark,
                                                               const protocol::failure& why) {
                             if (const auto self = weak.lock(); self && !closed_) {
-                                on_told(node, t, last, mark, why);
+                                on_result(node, t, last, mark, why);
                             }
                         });
 }
 
-void all_binding::on_told(const std::string& node, topic* t, std::string_view last,
-                          const std::optional<update_mark>& mark, const protocol::failure& why) {
+void all_binding::on_result(const std::string& node, topic* t, std::string_view last,
+                            const std::optional<update_mark>& mark, const protocol::failure& why) {
     auto& p = parts_[node];
     p.asked = false;
     if (t != nullptr) {
@@ -113,10 +113,10 @@ void all_binding::on_told(const std::string& node, topic* t, std::string_view la
     } else {
         p.failure = why;
     }
-    answer_when_whole();
+    reply_when_complete();
 }
 
-void all_binding::answer_when_whole() {
+void all_binding::reply_when_complete() {
     const bool whole = std::none_of(parts_.begin(), parts_.end(), [](const auto& entry) { return entry.second.asked; });
     if (whole && !joining_) {
         answer();

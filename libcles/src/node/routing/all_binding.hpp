@@ -39,10 +39,10 @@ class all_binding final : public deferred_request, private deadline {
 
     void bind_known(time_point now);
     void join(const std::string& node);
-    void on_told(const std::string& node, topic* t, std::string_view last, const std::optional<update_mark>& mark,
-                 const protocol::failure& why);
+    void on_result(const std::string& node, topic* t, std::string_view last, const std::optional<update_mark>& mark,
+                   const protocol::failure& why);
     void on_deadline(time_point now) override;
-    void answer_when_whole();
+    void reply_when_complete();
     void answer();
     void withdraw() override;
 

@@ -19,7 +19,7 @@ std::chrono::milliseconds pause_after(const subrequest_failure& why) {
         return out_of_reach;
     }
     return std::chrono::milliseconds{
-        std::min<std::uint64_t>(why.told.retry_ms.value_or(protocol::default_retry_ms), 1'000)};
+        std::min<std::uint64_t>(why.reported.retry_ms.value_or(protocol::default_retry_ms), 1'000)};
 }
 
 void begin_member(std::string& in, std::string_view node) {
@@ -53,7 +53,7 @@ bool any_request::begin(time_point now) {
     if (!chosen.nobody()) {
         ask(chosen, now);
     } else if (retry_after_) {
-        give_up(retry_after_->told, retry_after_->may_have_started);
+        give_up(retry_after_->reported, retry_after_->may_have_started);
     } else if (routing_->expects_more()) {
         return false;
     } else {
@@ -85,7 +85,7 @@ void any_request::ask(const load_balancer::chosen& chosen, time_point now) {
 void any_request::continue_after_local_refusal(const protocol::failure& why) {
     follow_call();
     asked_.push_back(routing_->host().name);
-    subrequest_failure failure{.told = why, .may_have_started = false};
+    subrequest_failure failure{.reported = why, .may_have_started = false};
     on_outcome({}, &failure);
 }
 
@@ -103,7 +103,7 @@ void any_request::on_outcome(std::string_view json, subrequest_failure* why) {
 
 // Updates the tracked load of the node that was asked.
 void any_request::note_end(const subrequest_failure* why) {
-    const bool refused = why != nullptr && (why->unreachable || why->told.code == errc::busy);
+    const bool refused = why != nullptr && (why->unreachable || why->reported.code == errc::busy);
     const auto until = refused ? saturating_add(routing_->host().time.now(), pause_after(*why)) : time_point{};
     if (asked_.back() == routing_->host().name) {
         if (refused) {
@@ -120,34 +120,34 @@ void any_request::note_end(const subrequest_failure* why) {
 
 bool any_request::may_repeat(const subrequest_failure& why) const noexcept {
     if (!why.may_have_started) {
-        return why.unreachable || why.told.code == errc::busy || why.told.code == errc::no_task ||
-               why.told.code == errc::no_target;
+        return why.unreachable || why.reported.code == errc::busy || why.reported.code == errc::no_task ||
+               why.reported.code == errc::no_target;
     }
-    return why.told.code == errc::unavailable && idempotent_ && !lost_ && !why.told.ran;
+    return why.reported.code == errc::unavailable && idempotent_ && !lost_ && !why.reported.ran;
 }
 
 void any_request::try_next(subrequest_failure why) {
-    const auto busy = why.told.code == errc::busy;
+    const auto busy = why.reported.code == errc::busy;
     const bool may_have_started = why.may_have_started;
-    const bool lost = may_have_started && why.told.code == errc::unavailable;
+    const bool lost = may_have_started && why.reported.code == errc::unavailable;
     busy_ += busy ? 1 : 0;
     const bool repeat = may_repeat(why) && busy_ < max_busy;
-    auto told = named(std::move(why), asked_.back());
+    auto reported = named(std::move(why), asked_.back());
     if (lost && lost_) {
-        told.ran = true;
-        told.answer.clear(); // another node's reply does not know of the first attempt
+        reported.ran = true;
+        reported.answer.clear(); // another node's reply does not know of the first attempt
     } else if (lost) {
-        lost_ = told;
+        lost_ = reported;
     }
-    if (busy && (!last_busy_ || told.retry_ms.value_or(0) < last_busy_->retry_ms.value_or(0))) {
-        last_busy_ = told;
+    if (busy && (!last_busy_ || reported.retry_ms.value_or(0) < last_busy_->retry_ms.value_or(0))) {
+        last_busy_ = reported;
     }
     if (!repeat) {
-        give_up(std::move(told), may_have_started);
+        give_up(std::move(reported), may_have_started);
         return;
     }
     part_.ticket = 0;
-    retry_after_ = subrequest_failure{.told = std::move(told), .may_have_started = may_have_started};
+    retry_after_ = subrequest_failure{.reported = std::move(reported), .may_have_started = may_have_started};
     routing_->schedule(shared_from_this());
 }
 

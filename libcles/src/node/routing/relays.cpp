@@ -33,15 +33,15 @@ class relays::relay final : public feed_events {
         upstream_ = owner_.out_.bind(node, path, adverbs, *this);
     }
     void stop() { upstream_.reset(); }
-    void join(const std::weak_ptr<const void>& whose, told tell) {
+    void join(const std::weak_ptr<const void>& whose, result_callback done) {
         if (bound_) {
-            tell(&topic_, last_value(), mark(), {});
+            done(&topic_, last_value(), mark(), {});
             return;
         }
         if (waiting_.size() == waiting_.capacity()) { // instead of growing: removes those that have given up
             std::erase_if(waiting_, [](const waiter& w) { return w.whose.expired(); });
         }
-        waiting_.push_back({whose, std::move(tell)});
+        waiting_.push_back({whose, std::move(done)});
     }
 
     [[nodiscard]] topic& subject() noexcept { return topic_; }
@@ -50,7 +50,7 @@ class relays::relay final : public feed_events {
   private:
     struct waiter {
         std::weak_ptr<const void> whose;
-        told tell;
+        result_callback done;
     };
 
     void on_bound(std::string_view last) override {
@@ -61,7 +61,7 @@ class relays::relay final : public feed_events {
         telling_ = true;
         for (const auto& w : std::exchange(waiting_, {})) {
             if (!w.whose.expired()) {
-                w.tell(&topic_, last_, mark(), {});
+                w.done(&topic_, last_, mark(), {});
             }
         }
         telling_ = false;
@@ -77,7 +77,7 @@ class relays::relay final : public feed_events {
         const auto held = owner_.all_.extract(topic_.path());
         for (const auto& w : waiting) {
             if (!w.whose.expired()) {
-                w.tell(nullptr, {}, {}, why);
+                w.done(nullptr, {}, {}, why);
             }
         }
     }
@@ -124,23 +124,23 @@ void relays::stop() {
 }
 
 void relays::join(std::string_view node, std::string_view path, std::string_view adverbs,
-                  const std::weak_ptr<const void>& whose, told tell) {
+                  const std::weak_ptr<const void>& whose, result_callback done) {
     const auto noun = noun_of(node, path);
     auto at = all_.find(noun);
     if (at != all_.end()) {
-        at->second->join(whose, std::move(tell));
+        at->second->join(whose, std::move(done));
         return;
     }
     if (all_.size() >= node_.bounds.nouns || stopped_) {
-        tell(nullptr, {}, {}, {.code = errc::busy, .message = "the limit of forwarded nouns is reached"});
+        done(nullptr, {}, {}, {.code = errc::busy, .message = "the limit of forwarded nouns is reached"});
         return;
     }
     if (!node_.kept_values->has_capacity(1)) {
-        tell(nullptr, {}, {}, no_memory(node_));
+        done(nullptr, {}, {}, no_memory(node_));
         return;
     }
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
-    at->second->join(whose, std::move(tell));
+    at->second->join(whose, std::move(done));
     at->second->start(node, path, adverbs);
 }
 

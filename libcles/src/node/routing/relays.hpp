@@ -31,11 +31,11 @@ class relays final : public topic_source {
 
     /// Receives the topic to bind to, the noun's last value, and which update that is, if it is known; or null and the
     /// reason.
-    using told = std::function<void(topic*, std::string_view last, const std::optional<update_mark>& mark,
-                                    const protocol::failure& why)>;
-    /// Binds a noun. Calls `tell` once, at once if the noun is bound already, and not if `whose` has expired.
+    using result_callback = std::function<void(topic*, std::string_view last, const std::optional<update_mark>& mark,
+                                               const protocol::failure& why)>;
+    /// Binds a noun. Calls `done` once, at once if the noun is bound already, and not if `whose` has expired.
     void join(std::string_view node, std::string_view path, std::string_view adverbs,
-              const std::weak_ptr<const void>& whose, told tell);
+              const std::weak_ptr<const void>& whose, result_callback done);
 
     [[nodiscard]] topic* find(std::string_view noun) noexcept override;
     void release(topic& t) override;

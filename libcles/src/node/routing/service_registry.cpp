@@ -108,7 +108,7 @@ void service_registry::on_member_seen(std::string_view name) {
         known.avoid_until = {};
     }
     if (another || known.digest != heard->tasks) {
-        begin_anew(known, heard->tasks, heard->where, now);
+        restart_discovery(known, heard->tasks, heard->where, now);
     } else if (moved) {
         const bool unknown = known.state != known_node::task_knowledge::known;
         give_up(known);
@@ -138,7 +138,8 @@ service_registry::digest_group* service_registry::digest_group_of(const known_no
 }
 
 // Its tasks are to be queried: it is new, or its digest has changed.
-void service_registry::begin_anew(known_node& of, std::string_view digest, std::string_view where, time_point now) {
+void service_registry::restart_discovery(known_node& of, std::string_view digest, std::string_view where,
+                                         time_point now) {
     leave_digest_group(of);
     of.digest = digest;
     of.where = where;
@@ -261,7 +262,7 @@ void service_registry::on_reply(const std::string& name, std::uint64_t ticket, s
     if (list) {
         on_tasks(*known, std::move(*list));
     } else {
-        on_no_answer(*known, why != nullptr && why->unreachable, now);
+        on_no_reply(*known, why != nullptr && why->unreachable, now);
     }
     ask(now);
     if (list || (expected && !expects_more())) {
@@ -284,7 +285,7 @@ void service_registry::on_tasks(known_node& of, task_list list) {
     }
 }
 
-void service_registry::on_no_answer(known_node& of, bool unreachable, time_point now) {
+void service_registry::on_no_reply(known_node& of, bool unreachable, time_point now) {
     of.state = known_node::task_knowledge::unknown;
     queries_.failed(of, unreachable, now);
     if (!of.live || !of.reachable()) { // queried again when it is received again

@@ -124,7 +124,7 @@ class service_registry final : private deadline {
 
     void on_member_seen(std::string_view name);
     void on_deadline(time_point now) override;
-    void begin_anew(known_node& of, std::string_view digest, std::string_view where, time_point now);
+    void restart_discovery(known_node& of, std::string_view digest, std::string_view where, time_point now);
     void leave_digest_group(known_node& n);
     void forget(known_node& n, time_point now);
     void expect(known_node& n, std::optional<time_point> until);
@@ -133,7 +133,7 @@ class service_registry final : private deadline {
     void ask(time_point now);
     void on_reply(const std::string& name, std::uint64_t ticket, std::string_view said, const subrequest_failure* why);
     void on_tasks(known_node& of, task_list list);
-    void on_no_answer(known_node& of, bool unreachable, time_point now);
+    void on_no_reply(known_node& of, bool unreachable, time_point now);
     void wake_next(digest_group& of);
     void follow();
     void set_tasks(known_node& of, std::shared_ptr<const task_list> tasks);

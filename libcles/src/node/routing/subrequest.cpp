@@ -25,12 +25,12 @@ bool handler_may_have_run(const protocol::failure& why) {
 }
 
 // A failure to reach the node, or to receive its reply.
-subrequest_failure on_the_way(boost::system::error_code code, std::string_view message) {
-    subrequest_failure why{.told = {.code = errc::unavailable, .message = std::string{message}}};
+subrequest_failure transit_failure(boost::system::error_code code, std::string_view message) {
+    subrequest_failure why{.reported = {.code = errc::unavailable, .message = std::string{message}}};
     // `busy` is from this node itself, which holds too much already.
     for (const auto reported : {errc::deadline, errc::cancelled, errc::too_large, errc::busy, errc::no_target}) {
         if (code == reported) {
-            why.told.code = reported;
+            why.reported.code = reported;
         }
     }
     why.may_have_started =
@@ -52,15 +52,15 @@ subrequest::verdict subrequest::offer(std::string_view json) {
 }
 
 void subrequest::fail(boost::system::error_code code, std::string_view message) {
-    auto why = on_the_way(code, message);
+    auto why = transit_failure(code, message);
     end({}, &why);
 }
 
 void subrequest::refuse(boost::system::error_code, std::string_view, std::string_view answer) {
     subrequest_failure why;
-    protocol::parse_failure(answer, why.told);
-    why.told.answer = answer;
-    why.may_have_started = handler_may_have_run(why.told);
+    protocol::parse_failure(answer, why.reported);
+    why.reported.answer = answer;
+    why.may_have_started = handler_may_have_run(why.reported);
     end({}, &why);
 }
 
@@ -77,10 +77,10 @@ outbound::progress_function progress_to(const std::shared_ptr<call>& c) {
 }
 
 protocol::failure named(subrequest_failure why, std::string_view node) {
-    if (why.told.answer.empty() && !why.told.message.starts_with(node)) {
-        why.told.message.insert(0, std::string{node} + ": ");
+    if (why.reported.answer.empty() && !why.reported.message.starts_with(node)) {
+        why.reported.message.insert(0, std::string{node} + ": ");
     }
-    return std::move(why.told);
+    return std::move(why.reported);
 }
 
 // -- at this node --------------------------------------------------------------------------------------------------
@@ -159,7 +159,7 @@ void local_request::fail(protocol::failure why, bool begun) {
         if (!why.message.starts_with(node_->name)) {
             why.message.insert(0, node_->name + ": ");
         }
-        subrequest_failure failure{.told = std::move(why), .may_have_started = begun};
+        subrequest_failure failure{.reported = std::move(why), .may_have_started = begun};
         then({}, &failure);
     }
 }

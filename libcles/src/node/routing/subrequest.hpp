@@ -22,7 +22,7 @@ namespace cles::core {
 
 /// Why a node gave no result to a request sent for a client.
 struct subrequest_failure {
-    protocol::failure told;       ///< as reported to the client
+    protocol::failure reported;   ///< as reported to the client
     bool may_have_started = true; ///< its handler may have run
     bool unreachable = false;     ///< the request did not get there
 };

@@ -82,20 +82,21 @@ void reply_writer::fail(reply_target where, const protocol::failure& why) {
         return;
     }
     ++(where.housekeeping ? node_.counts.housekeeping_errors : node_.counts.errors);
-    auto told = why;
-    if (told.answer.empty() && !told.message.starts_with(node_.name)) { // a handler's message does not name the node
-        told.message.insert(0, node_.name + ": ");
+    auto reported = why;
+    // A handler's message does not name the node.
+    if (reported.answer.empty() && !reported.message.starts_with(node_.name)) {
+        reported.message.insert(0, node_.name + ": ");
     }
     auto& out = output_for(where);
     const auto line = out.size();
     protocol::append_reply_head(out, where.id);
     const auto body = out.size();
-    protocol::append_failure(out, told);
+    protocol::append_failure(out, reported);
     if (out.size() - line > max_reply_) { // a handler's message may be long; the peer would close the link over it
         out.resize(body);
-        told.answer.clear();
-        cut(told.message, max_reply_ / max_escape > head_bytes ? max_reply_ / max_escape - head_bytes : 0);
-        protocol::append_failure(out, told);
+        reported.answer.clear();
+        cut(reported.message, max_reply_ / max_escape > head_bytes ? max_reply_ / max_escape - head_bytes : 0);
+        protocol::append_failure(out, reported);
     }
     out.push_back('\n');
     note(where, std::string_view{out}.substr(line));

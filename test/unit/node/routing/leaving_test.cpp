@@ -152,9 +152,9 @@ BOOST_AUTO_TEST_CASE(request_to_any_continues_with_another_node_as_if_busy) {
                                      }}});
     link.ask("PUSH self:cles/leaving reply=no");
     BOOST_REQUIRE_EQUAL(failures->size(), 1U);
-    BOOST_TEST(((*failures)[0].told.code == errc::busy));
+    BOOST_TEST(((*failures)[0].reported.code == errc::busy));
     BOOST_TEST(!(*failures)[0].may_have_started);
-    BOOST_TEST((*failures)[0].told.retry_ms.value_or(0) == 1000U);
+    BOOST_TEST((*failures)[0].reported.retry_ms.value_or(0) == 1000U);
 }
 
 BOOST_AUTO_TEST_CASE(closed_link_without_a_leave_notice_leaves_open_what_started) {

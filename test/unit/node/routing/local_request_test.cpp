@@ -26,8 +26,8 @@ struct log {
                 lines.push_back("ok " + std::string{json});
                 return;
             }
-            lines.push_back(std::string{wire_name(why->told.code)} + (why->told.ran ? " ran" : "") +
-                            (why->may_have_started ? " begun: " : ": ") + why->told.message);
+            lines.push_back(std::string{wire_name(why->reported.code)} + (why->reported.ran ? " ran" : "") +
+                            (why->may_have_started ? " begun: " : ": ") + why->reported.message);
         };
     }
     [[nodiscard]] cles::core::outbound::progress_function progress() {

@@ -84,8 +84,8 @@ BOOST_AUTO_TEST_CASE(router_gets_not_started_and_the_retry_time) {
     link.half_close();
     BOOST_REQUIRE(failed->has_value());
     BOOST_TEST(!(*failed)->may_have_started);
-    BOOST_TEST(((*failed)->told.code == errc::busy));
-    BOOST_TEST((*failed)->told.retry_ms.value_or(0) == 1000U);
+    BOOST_TEST(((*failed)->reported.code == errc::busy));
+    BOOST_TEST((*failed)->reported.retry_ms.value_or(0) == 1000U);
 }
 
 BOOST_AUTO_TEST_CASE(after_another_line_it_is_a_normal_link) {

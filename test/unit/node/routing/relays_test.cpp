@@ -181,7 +181,7 @@ BOOST_AUTO_TEST_CASE(unbind_cancels_a_pending_bind) {
     link.ask("BIND car2:pose id=7");
     BOOST_TEST(link.kind("BIND car2:pose lease=0 id=8") == "id=7 cancelled, id=8 ok");
     ways.bound("car2:pose").binds("{}");
-    BOOST_TEST(ways.count_bound() == 0U); // no client wants it any more
+    BOOST_TEST(ways.count_bound() == 0U); // no client is bound any more
     BOOST_TEST(link.take().empty());
 }
 
@@ -198,7 +198,7 @@ BOOST_AUTO_TEST_CASE(refusal_of_the_other_node_is_forwarded) {
     ways.bound("car2:pose").refuses(errc::no_task, "car2 has no BIND 'pose'");
     BOOST_TEST(link.sent() == "id=7 no_task");
     BOOST_TEST(link.session().serving().bindings() == 0U);
-    link.ask("BIND car2:pose id=8"); // it is bound anew
+    link.ask("BIND car2:pose id=8"); // it is bound again
     BOOST_TEST(ways.count_bound() == 1U);
 }
 

@@ -44,7 +44,7 @@ struct fixture {
         const auto answer = R"({"error":")" + code + R"(","message":"car2: no")" + more + "}";
         one->refuse({}, {}, answer);
         BOOST_TEST(outcome->failed);
-        BOOST_TEST(outcome->failure.told.answer == answer);
+        BOOST_TEST(outcome->failure.reported.answer == answer);
         return outcome->failure;
     }
     void again() {
@@ -71,10 +71,10 @@ BOOST_FIXTURE_TEST_CASE(unreached_node_has_not_started, fixture) {
     const auto why = fails(boost::asio::error::connection_refused);
     BOOST_TEST(why.unreachable);
     BOOST_TEST(!why.may_have_started);
-    BOOST_TEST((why.told.code == errc::unavailable));
+    BOOST_TEST((why.reported.code == errc::unavailable));
     again();
     BOOST_TEST(fails(errc::no_target).unreachable);
-    BOOST_TEST((outcome->failure.told.code == errc::no_target));
+    BOOST_TEST((outcome->failure.reported.code == errc::no_target));
 }
 
 BOOST_FIXTURE_TEST_CASE(lost_node_may_have_started, fixture) {
@@ -82,11 +82,11 @@ BOOST_FIXTURE_TEST_CASE(lost_node_may_have_started, fixture) {
         const auto why = fails(code);
         BOOST_TEST(!why.unreachable);
         BOOST_TEST(why.may_have_started);
-        BOOST_TEST((why.told.code == errc::unavailable));
+        BOOST_TEST((why.reported.code == errc::unavailable));
         again();
     }
     BOOST_TEST(fails(errc::deadline).may_have_started);
-    BOOST_TEST((outcome->failure.told.code == errc::deadline));
+    BOOST_TEST((outcome->failure.reported.code == errc::deadline));
 }
 
 BOOST_FIXTURE_TEST_CASE(request_too_large_to_send_has_not_started, fixture) {
@@ -97,7 +97,7 @@ BOOST_FIXTURE_TEST_CASE(request_too_large_to_send_has_not_started, fixture) {
 BOOST_FIXTURE_TEST_CASE(request_without_memory_on_this_node_is_busy, fixture) {
     BOOST_TEST(!fails(errc::busy).may_have_started);
     BOOST_TEST(!outcome->failure.unreachable);
-    BOOST_TEST((outcome->failure.told.code == errc::busy));
+    BOOST_TEST((outcome->failure.reported.code == errc::busy));
 }
 
 BOOST_FIXTURE_TEST_CASE(refusing_node_has_not_started_unless_it_says_so, fixture) {
