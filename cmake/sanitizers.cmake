@@ -20,6 +20,9 @@ function(cles_target_sanitizers target)
             # Instrumented Asio looks uninitialized to g++ 12. The builds without sanitizers keep this warning.
             list(APPEND quiet -Wno-maybe-uninitialized)
         endif()
+        if("undefined" IN_LIST CLES_SANITIZE AND CLES_SANITIZE_TRAP)
+            list(APPEND flags -fsanitize-undefined-trap-on-error)
+        endif()
     elseif("undefined" IN_LIST CLES_SANITIZE)
         # clang 14's check of function types breaks Asio's coroutines.
         list(APPEND flags -fno-sanitize=function)
@@ -28,6 +31,13 @@ function(cles_target_sanitizers target)
     target_compile_options(${target} PRIVATE ${flags} ${quiet})
     # A program that links an instrumented library needs the runtime, too.
     target_link_options(${target} PUBLIC ${flags})
+
+    get_target_property(type ${target} TYPE)
+    if(type STREQUAL "EXECUTABLE" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND "address" IN_LIST CLES_SANITIZE)
+        # The tables of the sanitizers contain a million addresses. At a fixed position, the linker writes them, instead of
+        # the loader at each start.
+        target_link_options(${target} PRIVATE -no-pie)
+    endif()
 endfunction()
 
 # cles_target_tests_only(target): for test code. It omits the checks of each pointer, which take half the compile
