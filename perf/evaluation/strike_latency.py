@@ -61,7 +61,10 @@ def end(process):
 
 def first_line(process):
     """The first line that it prints; empty if there is none within a minute."""
-    return process.stdout.readline() if select.select([process.stdout], [], [], 60)[0] else ""
+    for _ in range(60):  # a signal just before the call does not interrupt it, and is handled when it returns
+        if select.select([process.stdout], [], [], 1)[0]:
+            return process.stdout.readline()
+    return ""
 
 
 @contextlib.contextmanager

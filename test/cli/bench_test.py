@@ -223,7 +223,7 @@ class Usage(unittest.TestCase):
             (("--busy-poll", "-1"), "--busy-poll"),
             (("--requests", "5", "--duration", "1s"), "--duration"),
             (("--binders", "2"), "--binders needs --updates or --fan-out"),
-            (("--updates", "--binders", "1,2"), "one number of --binders"),
+            (("--updates", "--binders", "1,2"), "only one value of --binders"),
             (("--fan-out", "--updates"), "--updates cannot be combined with --fan-out"),
             (("--fan-out", "--duration", "1s"), "--duration cannot be combined with --fan-out"),
             (("--fan-out", "--transport", "udp"), "--transport tcp"),
