@@ -5,7 +5,6 @@ reconnaissance aircraft, reconnaissance aircraft to mission centre, mission cent
 import json
 import os
 import re
-import select
 import shutil
 import signal
 import socket
@@ -17,7 +16,7 @@ import time
 
 sys.path.append(os.path.join(os.path.dirname(__file__), "..", "perf", "evaluation"))
 from clean_environment import clean_environment  # noqa: E402
-from deferred_signals import DeferredSignals  # noqa: E402
+from deferred_signals import DeferredSignals, first_line  # noqa: E402
 
 PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
 CONFIG = """\
@@ -154,7 +153,7 @@ class Daemon(Process):
                                      insecure=str(fleet.hosts.insecure).lower(), plugins=", ".join(plugins)) + more)
         self.fleet, self.role = fleet, role
         super().__init__(fleet, name, fleet.hosts.command(role, fleet.program("clesd"), "--config", config))
-        line = self.process.stdout.readline() if select.select([self.process.stdout], [], [], PATIENCE)[0] else ""
+        line = first_line(self.process, PATIENCE)
         found = re.search(r"listening on (tcp://\S+:(\d+))", line)
         if not found:
             self.close()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: BSL-1.0
-"""Defers the signals that end a script while it starts a process."""
+"""How a script starts a process, and waits for its first line, so that the signals that end the script leave no process."""
 
+import select
 import signal
 import threading
 
@@ -19,3 +20,12 @@ class DeferredSignals:
             signal.signal(number, handler)
         for number in self.received:
             signal.raise_signal(number)
+
+
+def first_line(process, seconds):
+    """The first line that a process prints; empty if it prints none in that time."""
+    for _ in range(max(1, round(seconds))):
+        # A signal just before the call does not interrupt it, and is handled when it returns.
+        if select.select([process.stdout], [], [], 1)[0]:
+            return process.stdout.readline()
+    return ""

@@ -17,7 +17,6 @@ import contextlib
 import json
 import os
 import re
-import select
 import shutil
 import signal
 import statistics
@@ -26,12 +25,13 @@ import sys
 import tempfile
 
 from clean_environment import clean_environment
-from deferred_signals import DeferredSignals
+from deferred_signals import DeferredSignals, first_line
 from interval import summary
 from provenance import command, date, machine
 from result_file import write
 
 WANTED = 2.0
+PATIENCE = 60  # seconds for a program to print its first line
 
 
 @contextlib.contextmanager
@@ -59,14 +59,6 @@ def end(process):
     process.stdout.close()
 
 
-def first_line(process):
-    """The first line that it prints; empty if there is none within a minute."""
-    for _ in range(60):  # a signal just before the call does not interrupt it, and is handled when it returns
-        if select.select([process.stdout], [], [], 1)[0]:
-            return process.stdout.readline()
-    return ""
-
-
 @contextlib.contextmanager
 def node(options):
     """A daemon that offers both; its value is its address."""
@@ -80,7 +72,7 @@ def node(options):
                        f"  - {plugins}/libcles-strike.so\n")
         with open(log, "w+", encoding="utf-8") as said, \
                 running([os.path.join(options.programs, "clesd"), "--config", config], stderr=said) as process:
-            found = re.search(r"listening on (tcp://\S+)", first_line(process))
+            found = re.search(r"listening on (tcp://\S+)", first_line(process, PATIENCE))
             if not found:
                 said.seek(0)
                 raise SystemExit(f"strike_latency.py: the node did not start: {said.read()}")
@@ -99,7 +91,7 @@ def drill_beside_load(options, url):
     """Sends orders while frames are sent as fast as they are answered; returns the results of both."""
     with running([os.path.join(options.programs, "cles-jadc2"), "load", "--at", url, "--streams", str(options.streams),
                   "--duration", "0"]) as load:
-        if first_line(load) != "loading\n":
+        if first_line(load, PATIENCE) != "loading\n":
             raise SystemExit("strike_latency.py: the load did not begin")
         orders = drill(options.programs, url, options.orders)
         load.terminate()  # then it prints its result
