@@ -105,6 +105,8 @@ RESERVED_HEADERS = [
     (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/src/plugins/plugin_library\.[ch]pp$"),
      "Boost.DLL belongs to runtime/plugins/plugin_library alone"),
     (re.compile(r"spdlog/"), re.compile(r"(?!libcles/)"), "the library logs through its sink; spdlog is for programs"),
+    (re.compile(r"(thread|future|boost/asio/thread_pool\.hpp)$"), re.compile(r"(?!apps/(cles|platoon)/)"),
+     "this program has one thread, so the thread sanitizer does not run its tests (test/CMakeLists.txt)"),
 ]
 
 # These add seconds to the compile time of every user of the header.
@@ -363,6 +365,7 @@ PLANTED = [
     ("libcles/src/transport/a.cpp", '#include "api/connection.hpp"\n', "transport must not include api"),
     ("libcles/src/transport/a.cpp", "#include <cles/service.hpp>\n", "must not include the facade"),
     ("libcles/src/api/a.cpp", "#include <spdlog/spdlog.h>\n", "spdlog is for programs"),
+    ("apps/cles/output/a.cpp", "#include <thread>\n", "this program has one thread"),
     ("libcles/src/api/a.cpp", '#include "nowhere.hpp"\n', "is not a file of this project"),
     ("libcles/src/util/a.cpp", "int a;\n", "is not a known layer"),
     ("libcles/include/cles/a.hpp", '#include "protocol/line.hpp"\n', "public must not include protocol"),
