@@ -31,8 +31,8 @@ using namespace cles::test;
 using namespace std::chrono_literals;
 using cles::errc;
 
-constexpr std::size_t mebi = 1U << 20U;
-constexpr std::size_t budget = 16 * mebi;
+constexpr std::size_t large = 256U * 1024; // of one value
+constexpr std::size_t budget = 16 * large;
 
 std::uint64_t memory(cles::service& of, const std::string& name) { return metric(of, name, "memory"); }
 
@@ -42,8 +42,8 @@ BOOST_DATA_TEST_CASE(many_large_unread_results_stay_within_it, every_socket, kin
     std::vector<cles::responder> asked;
     car.on_pull("picture", [&](const cles::request&, cles::responder r) { asked.push_back(std::move(r)); });
     car.on_pull("speed", [] { return 7; });
-    constexpr std::size_t links = 10;
-    constexpr std::size_t of_each = 10;
+    constexpr std::size_t links = 3;
+    constexpr std::size_t of_each = 40; // more than TCP's buffers hold
     std::vector<std::unique_ptr<scripted_peer>> greedy;
     for (std::size_t i = 0; i < links; ++i) {
         greedy.push_back(std::make_unique<scripted_peer>(io, car.endpoints().front(), buffers::small));
@@ -52,7 +52,7 @@ BOOST_DATA_TEST_CASE(many_large_unread_results_stay_within_it, every_socket, kin
         }
     }
     run_until(io, [&] { return asked.size() == links * of_each; });
-    const std::string picture(mebi - 1000, 'x');
+    const std::string picture(large - 1000, 'x');
     std::uint64_t most = 0;
     for (std::size_t n = 0; n < of_each; ++n) { // one of each link in turn, otherwise the first ones get all of it
         for (std::size_t i = 0; i < links; ++i) {
@@ -111,14 +111,14 @@ BOOST_AUTO_TEST_CASE(many_large_requests_to_a_stopped_node_stay_within_its_forwa
     options.routing = cles::routing();
     cles::service hub{io, options};
     hub.on_pull("speed", [] { return 7; });
-    cles::service tower{io, knowing("tower", hub, {.memory = 64 * mebi})};
+    cles::service tower{io, knowing("tower", hub, {.memory = 4 * budget})};
     const auto via_hub = hub.endpoints().front();
     std::vector<std::unique_ptr<answer<>>> all;
-    const std::string large(900'000, 'x');
+    const std::string text(large - 1000, 'x');
     std::uint64_t most = 0;
     for (int i = 0; i < 60; ++i) {
         all.push_back(std::make_unique<answer<>>());
-        tower.async_push("stopped:notice", large, cles::call_options{}.at(via_hub).deadline(1s), all.back()->take());
+        tower.async_push("stopped:notice", text, cles::call_options{}.at(via_hub).deadline(1s), all.back()->take());
         answer<int> asked;
         tower.async_pull<int>("hub:speed", cles::call_options{}.urgent(), asked.take());
         run_until(io, [&] { return asked.done(); });
@@ -149,7 +149,7 @@ BOOST_AUTO_TEST_CASE(large_requests_of_a_program_to_a_peer_that_reads_none_are_b
     std::vector<std::unique_ptr<answer<>>> all;
     for (int i = 0; i < 100; ++i) {
         all.push_back(std::make_unique<answer<>>());
-        car.async_push("stopped:notice", std::string(500'000, 'x'), all.back()->options().deadline(1h),
+        car.async_push("stopped:notice", std::string(large / 2, 'x'), all.back()->options().deadline(1h),
                        all.back()->take());
     }
     run_until(io, [&] {
@@ -166,12 +166,12 @@ BOOST_AUTO_TEST_CASE(last_values_stay_within_it_and_those_of_a_task_replace_each
     boost::asio::io_context io;
     cles::service car{io, listening("car1", carrier::tcp4, {.memory = budget})};
     for (int i = 0; i < 100; ++i) {
-        car.update("map/" + std::to_string(i), std::string(mebi - 1000, 'x'));
+        car.update("map/" + std::to_string(i), std::string(large - 1000, 'x'));
         BOOST_TEST(memory(car, "values") <= budget / 2);
     }
     scripted_peer peer{io, car.endpoints().front()};
     BOOST_TEST(peer.ask("BIND self:map/0") == "{}");
-    BOOST_TEST(peer.ask("BIND self:map/99").size() > mebi - 1000);
+    BOOST_TEST(peer.ask("BIND self:map/99").size() > large - 1000);
     for (int i = 0; i < 100; ++i) {
         static_cast<void>(car.retire("map/" + std::to_string(i)));
     }
@@ -191,7 +191,7 @@ BOOST_AUTO_TEST_CASE(one_value_for_many_who_do_not_read_stays_within_it) {
     }
     std::uint64_t most = 0;
     for (int i = 0; i < 20; ++i) {
-        car.update("map", std::to_string(i) + std::string(200'000, 'x'));
+        car.update("map", std::to_string(i) + std::string(large / 5, 'x'));
         run_ready(io);
         most = std::max(most, memory(car, "used"));
     }
