@@ -63,7 +63,7 @@ BOOST_DATA_TEST_CASE(what_is_urgent_does_not_wait_behind_large_answers, carriers
     constexpr std::size_t count = 20;
     std::vector<answer<cles::json_text>> large(count);
     for (auto& each : large) {
-        n.tower.async_pull("car1:map", each.take());
+        n.tower.async_pull("car1:map", cles::call_options{}.deadline(1min), each.take());
     }
     answer<int> small;
     n.tower.async_pull<int>("car1:speed", cles::call_options{}.urgent(), small.take());

@@ -10,10 +10,11 @@ import time
 import unittest
 
 from daemon import DEFAULTS, Daemon, Folder, body
-from support import wait_until
+from support import PATIENCE, wait_until
 
 COUNTING = os.environ.get("COUNTING_PLUGIN", "")
 PAUSE = 1.0  # seconds
+JOB = 0.6 * max(PATIENCE / 30, 1)  # seconds: longer than it takes to queue 20 jobs and to pause, with a sanitizer too
 
 
 class Pauses(unittest.TestCase):
@@ -30,13 +31,13 @@ class Pauses(unittest.TestCase):
             return [int(line.split()[0]) for line in marks]
 
     @contextlib.contextmanager
-    def paused(self):
+    def paused(self, seconds=PAUSE):
         process = self.daemon.process
         process.send_signal(signal.SIGSTOP)
         os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
         try:
             yield
-            time.sleep(PAUSE)  # time has to pass
+            time.sleep(seconds)  # time has to pass
         finally:
             process.send_signal(signal.SIGCONT)
 
@@ -52,14 +53,14 @@ class Pauses(unittest.TestCase):
             first = 1000 * attempt
             with self.daemon.connect() as link, self.daemon.connect() as other:
                 # Ends while the daemon is stopped, not before, and leaves the only worker to the next.
-                link.send(f"DELEGATE sat1:once/{first}/600 id=1")
+                link.send(f"DELEGATE sat1:once/{first}/{round(JOB * 1000)} id=1")
                 wait_until(lambda n=first: n in self.begun(), "the first has begun")
                 for id_ in range(2, 12):
                     link.send(f"DELEGATE sat1:once/{first + id_}/0 id={id_} deadline=60000")
                 for id_ in range(12, 22):
-                    other.send(f"DELEGATE sat1:once/{first + id_}/0 id={id_} deadline=500")
+                    other.send(f"DELEGATE sat1:once/{first + id_}/0 id={id_} deadline={round(JOB * 800)}")
                 wait_until(lambda: '"queued":20' in self.daemon.ask("PULL self:cles/metrics"), "20 wait")
-                with self.paused():
+                with self.paused(max(PAUSE, JOB)):
                     for id_ in range(2, 12):
                         link.send(f"PUSH self:cles/cancel/{id_} reply=no")
                 answers = [link.read() for _ in range(11)]
