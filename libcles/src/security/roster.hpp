@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "security/keys.hpp"
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <vector>
+
+namespace cles::security {
+
+/// A node of the fleet, as the roster lists it.
+struct member {
+    std::uint32_t number = 0; ///< 1 to 2^24-1, never given again
+    std::string name{};
+    public_key key{};
+    agreement_key agreement{};      ///< the X25519 form of `key`
+    std::string group_keys{};       ///< sealed for this member, as written
+    std::optional<std::vector<std::string>> may{};    ///< rights; none: everything
+    std::optional<std::vector<std::string>> offers{}; ///< rights; none: everything
+    std::vector<std::string> forwards{}; ///< patterns of the names for which it may forward
+
+    /// Whether it is the same member, whatever its rights.
+    [[nodiscard]] bool is(const member& other) const noexcept {
+        return number == other.number && name == other.name && key == other.key;
+    }
+};
+
+/// The group keys of a roster.
+struct group_keys {
+    secret_bytes current; ///< of `roster::generation`
+    secret_bytes next;    ///< of the next one
+};
+
+/// A roster (docs/security.md, "The roster"): the members of a fleet, signed by the fleet's key. Immutable.
+class roster {
+  public:
+    /// Reads a roster line, after it has verified the signature.
+    /// \throws security_error
+    static std::shared_ptr<const roster> read(std::string_view line, const public_key& fleet);
+    /// The fleet's key that an unverified line names; for files that introduce a fleet. \throws security_error
+    static public_key named_fleet(std::string_view line);
+
+    [[nodiscard]] const std::string& line() const noexcept { return line_; }
+    [[nodiscard]] const public_key& fleet() const noexcept { return fleet_; }
+    [[nodiscard]] std::uint32_t version() const noexcept { return version_; }
+    [[nodiscard]] std::uint32_t last() const noexcept { return last_; }
+    [[nodiscard]] std::uint32_t generation() const noexcept { return generation_; }
+    [[nodiscard]] std::uint32_t oldest() const noexcept { return oldest_; }
+    /// By ascending number.
+    [[nodiscard]] const std::vector<member>& members() const noexcept { return members_; }
+    [[nodiscard]] const member* find(std::uint32_t number) const;
+    [[nodiscard]] const member* find(std::string_view name) const;
+    [[nodiscard]] const member* find(const public_key& key) const;
+    /// The group keys, sealed for the fleet's key, as written.
+    [[nodiscard]] const std::string& authority_keys() const noexcept { return authority_keys_; }
+
+  private:
+    roster() = default;
+    // ... (maps by number, name and key, all to indices of members_)
+    std::string line_;
+    public_key fleet_{};
+    std::uint32_t version_ = 0;
+    std::uint32_t last_ = 0;
+    std::uint32_t generation_ = 0;
+    std::uint32_t oldest_ = 0;
+    std::string authority_keys_;
+    std::vector<member> members_;
+};
+
+/// Opens group keys. \throws security_error if they are not for this key
+group_keys open_group_keys(const std::string& sealed, const signing_key& receiver);
+
+} // namespace cles::security

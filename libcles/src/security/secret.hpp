@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+
+namespace cles::security {
+
+using bytes_view = std::span<const std::uint8_t>;
+
+/// Secret bytes. Their memory is locked, so that it is not written to swap space, left out of core dumps, and wiped
+/// when they are destroyed. If the system's limit of locked memory is reached, they are still wiped.
+///
+/// Move only; a moved-from secret is empty.
+class secret_bytes {
+  public:
+    secret_bytes() = default;
+    explicit secret_bytes(std::size_t size);
+    explicit secret_bytes(bytes_view from);
+    /// From the operating system's generator.
+    static secret_bytes random(std::size_t size);
+
+    [[nodiscard]] std::uint8_t* data() noexcept { return bytes_.get(); }
+    [[nodiscard]] const std::uint8_t* data() const noexcept { return bytes_.get(); }
+    [[nodiscard]] std::size_t size() const noexcept { return bytes_ ? bytes_.get_deleter().size : 0; }
+    [[nodiscard]] bytes_view view() const noexcept { return {data(), size()}; }
+    [[nodiscard]] secret_bytes copy() const { return secret_bytes{view()}; }
+
+  private:
+    struct wipe {
+        std::size_t size = 0;
+        void operator()(std::uint8_t* bytes) const noexcept;
+    };
+    std::unique_ptr<std::uint8_t[], wipe> bytes_;
+};
+
+} // namespace cles::security
