@@ -11,11 +11,18 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace cles::test {
 
 /// The node car1, which routes for a client on a link; the test plays the other nodes.
 struct routing_fixture {
+    routing_fixture() = default;
+    /// Of a secured fleet, with a client that is a member.
+    routing_fixture(std::shared_ptr<core::node_security> security, const std::string& client)
+        : node({}, {}, {}, {}, std::move(security)), link(node, client) {}
+    routing_fixture(const routing_fixture&) = delete;
+    routing_fixture& operator=(const routing_fixture&) = delete;
     ~routing_fixture() { routing->stop(); }
 
     /// Another node announces itself.

@@ -27,12 +27,13 @@ namespace cles::test {
 class test_node {
   public:
     explicit test_node(limits bounds = {}, authoriser rules = {}, log_sink log = {},
-                       core::completion_queue::runner complete = {})
+                       core::completion_queue::runner complete = {}, std::shared_ptr<core::node_security> security = {})
         : host(std::make_shared<core::node_state>(core::node_options{.name = "car1",
                                                                      .epoch = 0x5f3a09c1,
                                                                      .first_datagram_id = first_datagram_id,
                                                                      .bounds = bounds,
                                                                      .authorise = std::move(rules),
+                                                                     .security = std::move(security),
                                                                      .log = std::move(log),
                                                                      .complete = std::move(complete)},
                                                   clock, [this] { ++wakes; })) {}
@@ -97,8 +98,16 @@ class test_link final : public recording_line_sink, public core::subscriber {
   public:
     explicit test_link(test_node& at) : test_link(at, 0) {}
     /// Over datagrams of this size, unless it is 0.
-    test_link(test_node& at, std::size_t datagram)
-        : recording_line_sink(datagram, std::make_shared<core::memory_account>(at.host->memory)), at_(at),
+    test_link(test_node& at, std::size_t datagram) : test_link(at, datagram, {}) {}
+    /// From a member of the fleet.
+    test_link(test_node& at, std::string member) : test_link(at, 0, std::move(member)) {}
+    test_link(test_node& at, std::size_t datagram, std::string member)
+        : recording_line_sink(datagram, std::make_shared<core::memory_account>(at.host->memory)),
+          at_(at), peer_{.transport = "tcp",
+                         .address = "tcp://127.0.0.1:1",
+                         .name = std::move(member),
+                         .uid = {},
+                         .local = true},
           session_(at.host, *this, *this, peer_) {}
 
     /// Receives a line and returns what was sent meanwhile.
@@ -153,7 +162,7 @@ class test_link final : public recording_line_sink, public core::subscriber {
     }
 
     test_node& at_;
-    identity peer_{.transport = "tcp", .address = "tcp://127.0.0.1:1", .local = true};
+    identity peer_;
     core::session session_;
 };
 

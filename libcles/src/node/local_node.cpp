@@ -7,6 +7,8 @@
 
 #include "node/base/completion_drain.hpp"
 #include "node/membership/reachable_endpoints.hpp"
+#include "node/session/request_checks.hpp"
+#include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
@@ -127,6 +129,13 @@ void local_node::start(const std::vector<std::string>& listen_at) {
     if (routing_wanted_ != nullptr) {
         routing_ = routing_wanted_->make(*this);
     }
+    if (node_->security) {
+        node_->security->observe([weak = weak_from_this()] {
+            if (const auto self = weak.lock()) {
+                self->on_security_changed();
+            }
+        });
+    }
     for (const auto& where : listen_at) {
         listen(where);
     }
@@ -151,6 +160,21 @@ void local_node::on_timer() {
         node_->peers.note_suspension(at);
     }
     node_->deadlines.expire(at);
+}
+
+void local_node::on_security_changed() {
+    if (stopped_) {
+        return;
+    }
+    const auto keep = shared_from_this();
+    const auto& security = *node_->security;
+    if (!security.is_member(node_->name)) {
+        post_log(log_level::error, node_->name + " was removed from the fleet by version " +
+                                       std::to_string(security.roster_version()) +
+                                       " of the roster: its requests are refused, and it refuses all");
+    }
+    connections_.on_security_changed();
+    feeds_.on_security_changed();
 }
 
 void local_node::check_shutdown() {
@@ -246,6 +270,11 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     boost::system::error_code code = errc::bad_request;
     if (!protocol::parse_noun(text, noun, why)) {
         return fail_later(std::move(operation), code, std::move(why));
+    }
+    if (!protocol::is_reserved_target(noun.target) && !permits(*node_, node_->name, noun.target, how, noun)) {
+        return fail_later(std::move(operation), errc::denied,
+                          node_->name + " may not send " + std::string{to_string(how)} + " '" + std::string{noun.task} +
+                              "' to " + std::string{noun.target});
     }
     auto* r = peer_channels_.to(noun.target, options.at_, options.urgent_, code, why);
     if (r == nullptr) {
@@ -380,6 +409,9 @@ void local_node::stop() {
     const auto keep = shared_from_this();
     send_updates(node_->unsent, node_->published, now());
     stopped_ = true;
+    if (node_->security) {
+        node_->security->observe(nullptr);
+    }
     listeners_.close();
     environment_->stop_timer();
     if (routing_) {

@@ -127,6 +127,7 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     void run() override; // one turn
     void join_group();
     void on_timer();
+    void on_security_changed();
     void check_noun(std::string_view noun) const;
 
     std::shared_ptr<core::environment> environment_;

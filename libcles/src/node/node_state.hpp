@@ -26,6 +26,7 @@
 namespace cles::core {
 
 class gossip;
+class node_security;
 
 /// The settings of a node.
 struct node_options {
@@ -35,6 +36,7 @@ struct node_options {
     std::uint64_t first_datagram_id = 0; ///< likewise; request ids by datagram count from here
     cles::limits bounds{};
     authoriser authorise{};
+    std::shared_ptr<node_security> security{}; ///< null: the node is not secured
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
     std::function<node_load()> load{};           ///< load of the program; empty: its running handlers
@@ -53,6 +55,7 @@ struct node_state {
     const std::uint64_t first_datagram_id;
     const cles::limits bounds;
     const authoriser authorise;
+    const std::shared_ptr<node_security> security;
     const log_sink log;
     const std::function<void(json_writer&)> metrics;
     const std::function<node_load()> load;

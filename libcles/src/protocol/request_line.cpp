@@ -91,6 +91,7 @@ constexpr std::array known_adverbs{
     known_adverb{"epoch", on(verb::update),
                  [](std::string_view v, request_line& r) { return (r.epoch = parse_epoch(v)).has_value(); }},
     known_adverb{"via", on_all, [](std::string_view v, request_line& r) { return is_list(r.via = v, is_name); }},
+    known_adverb{"from", on_all, [](std::string_view v, request_line& r) { return is_name(r.from = v); }},
     known_adverb{"since", on(verb::pull),
                  [](std::string_view v, request_line& r) { return (r.since = v).size() <= max_since; }},
     known_adverb{"describe", on(verb::pull),

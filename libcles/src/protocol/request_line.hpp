@@ -57,6 +57,7 @@ struct request_line : carried_adverbs {
     std::optional<std::uint64_t> seq;
     std::optional<std::uint32_t> epoch;
     std::string_view via;
+    std::string_view from;                     ///< the requester, if the peer forwards
     std::string_view since;                    ///< what the requester knows already
     std::string_view describe;                 ///< epochs of the incarnations to describe in full, separated by commas
     std::string_view body;                     ///< empty: none

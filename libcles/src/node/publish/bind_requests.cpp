@@ -8,6 +8,7 @@
 #include "node/session/inbound.hpp"
 #include "node/session/request_checks.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <utility>
@@ -35,9 +36,9 @@ bind_requests::bind_requests(std::shared_ptr<node_state> host, line_sink& out, s
     : shared_node_(std::move(host)), node_(*shared_node_), peer_(peer), out_(out), replies_(replies), updates_(updates),
       bound_(node_.published, updates) {
     if (out.datagram() != 0) {
-        leases_.emplace(node_.deadlines, [this](const std::string& path) {
+        leases_.emplace(node_.deadlines, [this](const leased& which) {
             ++node_.counts.leases_expired;
-            drop(path);
+            drop(which);
         });
     }
 }
@@ -48,6 +49,7 @@ void bind_requests::clear() {
     }
     pending_.clear();
     remote_bindings_.reset();
+    requesters_.clear();
     bound_.clear();
 }
 
@@ -58,30 +60,43 @@ void bind_requests::drain(time_point now) {
     }
 }
 
-// A noun of another node begins with its name and a colon, which no path of this node contains.
-void bind_requests::drop(const std::string& noun) {
-    const auto colon = noun.find(':');
-    if (colon == std::string::npos) {
-        bound_.unbind(noun);
+void bind_requests::drop(const leased& which) {
+    if (which.node.empty()) {
+        unbind(which.path.text);
     } else if (remote_bindings_) {
-        remote_bindings_->unbind(std::string_view{noun}.substr(0, colon), std::string_view{noun}.substr(colon + 1));
+        remote_bindings_->unbind(which.node, which.path);
     }
+}
+
+void bind_requests::unbind(std::string_view path) {
+    requesters_.erase(std::string{path});
+    bound_.unbind(path);
+}
+
+bool bind_requests::are_permitted() const {
+    return std::ranges::all_of(requesters_,
+                               [&](const auto& entry) {
+                                   const auto& [path, requester] = entry;
+                                   return permits(node_, requester, node_.name, verb::bind, path);
+                               }) &&
+           (!remote_bindings_ || remote_bindings_->are_permitted(node_));
 }
 
 void bind_requests::serve_remote(const protocol::request_line& r, time_point due, time_point now, inbound& from) {
     std::string scratch;
-    auto noun = std::string{r.noun.target}.append(":").append(protocol::canonical_path(r.noun, scratch));
+    const auto requester = requester_of(node_, peer_, r);
+    const leased which{std::string{r.noun.target},
+                       {std::string{protocol::canonical_path(r.noun, scratch)}, std::string{requester}}};
     if (r.unbinds()) {
         if (leases_) {
-            leases_->drop(noun);
+            leases_->drop(which);
         }
-        drop(noun);
+        drop(which);
         replies_.done(reply_target{r}, {});
         return;
     }
     // A binding that exists already needs no further capacity.
-    const bool known =
-        remote_bindings_ && remote_bindings_->binds(r.noun.target, protocol::canonical_path(r.noun, scratch));
+    const bool known = remote_bindings_ && remote_bindings_->binds(which.node, which.path);
     if (!known && size() >= node_.bounds.bindings) {
         replies_.fail(r, errc::busy, node_.name + ": too many bindings on this link");
         return;
@@ -90,14 +105,22 @@ void bind_requests::serve_remote(const protocol::request_line& r, time_point due
         remote_bindings_ =
             std::make_unique<relayed_bindings>(node_.published, bound_, node_.active_router->relayed(), updates_);
     }
-    set_lease(noun, lease_of(r), now);
-    node_.active_router->bind(r, *remote_bindings_, due, now, from);
+    set_lease(which, lease_of(r), now);
+    node_.active_router->bind(r, requester, *remote_bindings_, due, now, from);
 }
 
-void bind_requests::set_lease(std::string_view path, std::chrono::milliseconds lease, time_point now) {
+void bind_requests::set_lease(const leased& which, std::chrono::milliseconds lease, time_point now) {
     if (leases_) {
-        leases_->set(std::string{path}, saturating_add(now, lease));
+        leases_->set(which, saturating_add(now, lease));
     }
+}
+
+void bind_requests::bind(topic& t, const protocol::request_line& r, std::string_view path, time_point now) {
+    bound_.bind(t, terms_of(r));
+    if (node_.security) {
+        requesters_.insert_or_assign(std::string{path}, std::string{requester_of(node_, peer_, r)});
+    }
+    set_lease({{}, {std::string{path}}}, lease_of(r), now);
 }
 
 void bind_requests::serve(const protocol::request_line& r, time_point due, time_point now, inbound& from) {
@@ -105,10 +128,10 @@ void bind_requests::serve(const protocol::request_line& r, time_point due, time_
     const auto path = protocol::canonical_path(r.noun, scratch);
     if (r.unbinds()) {
         if (leases_) {
-            leases_->drop(path);
+            leases_->drop(leased{{}, {std::string{path}}});
         }
         withdraw(path);
-        bound_.unbind(path);
+        unbind(path);
         replies_.done(reply_target{r}, {});
         return;
     }
@@ -125,8 +148,7 @@ void bind_requests::serve(const protocol::request_line& r, time_point due, time_
         ask_bind_handler(node_, peer_, r);
         auto& t = open(path);
         replies_.done(reply_target{r}, t.last_body(), head_of(t, r.wants_mark));
-        bound_.bind(t, terms_of(r));
-        set_lease(path, lease_of(r), now);
+        bind(t, r, path, now);
     } catch (...) {
         replies_.fail(r, describe(std::current_exception()));
     }
@@ -157,8 +179,8 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
     });
     pending_.push_back({std::string{path}, c});
     const auto handler = std::make_shared<local_request>(
-        shared_node_, [this, c, path = std::string{path}, terms = terms_of(r), lease = lease_of(r),
-                       mark = r.wants_mark](std::string_view, const subrequest_failure* why_not) {
+        shared_node_, [this, c, path = std::string{path}, wanted = std::make_shared<protocol::owned_request>(r)](
+                          std::string_view, const subrequest_failure* why_not) {
             if (c->ended()) { // `this` may be gone with its link
                 return;
             }
@@ -169,9 +191,8 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
             try {
                 auto& t = open(path);
                 // Bound before the reply, which may set off other requests of the peer; updates follow it later.
-                bound_.bind(t, terms);
-                set_lease(path, lease, node_.time.now());
-                c->set_head(head_of(t, mark));
+                bind(t, **wanted, path, node_.time.now());
+                c->set_head(head_of(t, (*wanted)->wants_mark));
                 c->done(t.last_body());
             } catch (...) {
                 c->fail(describe(std::current_exception()));

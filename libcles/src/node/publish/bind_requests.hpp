@@ -11,7 +11,9 @@
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
+#include <chrono>
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,6 +45,8 @@ class bind_requests {
         return bound_.size() + (remote_bindings_ ? remote_bindings_->size() : 0);
     }
     [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+    /// Whether all requesters may still bind what is bound for them. True without security.
+    [[nodiscard]] bool are_permitted() const;
 
   private:
     struct asking {
@@ -50,13 +54,23 @@ class bind_requests {
         std::weak_ptr<call> answers; // a call counts as running until it is destroyed
     };
 
-    void drop(const std::string& noun);
+    /// A binding with a lease.
+    struct leased {
+        std::string node; ///< empty: this one
+        relayed_path path;
+
+        auto operator<=>(const leased&) const = default;
+    };
+
+    void drop(const leased& which);
+    void bind(topic& t, const protocol::request_line& request, std::string_view path, time_point now);
+    void unbind(std::string_view path);
     void serve_later(const protocol::request_line& request, std::string_view path, time_point due, time_point now,
                      inbound& from);
     void withdraw(std::string_view path);
     /// \throws cles::error if a limit is reached
     topic& open(std::string_view path);
-    void set_lease(std::string_view path, std::chrono::milliseconds lease, time_point now);
+    void set_lease(const leased& which, std::chrono::milliseconds lease, time_point now);
 
     std::shared_ptr<node_state> shared_node_;
     node_state& node_;
@@ -67,7 +81,8 @@ class bind_requests {
     link_bindings bound_;
     std::unique_ptr<relayed_bindings> remote_bindings_; // few links need it
     std::vector<asking> pending_;                       // whose handlers have not decided yet
-    std::optional<leases<std::string>> leases_;         // over datagrams: nothing shows that the peer has gone
+    std::map<std::string, std::string> requesters_;     // by path, of a secured node
+    std::optional<leases<leased>> leases_;              // over datagrams: nothing shows that the peer has gone
 };
 
 } // namespace cles::core

@@ -7,6 +7,7 @@
 #include "node/local_node.hpp"
 #include "node/routing/peer_channels.hpp"
 #include "node/session/outbound.hpp"
+#include "node/session/request_checks.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -127,9 +128,19 @@ void feed_links::refuse_later(core::feed_machine& feed, boost::system::error_cod
                                      why] { feed.on_refused(code, why, host->now()); });
 }
 
+// Feeds for clients have adverbs, with the client, whose rights have been checked.
+bool feed_links::is_permitted(core::feed_machine& feed) const {
+    return !feed.entry().terms.adverbs.empty() || protocol::is_reserved_target(feed.target()) ||
+           permits(host_.node(), host_.node().name, feed.target(), verb::bind, feed.path());
+}
+
 void feed_links::bind(core::feed_machine& feed) {
     if (host_.stopped()) {
         refuse_later(feed, errc::stopped, "the service has been stopped");
+        return;
+    }
+    if (!is_permitted(feed)) {
+        refuse_later(feed, errc::denied, host_.node().name + " may not bind '" + feed.path() + "' of " + feed.target());
         return;
     }
     auto& e = feed.entry();
@@ -291,6 +302,22 @@ void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
             feed->on_lost(std::string{node} + " was replaced by another instance", now);
         }
         feed->expedite(now);
+    }
+}
+
+void feed_links::on_security_changed() {
+    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> refused; // a completion may close others
+    for (auto& feed : feeds_) {
+        if (feed.is_bound() && !is_permitted(feed)) {
+            refused.emplace_back(&feed, feed.entry().handle);
+        }
+    }
+    for (const auto& [feed, handle] : refused) {
+        const auto alive = handle.lock();
+        if (alive && feed->is_bound()) {
+            unbind(*feed);
+            feed->on_lost(host_.node().name + " may no longer bind it", host_.now());
+        }
     }
 }
 

@@ -34,6 +34,8 @@ class feed_links final : public core::feed_host {
     /// The node has a new incarnation: feeds that wait to bind there do so at once. `replaced`: feeds that are still
     /// bound to the previous incarnation are bound again.
     void on_new_incarnation(std::string_view node, bool replaced);
+    /// The roster or the rules have changed: ends the bindings that are no longer permitted.
+    void on_security_changed();
     /// Closes all feeds.
     void stop();
 
@@ -61,6 +63,8 @@ class feed_links final : public core::feed_host {
     void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
     void ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c);
     [[nodiscard]] protocol::outgoing_request bind_request(core::feed_machine& feed, const connection& c);
+    /// Whether the node may bind it. True without security.
+    [[nodiscard]] bool is_permitted(core::feed_machine& feed) const;
     void refuse_later(core::feed_machine& feed, boost::system::error_code code, const std::string& why);
 
     local_node& host_;

@@ -9,11 +9,19 @@
 
 namespace cles::core {
 
-all_binding::all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, std::string path,
+all_binding::all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, relayed_path path,
                          relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due)
     : deferred_request(std::move(by), std::move(answers), due), task_(r.noun.task), path_(std::move(path)), via_(r.via),
-      adverbs_(forwarded_adverbs(r, routing_->host().name)), may_pass_on_(r.hops != 0), wants_mark_(r.wants_mark),
-      place_(place), wanted_(wanted) {}
+      adverbs_(forwarded_adverbs(r, routing_->host().name, path_.requester)), may_pass_on_(r.hops != 0),
+      wants_mark_(r.wants_mark), place_(place), wanted_(wanted) {}
+
+bool all_binding::may_bind_at(std::string_view node) const {
+    return permits(routing_->host(), path_.requester, node, verb::bind, path_.text);
+}
+
+bool all_binding::is_permitted() const {
+    return std::ranges::all_of(parts_, [this](const auto& entry) { return may_bind_at(entry.first); });
+}
 
 bool all_binding::begin(time_point now) {
     if (begun_) {
@@ -53,10 +61,10 @@ void all_binding::follow() {
     const auto self = shared_from_this();
     joining_ = true;
     const auto& host = routing_->host();
-    if (!parts_.contains(host.name) && core::offers(host, verb::bind, task_)) {
+    if (!parts_.contains(host.name) && core::offers(host, verb::bind, task_) && may_bind_at(host.name)) {
         auto& own = parts_[host.name];
         own.asked = false;
-        if (const auto* t = place_.take_own_part(path_, wanted_)) {
+        if (const auto* t = place_.take_own_part(path_.text, wanted_)) {
             own.result = t->last_body().empty() ? std::string_view{"{}"} : t->last_body();
             own.mark = t->last_mark();
         }
@@ -64,7 +72,7 @@ void all_binding::follow() {
     if (may_pass_on_) {
         std::vector<std::string> there;
         for (const auto& o : routing_->offers(verb::bind, task_)) {
-            if (!is_in_via(via_, o.by->name)) {
+            if (!is_in_via(via_, o.by->name) && may_bind_at(o.by->name)) {
                 there.push_back(o.by->name);
             }
         }
@@ -158,9 +166,9 @@ void all_binding::close(const all_binding* heir) {
             continue;
         }
         if (node == routing_->host().name) {
-            place_.leave_own_part(path_);
+            place_.leave_own_part(path_.text);
         } else {
-            place_.leave_part(node + ":" + path_);
+            place_.leave_part(path_.key(node));
         }
     }
     if (const auto c = std::exchange(call_, nullptr)) {

@@ -20,7 +20,7 @@ namespace cles::core {
 /// the last value of each.
 class all_binding final : public deferred_request, private deadline {
   public:
-    all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, std::string path,
+    all_binding(std::shared_ptr<request_router> by, const protocol::request_line& r, relayed_path path,
                 relayed_bindings& place, binding::terms wanted, std::shared_ptr<call> answers, time_point due);
 
     /// Returns false if it has to wait for more nodes to be discovered.
@@ -28,6 +28,8 @@ class all_binding final : public deferred_request, private deadline {
     [[nodiscard]] bool over() const override { return closed_; }
     /// The nodes that publish the noun may have changed.
     void follow();
+    /// Whether its requester may still bind what it has bound.
+    [[nodiscard]] bool is_permitted() const;
     /// Ends all bindings except those that `heir` has too. Does not use `place` afterwards.
     void close(const all_binding* heir = nullptr);
 
@@ -37,6 +39,7 @@ class all_binding final : public deferred_request, private deadline {
         bool bound = false; // with a failure too, if there was no memory for its last value
     };
 
+    [[nodiscard]] bool may_bind_at(std::string_view node) const;
     void bind_known(time_point now);
     void join(const std::string& node);
     void on_result(const std::string& node, topic* t, std::string_view last, const std::optional<update_mark>& mark,
@@ -47,7 +50,7 @@ class all_binding final : public deferred_request, private deadline {
     void withdraw() override;
 
     std::string task_;
-    std::string path_;
+    relayed_path path_;
     std::string via_;
     std::string adverbs_;
     bool may_pass_on_;

@@ -40,13 +40,14 @@ void deferred_request::follow_call() {
 
 any_request::any_request(std::shared_ptr<request_router> by, const protocol::request_line& r, const identity& peer,
                          std::shared_ptr<call> answers, time_point due)
-    : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer) {}
+    : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer),
+      requester_(requester_of(routing_->host(), peer, r)) {}
 
 bool any_request::begin(time_point now) {
     if (!retry_after_ && routing_->waits_for_discovery()) {
         return false;
     }
-    const auto chosen = routing_->choose(*request_, asked_, now);
+    const auto chosen = routing_->choose(*request_, requester_, asked_, now);
     if (over()) { // the program's load function has stopped the service
         return true;
     }
@@ -74,7 +75,7 @@ void any_request::ask(const load_balancer::chosen& chosen, time_point now) {
     if (chosen.other != nullptr) {
         asked_.push_back(chosen.other->name);
         ++chosen.other->given;
-        part_.ticket = routing_->send(*request_, chosen.other->name, reply_due_, then, progress_to(call_));
+        part_.ticket = routing_->send(*request_, requester_, chosen.other->name, reply_due_, then, progress_to(call_));
         return;
     }
     asked_.push_back(routing_->host().name);
@@ -165,7 +166,8 @@ void any_request::give_up(protocol::failure why, bool may_have_started) {
 
 scatter_gather::scatter_gather(std::shared_ptr<request_router> by, const protocol::request_line& r,
                                const identity& peer, std::shared_ptr<call> answers, time_point due)
-    : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer) {}
+    : deferred_request(std::move(by), std::move(answers), due), request_(r), peer_(peer),
+      requester_(requester_of(routing_->host(), peer, r)) {}
 
 bool scatter_gather::begin(time_point now) {
     if (begun_ || over()) {
@@ -185,7 +187,11 @@ void scatter_gather::ask_known(time_point now) {
     begun_ = true;
     routing_->host().deadlines.disarm(*this);
     const auto& r = *request_;
-    const auto add = [this](const std::string& node) { parts_.emplace_back().node = node; };
+    const auto add = [this, &r](const std::string& node) {
+        if (permits(routing_->host(), requester_, node, r.verb, r.noun)) {
+            parts_.emplace_back().node = node;
+        }
+    };
     if (offers(routing_->host(), r.verb, r.noun.task)) {
         add(routing_->host().name);
     }
@@ -216,7 +222,7 @@ void scatter_gather::ask_all(time_point now) {
         if (at->node == routing_->host().name) {
             own = &*at;
         } else {
-            at->ticket = routing_->send(*request_, at->node, by, then(*at));
+            at->ticket = routing_->send(*request_, requester_, at->node, by, then(*at));
         }
     }
     if (own != nullptr && !ended_) { // last, since its handler may do anything

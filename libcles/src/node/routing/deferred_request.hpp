@@ -87,6 +87,7 @@ class any_request final : public deferred_request {
 
     protocol::owned_request request_;
     const identity& peer_;           // valid until the call has ended
+    const std::string requester_;    // whose rights apply
     std::vector<std::string> asked_; // the last one is asked now
     attempt part_;                   // at that node
     bool idempotent_ = false;        // at that node
@@ -151,9 +152,10 @@ class scatter_gather final : public deferred_request, private deadline {
     void withdraw() override;
 
     protocol::owned_request request_;
-    const identity& peer_;    // valid until the call has ended
-    std::vector<part> parts_; // by name
-    std::size_t bytes_ = 0;   // of results
+    const identity& peer_;        // valid until the call has ended
+    const std::string requester_; // whose rights apply
+    std::vector<part> parts_;     // by name
+    std::size_t bytes_ = 0;       // of results
     bool begun_ = false;
     bool has_waited_ = false; // as long as permitted
     bool ended_ = false;

@@ -41,11 +41,13 @@ bool offers(const node_state& n, verb v, std::string_view task) {
     return n.tasks.find(v, task) != nullptr;
 }
 
-void load_balancer::gather(const protocol::request_line& r, const std::vector<std::string>& asked, bool may_be_here) {
+void load_balancer::gather(const protocol::request_line& r, std::string_view requester,
+                           const std::vector<std::string>& asked) {
     const auto was_asked = [&](std::string_view name) {
         return std::find(asked.begin(), asked.end(), name) != asked.end();
     };
-    const bool here = may_be_here && !was_asked(node_.name);
+    const auto may_ask = [&](std::string_view name) { return permits(node_, requester, name, r.verb, r.noun); };
+    const bool here = offers(node_, r.verb, r.noun.task) && !was_asked(node_.name) && may_ask(node_.name);
     if (here) {
         here_.update_load(node_.load_now()); // before the list is built: the program's function may send requests
     }
@@ -58,15 +60,15 @@ void load_balancer::gather(const protocol::request_line& r, const std::vector<st
     }
     for (const auto& o : others_.offers(r.verb, r.noun.task)) {
         if (o.by->live && o.by->reachable() && (r.via.empty() || !is_in_via(r.via, o.by->name)) &&
-            (asked.empty() || !was_asked(o.by->name))) {
+            (asked.empty() || !was_asked(o.by->name)) && may_ask(o.by->name)) {
             all_.push_back(o.by);
         }
     }
 }
 
-load_balancer::chosen load_balancer::choose(const protocol::request_line& r, const std::vector<std::string>& asked,
-                                            time_point now) {
-    gather(r, asked, offers(node_, r.verb, r.noun.task));
+load_balancer::chosen load_balancer::choose(const protocol::request_line& r, std::string_view requester,
+                                            const std::vector<std::string>& asked, time_point now) {
+    gather(r, requester, asked);
     at_once_.clear();
     std::copy_if(all_.begin(), all_.end(), std::back_inserter(at_once_),
                  [now](const candidate* c) { return c->avoid_until <= now; });

@@ -46,12 +46,14 @@ class load_balancer {
     };
     /// Selects a live node that offers the task, is not in `via` and is not in `asked`. Busy and unreachable nodes are
     /// selected only if there are no others, and nodes with all workers on long jobs only if no node has a free worker.
-    [[nodiscard]] chosen choose(const protocol::request_line& r, const std::vector<std::string>& asked, time_point now);
+    /// Of a secured fleet, only nodes of which `requester` may request it.
+    [[nodiscard]] chosen choose(const protocol::request_line& r, std::string_view requester,
+                                const std::vector<std::string>& asked, time_point now);
     /// This node has refused work.
     void avoid_local(time_point until) noexcept { here_.avoid_until = until; }
 
   private:
-    void gather(const protocol::request_line& r, const std::vector<std::string>& asked, bool may_be_here);
+    void gather(const protocol::request_line& r, std::string_view requester, const std::vector<std::string>& asked);
 
     const node_state& node_;
     const service_registry& others_;

@@ -20,8 +20,8 @@
 namespace cles::core {
 namespace {
 
-// A request has at most 16 adverbs, and this node writes up to six: id, deadline, progress, urgent, hops, via.
-constexpr std::size_t max_foreign = protocol::max_adverbs - 6;
+// A request has at most 16 adverbs, and this node writes up to seven: id, deadline, progress, urgent, hops, via, from.
+constexpr std::size_t max_foreign = protocol::max_adverbs - 7;
 
 void append_foreign(std::string& out, const protocol::request_line& r) {
     protocol::part_reader parts{r.text};
@@ -186,12 +186,15 @@ class node_router final : private peer_next_hop, public request_router {
 
 } // namespace
 
-std::string forwarded_adverbs(const protocol::request_line& r, std::string_view own_name) {
+std::string forwarded_adverbs(const protocol::request_line& r, std::string_view own_name, std::string_view requester) {
     auto out = "hops=" + std::to_string(r.hops == 0 ? 0 : r.hops - 1) + " via=";
     if (!r.via.empty()) {
         out.append(r.via).push_back(',');
     }
     out.append(own_name);
+    if (!requester.empty() && requester != own_name) {
+        out.append(" from=").append(requester);
+    }
     append_foreign(out, r);
     return out;
 }

@@ -10,13 +10,19 @@
 namespace cles::core {
 namespace {
 
-std::string noun_of(std::string_view node, std::string_view path) { return std::string{node}.append(":").append(path); }
-
 bool has(const std::vector<std::string>& all, std::string_view one) {
     return std::find(all.begin(), all.end(), one) != all.end();
 }
 
 } // namespace
+
+std::string relayed_path::key(std::string_view node) const {
+    auto made = std::string{node}.append(":").append(text);
+    if (!requester.empty()) {
+        made.append(" from=").append(requester);
+    }
+    return made;
+}
 
 class relays::relay final : public feed_events {
   public:
@@ -123,9 +129,9 @@ void relays::stop() {
     }
 }
 
-void relays::join(std::string_view node, std::string_view path, std::string_view adverbs,
+void relays::join(std::string_view node, const relayed_path& path, std::string_view adverbs,
                   const std::weak_ptr<const void>& whose, result_callback done) {
-    const auto noun = noun_of(node, path);
+    const auto noun = path.key(node);
     auto at = all_.find(noun);
     if (at != all_.end()) {
         at->second->join(whose, std::move(done));
@@ -141,7 +147,7 @@ void relays::join(std::string_view node, std::string_view path, std::string_view
     }
     at = all_.emplace(noun, std::make_unique<relay>(*this, noun)).first;
     at->second->join(whose, std::move(done));
-    at->second->start(node, path, adverbs);
+    at->second->start(node, path.text, adverbs);
 }
 
 topic* relays::find(std::string_view noun) noexcept {
@@ -158,14 +164,14 @@ void relays::release(topic& t) {
 
 relayed_bindings::~relayed_bindings() { clear(); }
 
-void relayed_bindings::bind(std::string_view node, std::string_view path, std::string_view adverbs,
+void relayed_bindings::bind(std::string_view node, const relayed_path& path, std::string_view adverbs,
                             binding::terms wanted, bool wants_mark, const std::shared_ptr<call>& c) {
     std::erase_if(asking_, [](const asking& a) {
         const auto waits = a.answers.lock();
         return !waits || waits->ended();
     });
-    auto noun = noun_of(node, path);
-    asking_.push_back({noun, c});
+    const named noun{path.key(node), std::string{node}, path};
+    asking_.push_back({noun.key, c});
     from_->join(
         node, path, adverbs, c,
         [this, weak = std::weak_ptr{c}, wanted, wants_mark,
@@ -184,7 +190,7 @@ void relayed_bindings::bind(std::string_view node, std::string_view path, std::s
             }
             // Bound before the reply, which may trigger other requests of the peer; updates follow the reply later.
             bound_.bind(*t, wanted);
-            if (!has(by_name_, noun)) {
+            if (!is_by_name(noun.key)) {
                 by_name_.push_back(noun);
             }
             if (wants_mark) {
@@ -194,8 +200,20 @@ void relayed_bindings::bind(std::string_view node, std::string_view path, std::s
         });
 }
 
-bool relayed_bindings::binds(std::string_view target, std::string_view path) {
-    return target == "all" ? all_.find(path) != all_.end() : bound_.has(noun_of(target, path));
+bool relayed_bindings::binds(std::string_view target, const relayed_path& path) {
+    return target == "all" ? all_.contains(path) : bound_.has(path.key(target));
+}
+
+bool relayed_bindings::is_by_name(std::string_view key) const {
+    return std::ranges::any_of(by_name_, [key](const named& each) { return each.key == key; });
+}
+
+bool relayed_bindings::are_permitted(const node_state& host) const {
+    return std::ranges::all_of(by_name_,
+                               [&](const named& each) {
+                                   return permits(host, each.path.requester, each.node, verb::bind, each.path.text);
+                               }) &&
+           std::ranges::all_of(all_, [](const auto& entry) { return entry.second->is_permitted(); });
 }
 
 void relayed_bindings::withdraw(std::string_view noun) {
@@ -209,16 +227,16 @@ void relayed_bindings::withdraw(std::string_view noun) {
     }
 }
 
-void relayed_bindings::unbind(std::string_view target, std::string_view path) {
+void relayed_bindings::unbind(std::string_view target, const relayed_path& path) {
     if (target == "all") {
-        if (const auto held = all_.extract(std::string{path}); !held.empty()) {
+        if (const auto held = all_.extract(path); !held.empty()) {
             held.mapped()->close();
         }
         return;
     }
-    const auto noun = noun_of(target, path);
+    const auto noun = path.key(target);
     withdraw(noun);
-    std::erase(by_name_, noun);
+    std::erase_if(by_name_, [&](const named& each) { return each.key == noun; });
     bound_.unbind(noun);
 }
 
@@ -234,13 +252,13 @@ void relayed_bindings::clear() {
 // -- parts of `all` ------------------------------------------------------------------------------------------------
 
 void relayed_bindings::take_part(topic& t, binding::terms wanted) {
-    if (!has(by_name_, t.path())) {
+    if (!is_by_name(t.path())) {
         bound_.bind(t, wanted);
     }
 }
 
 void relayed_bindings::leave_part(std::string_view noun) {
-    if (!has(by_name_, noun)) {
+    if (!is_by_name(noun)) {
         bound_.unbind(noun);
     }
 }

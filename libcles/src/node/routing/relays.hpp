@@ -20,9 +20,20 @@
 
 namespace cles::core {
 
-/// Forwards to this node's clients what other nodes publish, by nouns such as "car2:pose". Each noun is bound once, as
-/// long as clients use it. Its updates are forwarded as received; thinning and queuing happen here, separately for each
-/// client.
+/// A path of another node, bound for a client.
+struct relayed_path {
+    std::string text;
+    std::string requester{}; ///< in a secured fleet, the member whose rights apply
+
+    auto operator<=>(const relayed_path&) const = default;
+    /// Identifies the noun and its requester among those of a node: "car2:pose", "car2:pose from=car1". No noun
+    /// contains a space.
+    [[nodiscard]] std::string key(std::string_view node) const;
+};
+
+/// Forwards to this node's clients what other nodes publish, by nouns such as "car2:pose". Each noun is bound once for
+/// each requester, whose rights the publisher checks, as long as clients use it. Its updates are forwarded as received;
+/// thinning and queuing happen here, separately for each client.
 class relays final : public topic_source {
   public:
     relays(node_state& host, next_hop& out);
@@ -34,7 +45,7 @@ class relays final : public topic_source {
     using result_callback = std::function<void(topic*, std::string_view last, const std::optional<update_mark>& mark,
                                                const protocol::failure& why)>;
     /// Binds a noun. Calls `done` once, at once if the noun is bound already, and not if `whose` has expired.
-    void join(std::string_view node, std::string_view path, std::string_view adverbs,
+    void join(std::string_view node, const relayed_path& path, std::string_view adverbs,
               const std::weak_ptr<const void>& whose, result_callback done);
 
     [[nodiscard]] topic* find(std::string_view noun) noexcept override;
@@ -64,17 +75,19 @@ class relayed_bindings {
     ~relayed_bindings();
 
     /// Binds a noun of another node, and replies when that node has. A further BIND changes the terms.
-    void bind(std::string_view node, std::string_view path, std::string_view adverbs, binding::terms wanted,
+    void bind(std::string_view node, const relayed_path& path, std::string_view adverbs, binding::terms wanted,
               bool wants_mark, const std::shared_ptr<call>& c);
     /// Binds a noun of all its publishers from now on. Returns the previous binding of that noun, to be closed.
-    std::shared_ptr<all_binding> bind_all(std::string_view path, std::shared_ptr<all_binding> all) {
-        return std::exchange(all_[std::string{path}], std::move(all));
+    std::shared_ptr<all_binding> bind_all(const relayed_path& path, std::shared_ptr<all_binding> all) {
+        return std::exchange(all_[path], std::move(all));
     }
     /// Ends a binding, or a BIND that is still in progress.
-    void unbind(std::string_view target, std::string_view path);
+    void unbind(std::string_view target, const relayed_path& path);
     void clear();
+    /// Whether all requesters may still bind what is bound for them.
+    [[nodiscard]] bool are_permitted(const node_state& host) const;
     void drain(time_point now) { bound_.drain(now); }
-    [[nodiscard]] bool binds(std::string_view target, std::string_view path);
+    [[nodiscard]] bool binds(std::string_view target, const relayed_path& path);
     [[nodiscard]] std::size_t size() const noexcept { return bound_.size() + all_.size(); }
     [[nodiscard]] bool empty() const noexcept { return size() == 0; }
 
@@ -93,15 +106,21 @@ class relayed_bindings {
         std::weak_ptr<call> answers; // weak: a call accounts for memory as long as it exists
     };
     void withdraw(std::string_view noun);
+    [[nodiscard]] bool is_by_name(std::string_view key) const;
 
     publications& published_;
     link_bindings& own_;
     std::shared_ptr<relays> from_;
     link_bindings bound_;
-    std::vector<std::string> by_name_;    // nouns of other nodes, bound by name
+    struct named {
+        std::string key;
+        std::string node;
+        relayed_path path;
+    };
+    std::vector<named> by_name_;          // nouns of other nodes, bound by name
     std::vector<std::string> own_by_all_; // paths of this node, bound by `all` only
     std::vector<asking> asking_;
-    std::map<std::string, std::shared_ptr<all_binding>, std::less<>> all_; // by path
+    std::map<relayed_path, std::shared_ptr<all_binding>> all_;
 };
 
 } // namespace cles::core

@@ -4,6 +4,7 @@
 #include "node/routing/all_binding.hpp"
 #include "node/routing/deferred_request.hpp"
 #include "node/session/inbound.hpp"
+#include "node/session/request_checks.hpp"
 
 #include <chrono>
 #include <utility>
@@ -33,8 +34,9 @@ void request_router::stop() {
 bool request_router::route(const protocol::request_line& r, const identity& peer, time_point due, time_point now,
                            inbound& from) {
     const auto target = r.noun.target;
+    const auto requester = requester_of(*node_, peer, r);
     if (target == "any" && !waits_for_discovery_) {
-        const auto chosen = load_balancer_.choose(r, {}, now);
+        const auto chosen = load_balancer_.choose(r, requester, {}, now);
         if (chosen.here && runs_in_line(r)) {
             return false;
         }
@@ -57,15 +59,16 @@ bool request_router::route(const protocol::request_line& r, const identity& peer
         c->fail({.code = errc::no_target,
                  .message = "the request cannot be forwarded to '" + std::string{target} + "': hops=0"});
     } else {
-        forward(r, std::move(c), due);
+        forward(r, requester, std::move(c), due);
     }
     return true;
 }
 
 // Reply, progress and cancellation are forwarded too.
-void request_router::forward(const protocol::request_line& r, std::shared_ptr<call> c, time_point due) {
+void request_router::forward(const protocol::request_line& r, std::string_view requester, std::shared_ptr<call> c,
+                             time_point due) {
     const auto ticket = send(
-        r, r.noun.target, due,
+        r, requester, r.noun.target, due,
         [c, node = std::string{r.noun.target}](std::string_view json, subrequest_failure* why) {
             if (why == nullptr) {
                 c->done(json);
@@ -77,10 +80,10 @@ void request_router::forward(const protocol::request_line& r, std::shared_ptr<ca
     c->on_stop([self = shared_from_this(), ticket] { self->out_.cancel(ticket); });
 }
 
-std::uint64_t request_router::send(const protocol::request_line& r, std::string_view node, time_point due,
-                                   subrequest_outcome then, outbound::progress_function progress) {
+std::uint64_t request_router::send(const protocol::request_line& r, std::string_view requester, std::string_view node,
+                                   time_point due, subrequest_outcome then, outbound::progress_function progress) {
     const auto noun = std::string{node}.append(":").append(r.noun.path);
-    const auto adverbs = forwarded_adverbs(r, node_->name);
+    const auto adverbs = forwarded_adverbs(r, node_->name, requester);
     return out_.send({.verb = r.verb, .noun = noun, .carried = r.carried(), .adverbs = adverbs, .body = r.body}, due,
                      detail::pending_ptr{new subrequest(std::move(then))}, std::move(progress));
 }
@@ -101,15 +104,15 @@ void request_router::continue_after_busy(const protocol::request_line& r, const 
     }
 }
 
-void request_router::bind(const protocol::request_line& r, relayed_bindings& place, time_point due, time_point now,
-                          inbound& from) {
+void request_router::bind(const protocol::request_line& r, std::string_view requester, relayed_bindings& place,
+                          time_point due, time_point now, inbound& from) {
     const auto c = from.make_call(r, due, now);
     if (!c) {
         return;
     }
     const binding::terms wanted{.every = std::chrono::milliseconds{r.every_ms}, .keep = r.keep};
     std::string scratch;
-    const std::string path{protocol::canonical_path(r.noun, scratch)};
+    const relayed_path path{std::string{protocol::canonical_path(r.noun, scratch)}, std::string{requester}};
     if (r.noun.target == "all") {
         const auto all = std::make_shared<all_binding>(shared_from_this(), r, path, place, wanted, c, due);
         const auto before = place.bind_all(path, all);
@@ -124,7 +127,7 @@ void request_router::bind(const protocol::request_line& r, relayed_bindings& pla
                  .message = r.hops == 0 ? "the request cannot be forwarded: hops=0"
                                         : "a binding needs a node's name or 'all'"});
     } else {
-        place.bind(r.noun.target, path, forwarded_adverbs(r, node_->name), wanted, r.wants_mark, c);
+        place.bind(r.noun.target, path, forwarded_adverbs(r, node_->name, requester), wanted, r.wants_mark, c);
     }
 }
 

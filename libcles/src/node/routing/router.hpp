@@ -8,6 +8,7 @@
 #include "protocol/request_line.hpp"
 
 #include <memory>
+#include <string_view>
 
 namespace cles::core {
 
@@ -33,9 +34,10 @@ class router {
     /// This node was to serve a request in line but was `busy`, so it has not started: continues with another node.
     virtual void continue_after_busy(const protocol::request_line& request, const identity& peer,
                                      const protocol::failure& why, time_point due, time_point now, inbound& from) = 0;
-    /// Like `route`, for BIND. `place` contains the bindings of the link's peer, and lives as long as the call.
-    virtual void bind(const protocol::request_line& request, relayed_bindings& place, time_point due, time_point now,
-                      inbound& from) = 0;
+    /// Like `route`, for BIND of `requester`. `place` contains the bindings of the link's peer, and lives as long as
+    /// the call.
+    virtual void bind(const protocol::request_line& request, std::string_view requester, relayed_bindings& place,
+                      time_point due, time_point now, inbound& from) = 0;
     /// The source of the relayed bindings.
     virtual std::shared_ptr<relays> relayed() = 0;
 

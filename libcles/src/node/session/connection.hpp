@@ -37,6 +37,7 @@ class connection final : public link_events,
     [[nodiscard]] core::session& session() noexcept { return session_; }
     [[nodiscard]] origin from() const noexcept { return from_; }
     [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
+    [[nodiscard]] const identity& peer() const noexcept { return link_->peer(); }
     /// Whether it is a source of datagrams that was accepted.
     [[nodiscard]] bool is_source() const noexcept { return datagrams_ && monitor_; }
     /// Whether closing it would lose nothing.

@@ -5,6 +5,7 @@
 #include "node/local_node.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/session/request_checks.hpp"
+#include "port/node_security.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -141,6 +142,24 @@ void connections::refuse_new_requests() {
     for (const auto& [key, c] : open_) {
         if (c->from() != connection::origin::local) {
             c->session().serving().refuse_new_requests();
+        }
+    }
+}
+
+void connections::on_security_changed() {
+    const auto& security = *host_.node().security;
+    for (const auto& c : all()) {
+        const auto& peer = c->peer();
+        if (!peer.name.empty() && !security.is_member(peer.name)) {
+            host_.post_log(log_level::info, peer.name + " is no longer a member of the fleet: closed its link",
+                           peer.address);
+            c->abandon(peer.name + " is no longer a member of the fleet");
+        } else if (!c->session().serving().are_bindings_permitted()) {
+            host_.post_log(log_level::info, peer.name + " may no longer bind what it has bound: closed its link",
+                           peer.address);
+            c->close();
+        } else if (peer.transport == "tls" && c->usable()) {
+            c->session().send_hello();
         }
     }
 }

@@ -57,6 +57,9 @@ class connections {
     std::shared_ptr<connection> adopt(link_ptr made, connection::origin from);
     /// From now on, requests of other processes are refused, on open and on future connections.
     void refuse_new_requests();
+    /// The roster or the rules have changed: closes the connections of those that are no longer members, and those with
+    /// bindings that are no longer permitted. States the new roster on the others.
+    void on_security_changed();
     /// Returns false if it does not own the connection (any more).
     bool forget(connection& c, std::uint64_t received, std::uint64_t sent);
     /// Cancels a request that waits for its reply. False if there is none with that id.

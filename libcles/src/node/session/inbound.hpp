@@ -60,6 +60,8 @@ class inbound final : private task_sink {
         return in_flight() == 0 && bound_.empty() && (!datagrams_ || datagrams_->empty());
     }
     [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
+    /// Whether all bindings are still permitted. True without security.
+    [[nodiscard]] bool are_bindings_permitted() const { return bound_.are_permitted(); }
 
   private:
     static constexpr std::size_t max_frame = 64; // around a reply: "id=7 " and the closing characters

@@ -3,6 +3,7 @@
 
 #include <cles/json_reader.hpp>
 
+#include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 
 #include <exception>
@@ -21,7 +22,64 @@ bool is_in_via(std::string_view via, std::string_view name) {
     return false;
 }
 
+std::string_view requester_of(const node_state& n, const identity& peer, const protocol::request_line& r) {
+    if (!n.security) {
+        return {};
+    }
+    const std::string_view by = peer.transport == "inproc" ? std::string_view{n.name} : peer.name;
+    const bool states_another = !by.empty() && !r.from.empty() && r.from != by;
+    return states_another && n.security->may_forward(by, r.from) ? r.from : by;
+}
+
+bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
+             const protocol::noun_view& noun) {
+    return !n.security || n.security->allows(requester, provider, how, noun);
+}
+
+bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
+             std::string_view path) {
+    if (!n.security) {
+        return true;
+    }
+    protocol::noun_view noun;
+    std::string why;
+    const auto whole = std::string{provider}.append(":").append(path);
+    return protocol::parse_noun(whole, noun, why) && permits(n, requester, provider, how, noun);
+}
+
+namespace {
+
+// Requests that every member may send: they concern its own link, or security itself.
+bool is_exempt(const protocol::noun_view& noun) noexcept {
+    if (noun.task != "cles" || noun.parameters.empty()) {
+        return false;
+    }
+    const auto what = noun.parameters.front();
+    return what == "cancel" || what == "roster" || what == "hello" || what == "announced" || what == "leaving";
+}
+
+// For `any` and `all`, the rights are checked for each node that is asked.
+bool is_permitted(const node_state& n, const identity& peer, const protocol::request_line& r) {
+    const auto requester = requester_of(n, peer, r);
+    if (requester.empty() || !n.security->is_member(requester)) {
+        return false;
+    }
+    if (is_exempt(r.noun) || r.noun.target == "any" || r.noun.target == "all") {
+        return true;
+    }
+    if (is_local_target(n, r)) {
+        return permits(n, requester, n.name, r.verb, r.noun);
+    }
+    return permits(n, requester, r.noun.target, r.verb, r.noun) &&
+           (requester == n.name || n.security->may_forward(n.name, requester));
+}
+
+} // namespace
+
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& r) {
+    if (n.security && !is_permitted(n, peer, r)) {
+        return false;
+    }
     if (!n.authorise) {
         return true;
     }

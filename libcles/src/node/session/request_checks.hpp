@@ -35,6 +35,17 @@ std::string failure_text(const protocol::failure& why);
 /// Whether `name` is in the comma-separated list `via`.
 bool is_in_via(std::string_view via, std::string_view name);
 
+/// Whose rights apply to a request: those of the requester that a forwarder states, if the peer may forward for it;
+/// else the peer's. Empty if it is no member, and without security.
+std::string_view requester_of(const node_state& n, const identity& peer, const protocol::request_line& request);
+
+/// Whether `requester` may send `provider` a request for this noun. True without security.
+bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
+             const protocol::noun_view& noun);
+/// The same for a path of `provider`, such as that of a topic.
+bool permits(const node_state& n, std::string_view requester, std::string_view provider, verb how,
+             std::string_view path);
+
 /// Whether the access rules allow the request.
 bool allows(const node_state& n, const identity& peer, const protocol::request_line& request);
 

@@ -9,6 +9,8 @@
 #include "node/membership/gossip.hpp"
 #include "node/membership/peer_table.hpp"
 #include "node/membership/reachable_endpoints.hpp"
+#include "node/membership/roster_exchange.hpp"
+#include "port/node_security.hpp"
 
 #include <array>
 #include <chrono>
@@ -112,6 +114,9 @@ void write_description(json_writer& w, const node_state& n) {
     w.key("tasks");
     write_tasks(w, n);
     write_load_member(w, n.load_now());
+    if (n.security) {
+        write_member(w, "roster", std::uint64_t{n.security->roster_version()});
+    }
     w.end_object();
 }
 
@@ -173,6 +178,8 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
         } else {
             replies.fail(r, errc::bad_request, host.name + ": the body is not a table of nodes");
         }
+    } else if (host.security && parameters.size() == 1 && parameters[0] == "roster") {
+        serve_roster(host, replies, r);
     } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
         replies.fail(r, errc::bad_request, host.name + ": cancel needs an id from 1 to 2^63-1");
     } else {

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/session.hpp"
 
+#include "node/membership/roster_exchange.hpp"
 #include "node/session/request_checks.hpp"
 #include "protocol/line.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <utility>
 
 namespace cles::core {
@@ -73,6 +75,8 @@ void session::on_line(std::string_view line, time_point now) {
         on_update(subscriptions_.find(line, request));
     } else if (!is_datagram() && is_leave_notice(request)) {
         on_leaving();
+    } else if (node_->security && is_hello(request)) {
+        on_hello(request, now);
     } else {
         inbound_.on_request(line, request, now);
     }
@@ -122,6 +126,25 @@ void session::on_leaving() {
         failure_text({.code = errc::busy,
                       .message = "the node at " + peer_.address + " is leaving, and has not started this request",
                       .retry_ms = 1000}));
+}
+
+void session::on_hello(const protocol::request_line& r, time_point now) {
+    ++node_->counts.housekeeping;
+    if (wants_stated_roster(*node_, peer_, r, now)) {
+        const auto id = node_->next_id++;
+        outbound_.send({.verb = verb::pull, .noun = "self:cles/roster", .id = id},
+                       now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
+                       make_roster_reply(node_, peer_.name));
+    }
+}
+
+void session::send_hello() {
+    if (!closed_) {
+        const auto body = hello_body(*node_);
+        protocol::append_request(out_.output(),
+                                 {.verb = verb::push, .noun = "self:cles/hello", .wants_reply = false, .body = body});
+        out_.wake();
+    }
 }
 
 void session::send_leave_notice() {

@@ -33,6 +33,8 @@ class session {
     /// Sends the last line of this node, which leaves, and ends the link. Everything that it started for the peer has
     /// been answered. Does nothing over datagrams.
     void send_leave_notice();
+    /// States the version of this node's roster.
+    void send_hello();
     /// Answers a line with `busy`, and does nothing else.
     void reject(std::string_view line);
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
@@ -48,6 +50,7 @@ class session {
     void note_refusal(std::string_view line);
     void lose_requests(std::string_view why);
     void on_leaving();
+    void on_hello(const protocol::request_line& hello, time_point now);
     void on_update(const subscriptions::match& found);
 
     std::shared_ptr<node_state> node_;

@@ -16,7 +16,7 @@ struct fixture : cles::test::routing_fixture {
         cles::protocol::request_line r;
         cles::protocol::malformed_request wrong;
         BOOST_REQUIRE_MESSAGE(cles::protocol::parse_request(line, r, wrong), wrong.why);
-        return routing->choose(r, asked, node.clock.now());
+        return routing->choose(r, {}, asked, node.clock.now());
     }
 };
 
@@ -103,9 +103,9 @@ BOOST_AUTO_TEST_CASE(own_load_is_read_for_each_choice) {
     cles::protocol::request_line r;
     cles::protocol::malformed_request wrong;
     BOOST_REQUIRE(cles::protocol::parse_request("PULL any:speed", r, wrong));
-    BOOST_TEST(routes->choose(r, {}, node.clock.now()).other->name == "car2");
+    BOOST_TEST(routes->choose(r, {}, {}, node.clock.now()).other->name == "car2");
     own.queued = 0;
-    BOOST_TEST(routes->choose(r, {}, node.clock.now()).here);
+    BOOST_TEST(routes->choose(r, {}, {}, node.clock.now()).here);
     routes->stop();
 }
 

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/limits.hpp>
+#include <cles/verb.hpp>
+
+#include "protocol/grammar.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace cles::core {
+
+/// What a secured node asks of its environment about its fleet (docs/security.md): who is a member, what members may
+/// do, and the roster. Nodes without security have none, so that they do not contain the code.
+///
+/// Names are those of members. The functions are called on the node's executor, and call back only what `observe` says.
+class node_security {
+  public:
+    node_security() = default;
+    node_security(const node_security&) = delete;
+    node_security& operator=(const node_security&) = delete;
+    virtual ~node_security() = default;
+
+    [[nodiscard]] virtual bool is_member(std::string_view name) const = 0;
+    /// Whether `requester` may send this request to `provider`. For an update, `how` is BIND.
+    [[nodiscard]] virtual bool allows(std::string_view requester, std::string_view provider, verb how,
+                                      const protocol::noun_view& noun) const = 0;
+    /// Whether `forwarder` may pass on requests of `requester`.
+    [[nodiscard]] virtual bool may_forward(std::string_view forwarder, std::string_view requester) const = 0;
+
+    /// The version of the roster in force.
+    [[nodiscard]] virtual std::uint32_t roster_version() const = 0;
+    /// Its line, without LF.
+    [[nodiscard]] virtual const std::string& roster_line() const = 0;
+    /// Takes a roster from a peer. Returns what is wrong with it; nothing if it is in force now, or is not newer.
+    virtual std::optional<std::string> offer_roster(std::string_view line) = 0;
+    /// Whether to ask a member that states this version for its roster now; notes that it was asked.
+    virtual bool wants_roster(std::string_view from, std::uint32_t version, time_point now) = 0;
+    /// From now on, `changed` is called after the roster or the rules have changed, and never after
+    /// `observe(nullptr)`.
+    virtual void observe(std::function<void()> changed) = 0;
+};
+
+} // namespace cles::core

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "port/node_security.hpp"
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace cles::test {
+
+/// A fleet whose rights the test sets: everything is permitted except what is in `denied`.
+class scripted_security final : public core::node_security {
+  public:
+    [[nodiscard]] bool is_member(std::string_view name) const override { return members.contains(std::string{name}); }
+    [[nodiscard]] bool allows(std::string_view requester, std::string_view provider, verb how,
+                              const protocol::noun_view& noun) const override {
+        return is_member(requester) && !denied.contains(std::string{requester} + " " + std::string{to_string(how)} +
+                                                        " " + std::string{provider} + ":" + std::string{noun.path});
+    }
+    [[nodiscard]] bool may_forward(std::string_view forwarder, std::string_view requester) const override {
+        return is_member(requester) && forwarders.contains(std::string{forwarder});
+    }
+    [[nodiscard]] std::uint32_t roster_version() const override { return version; }
+    [[nodiscard]] const std::string& roster_line() const override { return line; }
+    std::optional<std::string> offer_roster(std::string_view offered) override {
+        if (offered != "{\"good\":1}") {
+            return "a bad roster";
+        }
+        line = offered;
+        change();
+        return {};
+    }
+    bool wants_roster(std::string_view from, std::uint32_t stated, time_point) override {
+        return is_member(from) && stated > version;
+    }
+    void observe(std::function<void()> changed) override { changed_ = std::move(changed); }
+
+    /// The roster or the rules change.
+    void change() {
+        if (changed_) {
+            changed_();
+        }
+    }
+
+    std::set<std::string> members{"car1", "car2", "car3", "sat1"};
+    std::set<std::string> denied;             ///< "car2 PULL car1:speed"
+    std::set<std::string> forwarders{"car1"}; ///< for everybody
+    std::uint32_t version = 7;
+    std::string line = "{\"signature\":\"s\",\"roster\":{}}";
+
+  private:
+    std::function<void()> changed_;
+};
+
+} // namespace cles::test

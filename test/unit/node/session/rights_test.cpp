@@ -1,0 +1,139 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "support/scripted_security.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <memory>
+#include <string>
+
+namespace rights {
+namespace {
+
+struct fixture {
+    fixture() {
+        node.on(cles::verb::pull, "speed", "1");
+        node.on(cles::verb::push, "note", "{}");
+        node.open("pose");
+    }
+
+    std::shared_ptr<cles::test::scripted_security> security = std::make_shared<cles::test::scripted_security>();
+    cles::test::test_node node{{}, {}, {}, {}, security};
+    cles::test::test_link link{node, "car2"};
+};
+
+} // namespace
+} // namespace rights
+
+BOOST_FIXTURE_TEST_SUITE(rights, fixture)
+
+BOOST_AUTO_TEST_CASE(a_member_may_do_what_its_rights_permit) {
+    BOOST_TEST(link.kind("PULL car1:speed id=7") == "id=7 ok");
+    security->denied.insert("car2 PULL car1:speed");
+    BOOST_TEST(link.kind("PULL car1:speed id=8") == "id=8 denied");
+    BOOST_TEST(link.kind("PULL self:speed id=9") == "id=9 denied"); // the rights name the node that serves
+    BOOST_TEST(link.kind("PUSH car1:note id=10") == "id=10 ok");
+}
+
+BOOST_AUTO_TEST_CASE(others_may_do_nothing) {
+    cles::test::test_link nobody{node, ""};
+    BOOST_TEST(nobody.kind("PULL car1:speed id=7") == "id=7 denied");
+    BOOST_TEST(nobody.kind("PULL car1:cles id=8") == "id=8 denied");
+    BOOST_TEST(nobody.kind("PULL car1:cles/roster id=9") == "id=9 denied");
+    cles::test::test_link stranger{node, "car9"};
+    BOOST_TEST(stranger.kind("PULL car1:speed id=7") == "id=7 denied");
+    BOOST_TEST(stranger.kind("PULL car1:cles/roster id=8") == "id=8 denied");
+}
+
+BOOST_AUTO_TEST_CASE(a_member_that_was_removed_may_do_nothing) {
+    security->members.erase("car2");
+    BOOST_TEST(link.kind("PULL car1:speed id=7") == "id=7 denied");
+}
+
+BOOST_AUTO_TEST_CASE(the_roster_is_exempt_and_other_reserved_nouns_are_not) {
+    security->denied = {"car2 PULL car1:cles/roster", "car2 PULL car1:cles", "car2 PULL car1:cles/metrics",
+                        "car2 PUSH car1:cles/cancel/5"};
+    BOOST_TEST(link.kind("PULL car1:cles/roster id=7") == "id=7 ok");
+    BOOST_TEST(link.kind("PUSH car1:cles/cancel/5 id=8") == "id=8 ok");
+    BOOST_TEST(link.kind("PULL car1:cles id=9") == "id=9 denied");
+    BOOST_TEST(link.kind("PULL car1:cles/metrics id=10") == "id=10 denied");
+}
+
+BOOST_AUTO_TEST_CASE(rules_of_the_program_narrow_the_rights) {
+    cles::test::test_node strict{{}, [](const cles::access& a) { return a.task != "speed"; }, {}, {}, security};
+    strict.on(cles::verb::pull, "speed", "1");
+    strict.on(cles::verb::pull, "fuel", "1");
+    cles::test::test_link to{strict, "car2"};
+    BOOST_TEST(to.kind("PULL car1:speed id=7") == "id=7 denied");
+    BOOST_TEST(to.kind("PULL car1:fuel id=8") == "id=8 ok");
+    security->denied.insert("car2 PULL car1:fuel");
+    BOOST_TEST(to.kind("PULL car1:fuel id=9") == "id=9 denied");
+}
+
+BOOST_AUTO_TEST_SUITE(forwarded)
+
+BOOST_AUTO_TEST_CASE(the_rights_of_the_stated_requester_apply) {
+    security->forwarders = {"car2"};
+    security->denied = {"car3 PULL car1:speed", "car2 PUSH car1:note"};
+    BOOST_TEST(link.kind("PULL car1:speed id=7 from=car3") == "id=7 denied");
+    BOOST_TEST(link.kind("PULL car1:speed id=8") == "id=8 ok");
+    BOOST_TEST(link.kind("PUSH car1:note id=9 from=car3") == "id=9 ok");
+    BOOST_TEST(link.kind("PUSH car1:note id=10") == "id=10 denied");
+}
+
+BOOST_AUTO_TEST_CASE(a_statement_of_others_is_ignored) {
+    security->forwarders = {};
+    security->denied = {"car3 PULL car1:speed", "car2 PUSH car1:note"};
+    BOOST_TEST(link.kind("PULL car1:speed id=7 from=car3") == "id=7 ok");
+    BOOST_TEST(link.kind("PUSH car1:note id=8 from=car3") == "id=8 denied");
+}
+
+BOOST_AUTO_TEST_CASE(a_requester_that_is_no_member_gets_nothing_more) {
+    security->forwarders = {"car2"};
+    security->denied = {"car2 PULL car1:speed"};
+    BOOST_TEST(link.kind("PULL car1:speed id=7 from=car9") == "id=7 denied");
+    BOOST_TEST(link.kind("PULL car1:speed id=8 from=a:b") == "id=8 bad_request");
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE(bindings)
+
+BOOST_AUTO_TEST_CASE(they_need_the_right_to_bind) {
+    security->denied = {"car2 BIND car1:pose"};
+    BOOST_TEST(link.kind("BIND car1:pose id=7") == "id=7 denied");
+    BOOST_TEST(link.session().serving().bindings() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(it_is_known_when_one_is_no_longer_permitted) {
+    BOOST_TEST(link.kind("BIND car1:pose id=7") == "id=7 ok");
+    BOOST_TEST(link.session().serving().are_bindings_permitted());
+    security->denied = {"car2 BIND car1:pose"};
+    BOOST_TEST(!link.session().serving().are_bindings_permitted());
+    BOOST_TEST(link.kind("BIND car1:pose lease=0 id=8") == "id=8 denied");
+    security->denied.clear();
+    BOOST_TEST(link.kind("BIND car1:pose lease=0 id=9") == "id=9 ok");
+    security->denied = {"car2 BIND car1:pose"};
+    BOOST_TEST(link.session().serving().are_bindings_permitted());
+}
+
+BOOST_AUTO_TEST_CASE(one_that_was_forwarded_is_the_stated_requesters) {
+    security->forwarders = {"car2"};
+    BOOST_TEST(link.kind("BIND car1:pose id=7 from=car3") == "id=7 ok");
+    security->denied = {"car2 BIND car1:pose"};
+    BOOST_TEST(link.session().serving().are_bindings_permitted());
+    security->denied = {"car3 BIND car1:pose"};
+    BOOST_TEST(!link.session().serving().are_bindings_permitted());
+}
+
+BOOST_AUTO_TEST_CASE(nothing_is_kept_without_security) {
+    cles::test::test_node open;
+    open.open("pose");
+    cles::test::test_link to{open};
+    BOOST_TEST(to.kind("BIND car1:pose id=7 from=car3") == "id=7 ok");
+    BOOST_TEST(to.session().serving().are_bindings_permitted());
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+BOOST_AUTO_TEST_SUITE_END()
