@@ -35,14 +35,14 @@ struct fixture {
             text += line;
         }
         int calls = 0;
-        cles::core::lines_done done;
+        cles::core::datagrams_done done;
         for (std::string_view rest = text; !rest.empty(); ++calls) {
             const auto sent = burst.send(rest);
             BOOST_REQUIRE(sent.bytes > 0U);
-            done.lines += sent.lines;
+            done.count += sent.count;
             rest.remove_prefix(sent.bytes);
         }
-        BOOST_TEST(done.lines == lines.size());
+        BOOST_TEST(done.count == lines.size());
         return calls;
     }
     int send_all(const std::vector<std::string>& lines) {

@@ -81,7 +81,10 @@ struct plain_member final : cles::core::group_listener {
         port->start(*this);
     }
     ~plain_member() { port->close(); }
-    void on_datagram(const cles::core::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
+    bool on_datagram(const cles::core::group_datagram& datagram) override {
+        heard.emplace_back(datagram.text);
+        return true;
+    }
     void on_writable() override {}
     void say(std::string_view line) { port->send(line); }
     [[nodiscard]] std::size_t count(std::string_view head) const {

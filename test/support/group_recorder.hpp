@@ -3,7 +3,6 @@
 
 #include "port/group_port.hpp"
 
-#include <algorithm>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -21,16 +20,18 @@ class group_recorder final : public core::group_port {
     explicit group_recorder(const core::group_source& self = source_at(4000)) : self_(self) {}
 
     void start(core::group_listener&) override {}
-    core::lines_done send(std::string_view lines) override {
-        const core::lines_done all{.lines = static_cast<std::size_t>(std::ranges::count(lines, '\n')),
-                                   .bytes = lines.size()};
-        while (!lines.empty()) {
-            const auto size = lines.find('\n');
-            sent_.emplace_back(lines.substr(0, size));
-            lines.remove_prefix(size + 1);
+    core::datagrams_done send(core::datagram_list all) override {
+        core::datagrams_done taken;
+        for (; !all.empty(); all.drop_first()) {
+            const auto one = all.first();
+            sent_.emplace_back(one.substr(0, one.size() - (one.ends_with('\n') ? 1 : 0)));
+            ++taken.count;
+            taken.bytes += one.size();
         }
-        return all;
+        return taken;
     }
+    void send_to(const core::group_source&, std::string_view) override {}
+    void receive_own() override {}
     [[nodiscard]] std::size_t unsent() const noexcept override { return writable ? 0 : 1; }
     void close() override {}
     [[nodiscard]] const core::group_source& source() const noexcept override { return self_; }

@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -58,6 +59,9 @@ struct group_datagram {
     const group_source& from;
     std::string_view text;
     const protocol::request_line* request; ///< null: not valid in a group
+    bool to_group = true;                  ///< otherwise it was sent to this node's own source
+    std::string_view member{};             ///< the authenticated sender, of a secured fleet
+    std::uint32_t epoch = 0;               ///< which the sender has confirmed
 };
 
 /// Receives what arrives from a multicast group.
@@ -66,8 +70,10 @@ class group_listener {
     group_listener() = default;
     group_listener(const group_listener&) = delete;
     group_listener& operator=(const group_listener&) = delete;
-    /// Also called for a node's own datagrams if other nodes use the same socket.
-    virtual void on_datagram(const group_datagram& datagram) = 0;
+
+    /// Also called for a node's own datagrams if other nodes use the same socket. Returns whether its sender may send
+    /// from that source.
+    virtual bool on_datagram(const group_datagram& datagram) = 0;
     /// What was pending has been sent.
     virtual void on_writable() = 0;
 
@@ -75,9 +81,34 @@ class group_listener {
     ~group_listener() = default;
 };
 
-/// How much of a text has been dealt with: it was sent, or is pending.
-struct lines_done {
-    std::size_t lines = 0;
+/// Datagrams to send, one behind the other: whole lines, each with its LF, or texts of given sizes.
+class datagram_list {
+  public:
+    // NOLINTNEXTLINE(google-explicit-constructor): lines are such a list
+    datagram_list(std::string_view lines) noexcept : bytes_(lines) {}
+    datagram_list(std::string_view bytes, std::span<const std::uint16_t> sizes) noexcept
+        : bytes_(bytes), sizes_(sizes), sized_(true) {}
+
+    [[nodiscard]] bool empty() const noexcept { return bytes_.empty(); }
+    [[nodiscard]] std::string_view bytes() const noexcept { return bytes_; }
+    /// \pre not empty
+    [[nodiscard]] std::string_view first() const noexcept {
+        return bytes_.substr(0, sized_ ? sizes_.front() : bytes_.find('\n') + 1);
+    }
+    void drop_first() noexcept {
+        bytes_.remove_prefix(first().size());
+        sizes_ = sized_ ? sizes_.subspan(1) : sizes_;
+    }
+
+  private:
+    std::string_view bytes_;
+    std::span<const std::uint16_t> sizes_;
+    bool sized_ = false;
+};
+
+/// How many datagrams, and bytes of them, have been dealt with: they were sent, or are pending.
+struct datagrams_done {
+    std::size_t count = 0;
     std::size_t bytes = 0;
 };
 
@@ -92,10 +123,15 @@ class group_port {
 
     /// Starts to deliver what arrives. The listener must live until `close`.
     virtual void start(group_listener& owner) = 0;
-    /// Sends whole lines, each with its LF as one datagram; those for which the socket has no space are pending. A
-    /// datagram that cannot be sent for another reason counts as lost in the network.
+    /// Sends to the group; datagrams for which the socket has no space are pending. One that cannot be sent for another
+    /// reason counts as lost in the network.
     /// \return less than everything if the limit on pending bytes is reached
-    virtual lines_done send(std::string_view lines) = 0;
+    virtual datagrams_done send(datagram_list all) = 0;
+    /// Sends one datagram to a source in the group, which receives it if it has called `receive_own`. If the socket has
+    /// no space, it is lost.
+    virtual void send_to(const group_source& to, std::string_view datagram) = 0;
+    /// From now on, also delivers what is sent to `source`.
+    virtual void receive_own() = 0;
     /// Bytes that are pending.
     [[nodiscard]] virtual std::size_t unsent() const noexcept = 0;
     virtual void close() = 0;

@@ -4,10 +4,12 @@
 #include <cles/limits.hpp>
 #include <cles/verb.hpp>
 
+#include "port/group_port.hpp"
 #include "protocol/grammar.hpp"
 
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -31,6 +33,14 @@ class node_security {
                                       const protocol::noun_view& noun) const = 0;
     /// Whether `forwarder` may pass on requests of `requester`.
     [[nodiscard]] virtual bool may_forward(std::string_view forwarder, std::string_view requester) const = 0;
+
+    /// The signature of an update of this node, for the adverb `sig`.
+    [[nodiscard]] virtual std::string sign_update(std::string_view path, std::uint64_t seq, std::string_view epoch,
+                                                  std::string_view body) const = 0;
+    [[nodiscard]] virtual bool is_signed(std::string_view publisher, std::string_view path, std::uint64_t seq,
+                                         std::string_view epoch, std::string_view body, std::string_view sig) const = 0;
+    /// A port that seals what it sends with that one, and delivers what it can open, with its sender.
+    [[nodiscard]] virtual std::shared_ptr<group_port> seal(std::shared_ptr<group_port> port) = 0;
 
     /// The version of the roster in force.
     [[nodiscard]] virtual std::uint32_t roster_version() const = 0;

@@ -92,6 +92,7 @@ constexpr std::array known_adverbs{
                  [](std::string_view v, request_line& r) { return (r.epoch = parse_epoch(v)).has_value(); }},
     known_adverb{"via", on_all, [](std::string_view v, request_line& r) { return is_list(r.via = v, is_name); }},
     known_adverb{"from", on_all, [](std::string_view v, request_line& r) { return is_name(r.from = v); }},
+    known_adverb{"sig", on_all, [](std::string_view v, request_line& r) { return (r.sig = v).size() <= max_sig; }},
     known_adverb{"since", on(verb::pull),
                  [](std::string_view v, request_line& r) { return (r.since = v).size() <= max_since; }},
     known_adverb{"describe", on(verb::pull),

@@ -27,6 +27,7 @@ inline constexpr std::uint32_t default_lease_ms = 10'000;
 inline constexpr std::uint32_t max_lease_ms = 60'000;
 inline constexpr std::size_t max_since = 64;
 inline constexpr std::size_t max_described = 64;
+inline constexpr std::size_t max_sig = 128; // a signature has 86 characters
 
 constexpr std::uint32_t default_deadline(verb v) noexcept {
     return v == verb::delegate ? default_delegate_deadline_ms : default_deadline_ms;
@@ -58,6 +59,7 @@ struct request_line : carried_adverbs {
     std::optional<std::uint32_t> epoch;
     std::string_view via;
     std::string_view from;                     ///< the requester, if the peer forwards
+    std::string_view sig;                      ///< the signature of the requester, or of an update's publisher
     std::string_view since;                    ///< what the requester knows already
     std::string_view describe;                 ///< epochs of the incarnations to describe in full, separated by commas
     std::string_view body;                     ///< empty: none

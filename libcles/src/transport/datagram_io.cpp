@@ -79,28 +79,30 @@ constexpr std::size_t max_run = 1U << 15U; // out of the 64 KiB of one datagram
 
 using segment_size = std::uint16_t;
 
-// Lines of one length; the last may be shorter.
+// Datagrams of one length; the last may be shorter.
 struct run {
-    std::string_view text;
-    std::size_t lines;
+    std::string_view bytes;
+    std::size_t count;
     segment_size each;
 };
 
-std::string_view first_line(std::string_view lines) noexcept { return lines.substr(0, lines.find('\n') + 1); }
-
-run first_run(std::string_view lines, std::size_t most) noexcept {
-    const auto length = first_line(lines).size();
+// Removes them from `rest`.
+run take_run(core::datagram_list& rest, std::size_t most) noexcept {
+    const auto before = rest.bytes();
+    const auto length = rest.first().size();
+    rest.drop_first();
     std::size_t bytes = length;
     std::size_t count = 1;
-    for (bool alike = true; alike && count < most && bytes < lines.size(); ++count) {
-        const auto next = first_line(lines.substr(bytes)).size();
+    for (bool alike = true; alike && count < most && !rest.empty(); ++count) {
+        const auto next = rest.first().size();
         if (next > length || bytes + next > max_run) {
             break;
         }
+        rest.drop_first();
         bytes += next;
         alike = next == length;
     }
-    return {.text = lines.substr(0, bytes), .lines = count, .each = static_cast<segment_size>(length)};
+    return {.bytes = before.substr(0, bytes), .count = count, .each = static_cast<segment_size>(length)};
 }
 
 struct segment_control {
@@ -125,26 +127,29 @@ send_batch::send_batch(udp::socket& socket) noexcept : socket_(socket) {
     segments_ = ::setsockopt(socket.native_handle(), SOL_UDP, UDP_SEGMENT, &not_by_itself, sizeof not_by_itself) == 0;
 }
 
-core::lines_done send_batch::send(std::string_view lines, const udp::endpoint* to) noexcept {
-    const auto done = segments_ ? send_runs(lines, max_in_run, to) : std::nullopt;
-    return done ? *done : *send_runs(lines, 1, to);
+core::datagrams_done send_batch::send(core::datagram_list all, const udp::endpoint* to) noexcept {
+    const auto done = segments_ ? send_runs(all, max_in_run, to) : std::nullopt;
+    return done ? *done : *send_runs(all, 1, to);
 }
 
-core::lines_done send_batch::send_all(std::string_view lines, const udp::endpoint* to) noexcept {
-    core::lines_done all;
-    while (all.bytes < lines.size()) {
-        const auto done = send(lines.substr(all.bytes), to);
-        if (done.lines == 0) {
+core::datagrams_done send_batch::send_all(core::datagram_list all, const udp::endpoint* to) noexcept {
+    core::datagrams_done total;
+    while (!all.empty()) {
+        const auto done = send(all, to);
+        if (done.count == 0) {
             break;
         }
-        all.lines += done.lines;
-        all.bytes += done.bytes;
+        total.count += done.count;
+        total.bytes += done.bytes;
+        for (auto left = done.count; left != 0; --left) {
+            all.drop_first();
+        }
     }
-    return all;
+    return total;
 }
 
-std::optional<core::lines_done> send_batch::send_runs(std::string_view lines, std::size_t longest,
-                                                      const udp::endpoint* to) noexcept {
+std::optional<core::datagrams_done> send_batch::send_runs(core::datagram_list all, std::size_t longest,
+                                                          const udp::endpoint* to) noexcept {
     // NOLINTBEGIN(cppcoreguidelines-pro-type-member-init): only the entries in use are set
     std::array<std::size_t, max_runs> in_each;
     std::array<iovec, max_runs> texts;
@@ -152,11 +157,10 @@ std::optional<core::lines_done> send_batch::send_runs(std::string_view lines, st
     std::array<segment_control, max_runs> controls;
     // NOLINTEND(cppcoreguidelines-pro-type-member-init)
     unsigned count = 0;
-    for (auto rest = lines; !rest.empty() && count < max_runs; ++count) {
-        const auto now = first_run(rest, longest);
-        rest.remove_prefix(now.text.size());
-        in_each[count] = now.lines;
-        texts[count] = {.iov_base = const_cast<char*>(now.text.data()), .iov_len = now.text.size()};
+    for (; !all.empty() && count < max_runs; ++count) {
+        const auto now = take_run(all, longest);
+        in_each[count] = now.count;
+        texts[count] = {.iov_base = const_cast<char*>(now.bytes.data()), .iov_len = now.bytes.size()};
         messages[count] = {};
         messages[count].msg_hdr.msg_iov = &texts[count];
         messages[count].msg_hdr.msg_iovlen = 1;
@@ -164,7 +168,7 @@ std::optional<core::lines_done> send_batch::send_runs(std::string_view lines, st
             messages[count].msg_hdr.msg_name = const_cast<sockaddr*>(to->data());
             messages[count].msg_hdr.msg_namelen = static_cast<socklen_t>(to->size());
         }
-        if (now.lines > 1) {
+        if (now.count > 1) {
             segment(messages[count].msg_hdr, controls[count], now.each);
         }
     }
@@ -174,16 +178,16 @@ std::optional<core::lines_done> send_batch::send_runs(std::string_view lines, st
         sent = try_it();
     }
     if (sent < 0 && errno == EAGAIN) {
-        return core::lines_done{};
+        return core::datagrams_done{};
     }
     if (sent < 0 && in_each[0] > 1) { // one by one they may pass, as on a path with a small MTU
         segments_ = errno != EIO;     // the interface cannot segment
         return std::nullopt;
     }
-    core::lines_done done;
+    core::datagrams_done done;
     const auto count_done = static_cast<std::size_t>(std::max(sent, 1)); // the first is sent, or lost
     for (std::size_t i = 0; i < count_done; ++i) {
-        done.lines += in_each[i];
+        done.count += in_each[i];
         done.bytes += texts[i].iov_len;
     }
     return done;

@@ -16,9 +16,9 @@
 
 namespace cles::transport {
 
-/// Sends whole lines, each with its LF as one datagram, as many as one system call takes (sendmmsg(2)). Consecutive
-/// lines of one length pass through the system as one, until the network device, or a socket that does not accept them
-/// so, splits them (UDP_SEGMENT, udp(7)): routing is most of the cost of a datagram.
+/// Sends datagrams, as many as one system call takes (sendmmsg(2)). Consecutive ones of one length pass through the
+/// system as one, until the network device, or a socket that does not accept them so, splits them (UDP_SEGMENT,
+/// udp(7)): routing is most of the cost of a datagram.
 ///
 /// If the system or the interface does not support this, each is sent on its own.
 class send_batch {
@@ -28,16 +28,16 @@ class send_batch {
     /// \pre the socket outlives this, and is non-blocking
     explicit send_batch(udp::socket& socket) noexcept;
 
-    /// Sends to the connected peer, or else to `to`. A line that cannot be sent counts as lost in the network, and as
-    /// done. \return what is done; nothing if there is no space \pre there is a line
-    core::lines_done send(std::string_view lines, const udp::endpoint* to = nullptr) noexcept;
+    /// Sends to the connected peer, or else to `to`. A datagram that cannot be sent counts as lost in the network, and
+    /// as done. \return what is done; nothing if there is no space \pre there is one
+    core::datagrams_done send(core::datagram_list all, const udp::endpoint* to = nullptr) noexcept;
     /// The same, as long as there is space.
-    core::lines_done send_all(std::string_view lines, const udp::endpoint* to) noexcept;
+    core::datagrams_done send_all(core::datagram_list all, const udp::endpoint* to) noexcept;
 
   private:
     // Nothing: the first run cannot be sent as one.
-    std::optional<core::lines_done> send_runs(std::string_view lines, std::size_t longest,
-                                              const udp::endpoint* to) noexcept;
+    std::optional<core::datagrams_done> send_runs(core::datagram_list all, std::size_t longest,
+                                                  const udp::endpoint* to) noexcept;
 
     udp::socket& socket_;
     bool segments_;

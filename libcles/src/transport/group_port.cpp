@@ -17,6 +17,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <mutex>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -336,22 +337,34 @@ void group_port::close() {
     own_.close(ignored);
 }
 
-core::lines_done group_port::send(std::string_view lines) {
+core::datagrams_done group_port::send(core::datagram_list all) {
     if (!own_.is_open()) {
-        return {.bytes = lines.size()}; // all of it is lost
+        return {.bytes = all.bytes().size()}; // all of it is lost
     }
-    auto taken = unsent() == 0 ? burst_.send_all(lines, &group_) : core::lines_done{};
-    while (taken.bytes < lines.size()) {
-        const auto line = lines.substr(taken.bytes, lines.find('\n', taken.bytes) + 1 - taken.bytes);
-        if (unsent() + line.size() > max_waiting) {
+    auto taken = unsent() == 0 ? burst_.send_all(all, &group_) : core::datagrams_done{};
+    for (auto sent = taken.count; sent != 0; --sent) {
+        all.drop_first();
+    }
+    while (!all.empty()) {
+        const auto one = all.first();
+        if (unsent() + one.size() > max_waiting) {
             break;
         }
-        waiting_.append(line);
-        ++taken.lines;
-        taken.bytes += line.size();
+        waiting_.append(one);
+        waiting_sizes_.push_back(static_cast<std::uint16_t>(one.size()));
+        ++taken.count;
+        taken.bytes += one.size();
+        all.drop_first();
     }
     wait_until_writable();
     return taken;
+}
+
+void group_port::send_to(const core::group_source& to, std::string_view datagram) {
+    error_code ignored;
+    if (own_.is_open()) {
+        own_.send_to(asio::buffer(datagram), {asio::ip::address_v4{to.address}, to.port}, 0, ignored);
+    }
 }
 
 void group_port::wait_until_writable() {
@@ -371,13 +384,61 @@ void group_port::wait_until_writable() {
 }
 
 void group_port::send_rest() {
-    waiting_at_ += burst_.send_all(std::string_view{waiting_}.substr(waiting_at_), &group_).bytes;
+    const auto done = burst_.send_all({std::string_view{waiting_}.substr(waiting_at_),
+                                       std::span<const std::uint16_t>{waiting_sizes_}.subspan(waiting_sent_)},
+                                      &group_);
+    waiting_at_ += done.bytes;
+    waiting_sent_ += done.count;
     if (unsent() != 0) {
         wait_until_writable();
         return;
     }
     waiting_.clear();
+    waiting_sizes_.clear();
     waiting_at_ = 0;
+    waiting_sent_ = 0;
+}
+
+// --- What is sent to this node alone ---
+
+void group_port::receive_own() {
+    if (!own_arrived_ && own_.is_open()) {
+        own_arrived_.emplace();
+        receive_batch::prepare(own_);
+        drop_nothing(own_);
+        wait_for_own();
+    }
+}
+
+void group_port::wait_for_own() {
+    own_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
+        if (!code) {
+            self->deliver_own();
+        }
+    });
+}
+
+void group_port::deliver_own() {
+    const auto go_on_soon = [this] {
+        asio::post(own_.get_executor(), [self = shared_from_this()] { self->deliver_own(); });
+    };
+    bool left = false;
+    try {
+        left = own_arrived_->hand_over(own_, [this](const receive_batch::datagram& one) {
+            if (owner_ != nullptr) {
+                const auto from = source_of(one.from);
+                owner_->on_datagram({.from = from, .text = one.text, .request = nullptr, .to_group = false});
+            }
+        });
+    } catch (...) { // of a handler, for the thread that runs the context; other datagrams are not affected
+        go_on_soon();
+        throw;
+    }
+    if (left) {
+        go_on_soon();
+    } else if (own_.is_open()) {
+        wait_for_own();
+    }
 }
 
 } // namespace cles::transport

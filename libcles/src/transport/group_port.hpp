@@ -10,9 +10,12 @@
 #include <boost/asio/ip/udp.hpp>
 
 #include <cstddef>
+#include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::transport {
 
@@ -34,7 +37,9 @@ class group_port final : public core::group_port, public std::enable_shared_from
                const multicast_options& where);
 
     void start(core::group_listener& owner) override;
-    core::lines_done send(std::string_view lines) override;
+    core::datagrams_done send(core::datagram_list all) override;
+    void send_to(const core::group_source& to, std::string_view datagram) override;
+    void receive_own() override;
     [[nodiscard]] std::size_t unsent() const noexcept override { return waiting_.size() - waiting_at_; }
     void close() override;
     [[nodiscard]] const core::group_source& source() const noexcept override { return source_; }
@@ -44,15 +49,20 @@ class group_port final : public core::group_port, public std::enable_shared_from
   private:
     void send_rest();
     void wait_until_writable();
+    void wait_for_own();
+    void deliver_own();
 
     udp::endpoint group_;
     core::group_source source_;
     std::shared_ptr<group_receiver> receiver_;
     udp::socket own_;
     send_batch burst_;
-    core::group_listener* owner_ = nullptr; // null: closed
-    std::string waiting_;
-    std::size_t waiting_at_ = 0;
+    core::group_listener* owner_ = nullptr;    // null: closed
+    std::string waiting_;                      // pending datagrams
+    std::vector<std::uint16_t> waiting_sizes_; // of each
+    std::size_t waiting_at_ = 0;               // bytes of them that were sent
+    std::size_t waiting_sent_ = 0;             // how many were sent
+    std::optional<receive_batch> own_arrived_; // once it receives what is sent to `source`
     bool waits_until_writable_ = false;
 };
 

@@ -141,7 +141,7 @@ std::shared_ptr<udp_link> udp_port::link_of(const udp::endpoint& sender) {
 
 // -- sending -------------------------------------------------------------------------------------------------------
 
-core::lines_done udp_port::send(const udp_link& to, std::string_view lines) {
+core::datagrams_done udp_port::send(const udp_link& to, std::string_view lines) {
     return burst_.send_all(lines, connected_ ? nullptr : &to.endpoint());
 }
 

@@ -93,7 +93,7 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     void receive();
     /// Sends whole lines, each with its LF as one datagram, as long as the socket has space. One that cannot be sent
     /// counts as lost in the network.
-    core::lines_done send(const udp_link& to, std::string_view lines);
+    core::datagrams_done send(const udp_link& to, std::string_view lines);
     void wait_until_writable(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }

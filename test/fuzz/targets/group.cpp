@@ -50,17 +50,18 @@ limits small_limits() {
 class output final : public core::group_port {
   public:
     void start(core::group_listener&) override {}
-    core::lines_done send(std::string_view lines) override {
-        core::lines_done all;
-        while (all.bytes < lines.size()) {
-            const auto size = lines.find('\n', all.bytes) + 1 - all.bytes;
-            require(size <= lines.size() - all.bytes, "it consists of whole lines", lines);
-            check(lines.substr(all.bytes, size));
-            all.bytes += size;
-            ++all.lines;
+    core::datagrams_done send(core::datagram_list all) override {
+        core::datagrams_done taken;
+        for (; !all.empty(); all.drop_first()) {
+            require(all.bytes().ends_with('\n'), "it consists of whole lines", all.bytes());
+            check(all.first());
+            taken.bytes += all.first().size();
+            ++taken.count;
         }
-        return all;
+        return taken;
     }
+    void send_to(const core::group_source&, std::string_view) override {}
+    void receive_own() override {}
     [[nodiscard]] std::size_t unsent() const noexcept override { return writable ? 0 : 1; }
     void close() override {}
     [[nodiscard]] const core::group_source& source() const noexcept override { return self_; }

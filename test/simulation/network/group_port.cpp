@@ -49,21 +49,20 @@ void group_port::close() {
 
 // -- sending ---------------------------------------------------------------------------------------------------------
 
-core::lines_done group_port::send(std::string_view lines) {
+core::datagrams_done group_port::send(core::datagram_list all) {
     if (owner_ == nullptr) {
-        return {.bytes = lines.size()};
+        return {.bytes = all.bytes().size()};
     }
-    core::lines_done taken;
-    while (taken.bytes < lines.size()) {
-        const auto line = lines.substr(taken.bytes, lines.find('\n', taken.bytes) + 1 - taken.bytes);
-        if (!put(line)) {
-            break;
-        }
-        ++taken.lines;
-        taken.bytes += line.size();
+    core::datagrams_done taken;
+    for (; !all.empty() && put(all.first()); all.drop_first()) {
+        ++taken.count;
+        taken.bytes += all.first().size();
     }
     return taken;
 }
+
+// No simulated node is secured, and others send nothing to a source in the group.
+void group_port::send_to(const core::group_source&, std::string_view) {}
 
 // What a planted fault loses.
 bool group_port::is_swallowed(std::string_view line) {

@@ -23,7 +23,9 @@ class group_port final : public core::group_port, public std::enable_shared_from
     group_port(network& net, node_run& process);
 
     void start(core::group_listener& owner) override;
-    core::lines_done send(std::string_view lines) override;
+    core::datagrams_done send(core::datagram_list all) override;
+    void send_to(const core::group_source& to, std::string_view datagram) override;
+    void receive_own() override {}
     [[nodiscard]] std::size_t unsent() const noexcept override { return unsent_; }
     void close() override;
     [[nodiscard]] const core::group_source& source() const noexcept override { return source_; }

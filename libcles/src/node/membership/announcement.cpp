@@ -2,6 +2,7 @@
 #include "node/membership/announcement.hpp"
 
 #include "json/json_members.hpp"
+#include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
 
@@ -111,6 +112,7 @@ bool read_announcement_member(json_reader& r, std::string_view key, announcement
            : key == "leaving"     ? r.read(out.leaving)
            : key == "pool"        ? r.read(out.pool)
            : key == "sources"     ? read_sources(r, out.sources)
+           : key == "roster"      ? read_count(r, out.roster)
                                   : r.skip();
 }
 
@@ -149,6 +151,9 @@ void append_body(std::string& out, const announcement& said, std::size_t endpoin
     write_member(w, "tasks", said.tasks);
     if (said.leaving) {
         write_member(w, "leaving", true);
+    }
+    if (said.roster != 0) {
+        write_member(w, "roster", said.roster);
     }
     w.end_object();
 }
@@ -197,12 +202,17 @@ bool read_announcement(const protocol::request_line& update, announcement& out, 
     return true;
 }
 
-void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch) {
+void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch,
+                         const node_security* security) {
     const auto start = out.size();
     for (auto endpoints = std::min(said.endpoints.size(), max_endpoints);; --endpoints) {
         protocol::append_update_head(out, said.node, "cles", seq, epoch);
-        append_body(out, said, endpoints);
-        out.push_back('\n');
+        std::string body;
+        append_body(body, said, endpoints);
+        if (security != nullptr) {
+            out.append("sig=").append(security->sign_update("cles", seq, epoch, body)).append(" ");
+        }
+        out.append(body).push_back('\n');
         if (out.size() - start <= protocol::datagram_bytes || endpoints == 0) {
             return;
         }

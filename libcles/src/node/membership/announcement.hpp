@@ -22,6 +22,8 @@
 
 namespace cles::core {
 
+class node_security;
+
 inline constexpr std::chrono::milliseconds min_interval{250};
 inline constexpr std::chrono::milliseconds max_interval{60'000};
 inline constexpr std::chrono::milliseconds usual_interval{1'000};
@@ -44,6 +46,7 @@ struct announcement {
     std::string pool{}; ///< empty: the pool without a name
     /// The node's sources in the group, one per interface; empty if it uses one interface.
     std::vector<group_source> sources{};
+    std::uint32_t roster = 0; ///< the version of its roster; 0: the node is not secured
 };
 
 /// Reads an update of the noun `<node>:cles`. On failure returns false, and `why` contains the reason.
@@ -52,8 +55,10 @@ bool read_announcement(const protocol::request_line& update, announcement& out, 
 /// Reads the value of one key; an unknown key is skipped.
 bool read_announcement_member(json_reader& r, std::string_view key, announcement& out);
 
-/// Appends the line with its LF, at most 1200 bytes: endpoints that do not fit are omitted, the last first.
-void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch);
+/// Appends the line with its LF, at most 1200 bytes: endpoints that do not fit are omitted, the last first. With
+/// `security`, it is signed.
+void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch,
+                         const node_security* security = nullptr);
 
 // Members that several kinds of entries have.
 

@@ -7,8 +7,10 @@
 #include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/membership/name_conflict.hpp"
+#include "node/membership/roster_exchange.hpp"
 #include "node/routing/peer_channels.hpp"
 #include "node/session/reserved_tasks.hpp"
+#include "port/node_security.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -194,7 +196,8 @@ void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
                       .interval = interval,
                       .tasks = digest_of_tasks(tasks),
                       .leaving = leaving,
-                      .pool = node.peers.pool()};
+                      .pool = node.peers.pool(),
+                      .roster = node.security ? node.security->roster_version() : 0};
     ++seq_;
     if (gossip_ && !leaving) {
         said.endpoints = endpoints_for_gossip();
@@ -215,9 +218,9 @@ void discovery::announce_to_group(announcement& said) {
     }
     bool sent = false;
     for (auto* port : group_->ports()) {
-        said.endpoints = endpoints_for_group(port->source().is_loopback());
+        said.endpoints = node.security ? endpoints_of_interfaces() : endpoints_for_group(port->source().is_loopback());
         std::string line;
-        append_announcement(line, said, seq_, node.epoch);
+        append_announcement(line, said, seq_, node.epoch, node.security.get());
         sent = group_->send(*port, line) || sent;
     }
     node.counts.announcements_sent += sent ? 1 : 0;
@@ -256,6 +259,32 @@ std::vector<std::string> discovery::endpoints_for_group(bool loopback) const {
     return result;
 }
 
+// The same for all receivers, since they are signed: with the addresses of the interfaces instead of an unspecified
+// one, and without Unix sockets, which mean nothing to other hosts.
+std::vector<std::string> discovery::endpoints_of_interfaces() const {
+    std::vector<std::string> result;
+    const auto add = [&](const url& where) {
+        if (auto text = to_string(where); std::ranges::find(result, text) == result.end()) {
+            result.push_back(std::move(text));
+        }
+    };
+    for (const auto& endpoint : host_.node().endpoints) {
+        auto where = parse_url(endpoint);
+        if (where.scheme == "inproc" || where.scheme == "unix") {
+            continue;
+        }
+        if (where.host != "0.0.0.0" && where.host != "::") {
+            add(where);
+            continue;
+        }
+        for (const auto* port : group_ != nullptr ? group_->ports() : std::vector<group_port*>{}) {
+            where.host = host_text(port->source());
+            add(where);
+        }
+    }
+    return result;
+}
+
 std::size_t discovery::others() const { return host_.node().peers.size(); }
 
 void discovery::on_solicitation(bool by_name, time_point now) {
@@ -281,7 +310,10 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
         std::erase_if(said.sources, [](const group_source& each) { return each.is_loopback(); });
     }
     switch (host_.node().peers.apply_announcement(said, *update.epoch, *update.seq, from, now)) {
-    case membership::verdict::taken: ++counts.announcements_received; break;
+    case membership::verdict::taken:
+        ++counts.announcements_received;
+        ask_for_roster(said, now);
+        break;
     case membership::verdict::duplicate: ++counts.group_repeated; break;
     case membership::verdict::old: ++counts.announcements_dropped; break;
     case membership::verdict::refused: ++counts.peers_refused; break;
@@ -291,6 +323,17 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
         break;
     case membership::verdict::own:
     case membership::verdict::unknown: break;
+    }
+}
+
+// A node with a newer roster has announced itself.
+void discovery::ask_for_roster(const announcement& said, time_point now) {
+    const auto& host = host_.shared_node();
+    if (host->security && host->security->wants_roster(said.node, said.roster, now)) {
+        const auto noun = said.node + ":cles/roster";
+        host_.peer_channels().send(said.node, {}, {.verb = verb::pull, .noun = noun},
+                                   now + std::chrono::milliseconds{protocol::default_deadline_ms},
+                                   make_roster_reply(host, said.node), {});
     }
 }
 

@@ -177,6 +177,8 @@ class discovery final : private announcement_listener, private membership::watch
     void follow_incarnation(const std::string& name);
     void announce_to_group(announcement& said);
     [[nodiscard]] std::vector<std::string> endpoints_for_group(bool loopback) const;
+    [[nodiscard]] std::vector<std::string> endpoints_of_interfaces() const;
+    void ask_for_roster(const announcement& said, time_point now);
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
     local_node& host_;

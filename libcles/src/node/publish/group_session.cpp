@@ -11,12 +11,12 @@ namespace cles::core {
 
 namespace {
 
-identity identity_of(const group_source& from) {
+identity identity_of(const group_datagram& datagram) {
     return {.transport = "multicast",
-            .address = "udp://" + to_text(from),
-            .name = {},
+            .address = "udp://" + to_text(datagram.from),
+            .name = std::string{datagram.member},
             .uid = {},
-            .local = from.is_loopback()};
+            .local = datagram.from.is_loopback()};
 }
 
 std::pair<group_source, std::string> key_of(const group_source& from, const protocol::request_line& bind) {
@@ -52,27 +52,30 @@ void group_session::on_writable() {
     bindings_.drain(node_->time.now());
 }
 
-void group_session::on_datagram(const group_datagram& datagram) {
+bool group_session::on_datagram(const group_datagram& datagram) {
     const auto keep = group_.keep_owner();
+    auto found = group_verdict::taken;
     if (!group_.is_own(datagram.from)) {
         ++node_->counts.group_received;
-        if (datagram.request == nullptr || !serve(datagram.from, *datagram.request, node_->time.now())) {
-            ++node_->counts.group_dropped;
-        }
+        found = datagram.request == nullptr ? group_verdict::malformed : serve(datagram, node_->time.now());
+        node_->counts.group_dropped += found == group_verdict::malformed ? 1 : 0;
     }
     node_->completions.rethrow();
+    return found != group_verdict::refused;
 }
 
-bool group_session::serve(const group_source& from, const protocol::request_line& request, time_point now) {
+group_verdict group_session::serve(const group_datagram& datagram, time_point now) {
+    const auto& request = *datagram.request;
     const auto target = request.noun.target;
     if (request.is_update()) {
-        return !protocol::is_reserved_target(target) && group_.take(from, request, now);
+        return protocol::is_reserved_target(target) ? group_verdict::malformed : group_.take(datagram, now);
     }
-    return request.verb == verb::bind && (target == "all" || !protocol::is_reserved_target(target)) &&
-           on_bind(from, request, now);
+    const bool good = request.verb == verb::bind && (target == "all" || !protocol::is_reserved_target(target)) &&
+                      on_bind(datagram, request, now);
+    return good ? group_verdict::taken : group_verdict::malformed;
 }
 
-bool group_session::on_bind(const group_source& from, const protocol::request_line& bind, time_point now) {
+bool group_session::on_bind(const group_datagram& datagram, const protocol::request_line& bind, time_point now) {
     const auto& noun = bind.noun;
     const bool solicits = noun.task == "cles";
     if (solicits && !noun.parameters.empty()) {
@@ -83,9 +86,9 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
         return true;
     }
     if (!solicits) {
-        return !group_.is_ignored(from, now) && bind_noun(from, bind, now);
+        return !group_.is_ignored(datagram.from, now) && bind_noun(datagram, bind, now);
     }
-    if (!allows(*node_, identity_of(from), bind)) {
+    if (!allows(*node_, identity_of(datagram), bind)) {
         return false;
     }
     group_.solicited(by_name, now);
@@ -93,8 +96,9 @@ bool group_session::on_bind(const group_source& from, const protocol::request_li
 }
 
 // Subject to the access rules, and to the handler for BIND if there is one.
-bool group_session::bind_noun(const group_source& from, const protocol::request_line& bind, time_point now) {
-    const auto peer = identity_of(from);
+bool group_session::bind_noun(const group_datagram& datagram, const protocol::request_line& bind, time_point now) {
+    const auto& from = datagram.from;
+    const auto peer = identity_of(datagram);
     if (!allows(*node_, peer, bind)) {
         return false;
     }

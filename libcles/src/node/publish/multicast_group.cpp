@@ -4,6 +4,8 @@
 #include <cles/json_reader.hpp>
 
 #include "node/membership/membership.hpp"
+#include "node/session/request_checks.hpp"
+#include "port/node_security.hpp"
 #include "protocol/request_line.hpp"
 
 #include <boost/system/errc.hpp>
@@ -53,12 +55,15 @@ void multicast_group::join(environment& by, const multicast_options& where, bool
 
 void multicast_group::join(environment& by, const network_interface& interface, const multicast_options& where,
                            bool insecure) {
-    if (!interface.loopback && !insecure) {
+    if (!interface.loopback && !insecure && !node_->security) {
         throw error(errc::insecure_listen, "multicast on '" + interface.name +
                                                "' can be reached from other hosts, which are not authenticated; "
                                                "set 'insecure' to allow it");
     }
     auto port = by.join(interface, where);
+    if (node_->security) {
+        port = node_->security->seal(std::move(port));
+    }
     const auto source = port->source();
     sessions_.emplace_back(node_, *this, std::move(port), by.random());
     interfaces_ += (interfaces_.empty() ? "" : ", ") + interface.name;
@@ -144,7 +149,7 @@ bool send_to(group_port& by, counters& counts, std::string_view lines) {
         return true;
     }
     const auto taken = by.send(lines);
-    counts.group_sent += taken.lines;
+    counts.group_sent += taken.count;
     const auto left = lines.substr(taken.bytes);
     counts.group_unsent += static_cast<std::uint64_t>(std::ranges::count(left, '\n'));
     return left.empty();
@@ -183,16 +188,38 @@ void multicast_group::solicited(bool by_name, time_point now) {
     }
 }
 
-bool multicast_group::take(const group_source& from, const protocol::request_line& update, time_point now) {
+// In a secured fleet, a member publishes under its own name, with the epoch that it has confirmed. Announcements are
+// signed, since others pass them on.
+bool multicast_group::is_authentic(const group_datagram& datagram) const {
+    const auto& security = node_->security;
+    if (!security) {
+        return true;
+    }
+    const auto& update = *datagram.request;
+    if (datagram.member != update.noun.target || datagram.epoch != update.epoch) {
+        return false;
+    }
+    return update.noun.task != "cles" ||
+           security->is_signed(datagram.member, update.noun.path, *update.seq, protocol::epoch_text(*update.epoch),
+                               update.body, update.sig);
+}
+
+group_verdict multicast_group::take(const group_datagram& datagram, time_point now) {
     using verdict = publisher_sources::verdict;
+    const auto& from = datagram.from;
+    const auto& update = *datagram.request;
     const auto& noun = update.noun;
+    if (!is_authentic(datagram)) {
+        return group_verdict::malformed;
+    }
     if (noun.task == "cles") {
         return take_announcement(from, update, now);
     }
     auto& counts = node_->counts;
-    if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || sources_.is_foreign(from, now)) {
+    if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || sources_.is_foreign(from, now) ||
+        !permits(*node_, node_->name, noun.target, verb::bind, noun)) {
         ++counts.updates_dropped;
-        return true;
+        return group_verdict::taken;
     }
     const auto found = sources_.look(noun.target, from, now);
     if (found == verdict::another) {
@@ -205,18 +232,18 @@ bool multicast_group::take(const group_source& from, const protocol::request_lin
     } else {
         ++counts.updates_dropped;
     }
-    return true;
+    return found == verdict::refused ? group_verdict::refused : group_verdict::taken;
 }
 
-bool multicast_group::take_announcement(const group_source& from, const protocol::request_line& update,
-                                        time_point now) {
+group_verdict multicast_group::take_announcement(const group_source& from, const protocol::request_line& update,
+                                                 time_point now) {
     if (!update.noun.parameters.empty() || !is_valid_json(update.body, node_->bounds.depth)) {
-        return false;
+        return group_verdict::malformed;
     }
     if (listener_ != nullptr) {
         listener_->on_announcement(from, update, now);
     }
-    return true;
+    return group_verdict::taken;
 }
 
 publisher_sources::verdict publisher_sources::look(std::string_view node, const group_source& from, time_point now) {
