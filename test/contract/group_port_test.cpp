@@ -41,7 +41,7 @@ struct member final : cles::core::group_listener {
     }
     ~member() { port->close(); }
 
-    bool on_datagram(const cles::core::group_datagram& datagram) override {
+    void on_datagram(const cles::core::group_datagram& datagram) override {
         heard.emplace_back(datagram.text);
         sources.push_back(datagram.from);
         said.push_back(datagram.request != nullptr);
@@ -55,7 +55,6 @@ struct member final : cles::core::group_listener {
         if (close_at_next) {
             port->close();
         }
-        return true;
     }
     void on_writable() override {}
 

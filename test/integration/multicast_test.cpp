@@ -81,10 +81,7 @@ struct plain_member final : cles::core::group_listener {
         port->start(*this);
     }
     ~plain_member() { port->close(); }
-    bool on_datagram(const cles::core::group_datagram& datagram) override {
-        heard.emplace_back(datagram.text);
-        return true;
-    }
+    void on_datagram(const cles::core::group_datagram& datagram) override { heard.emplace_back(datagram.text); }
     void on_writable() override {}
     void say(std::string_view line) { port->send(line); }
     [[nodiscard]] std::size_t count(std::string_view head) const {

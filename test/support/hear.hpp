@@ -9,10 +9,10 @@
 namespace cles::test {
 
 /// The session receives a datagram, as from the network.
-inline bool hear(core::group_session& session, const core::group_source& from, std::string_view datagram) {
+inline void hear(core::group_session& session, const core::group_source& from, std::string_view datagram) {
     protocol::request_line said;
     const bool valid = protocol::parse_group_message(datagram, said);
-    return session.on_datagram({.from = from, .text = datagram, .request = valid ? &said : nullptr});
+    session.on_datagram({.from = from, .text = datagram, .request = valid ? &said : nullptr});
 }
 
 } // namespace cles::test

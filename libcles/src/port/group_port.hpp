@@ -54,6 +54,19 @@ std::string to_text(const group_source& s);
 /// Parses that; nothing if it is anything else.
 std::optional<group_source> parse_group_source(std::string_view text) noexcept;
 
+/// Whether a datagram that was opened counts: each does once. Asked when its source has been checked.
+class datagram_admission {
+  public:
+    datagram_admission() = default;
+    datagram_admission(const datagram_admission&) = delete;
+    datagram_admission& operator=(const datagram_admission&) = delete;
+    /// \param is_signed it has a valid signature, so its `seq` shows whether it is a repeat
+    [[nodiscard]] virtual bool accept(bool is_signed) = 0;
+
+  protected:
+    ~datagram_admission() = default;
+};
+
 /// A datagram from a multicast group, parsed once for all nodes that receive it; valid during the call.
 struct group_datagram {
     const group_source& from;
@@ -62,6 +75,12 @@ struct group_datagram {
     bool to_group = true;                  ///< otherwise it was sent to this node's own source
     std::string_view member{};             ///< the authenticated sender, of a secured fleet
     std::uint32_t epoch = 0;               ///< which the sender has confirmed
+    datagram_admission* admission = nullptr;
+
+    /// Whether it counts; see `datagram_admission`.
+    [[nodiscard]] bool accept(bool is_signed = false) const {
+        return admission == nullptr || admission->accept(is_signed);
+    }
 };
 
 /// Receives what arrives from a multicast group.
@@ -71,9 +90,8 @@ class group_listener {
     group_listener(const group_listener&) = delete;
     group_listener& operator=(const group_listener&) = delete;
 
-    /// Also called for a node's own datagrams if other nodes use the same socket. Returns whether its sender may send
-    /// from that source.
-    virtual bool on_datagram(const group_datagram& datagram) = 0;
+    /// Also called for a node's own datagrams if other nodes use the same socket.
+    virtual void on_datagram(const group_datagram& datagram) = 0;
     /// What was pending has been sent.
     virtual void on_writable() = 0;
 

@@ -52,27 +52,25 @@ void group_session::on_writable() {
     bindings_.drain(node_->time.now());
 }
 
-bool group_session::on_datagram(const group_datagram& datagram) {
+void group_session::on_datagram(const group_datagram& datagram) {
     const auto keep = group_.keep_owner();
-    auto found = group_verdict::taken;
     if (!group_.is_own(datagram.from)) {
         ++node_->counts.group_received;
-        found = datagram.request == nullptr ? group_verdict::malformed : serve(datagram, node_->time.now());
-        node_->counts.group_dropped += found == group_verdict::malformed ? 1 : 0;
+        if (datagram.request == nullptr || !serve(datagram, node_->time.now())) {
+            ++node_->counts.group_dropped;
+        }
     }
     node_->completions.rethrow();
-    return found != group_verdict::refused;
 }
 
-group_verdict group_session::serve(const group_datagram& datagram, time_point now) {
+bool group_session::serve(const group_datagram& datagram, time_point now) {
     const auto& request = *datagram.request;
     const auto target = request.noun.target;
     if (request.is_update()) {
-        return protocol::is_reserved_target(target) ? group_verdict::malformed : group_.take(datagram, now);
+        return !protocol::is_reserved_target(target) && group_.take(datagram, now);
     }
-    const bool good = request.verb == verb::bind && (target == "all" || !protocol::is_reserved_target(target)) &&
-                      on_bind(datagram, request, now);
-    return good ? group_verdict::taken : group_verdict::malformed;
+    return request.verb == verb::bind && (target == "all" || !protocol::is_reserved_target(target)) &&
+           datagram.accept() && on_bind(datagram, request, now);
 }
 
 bool group_session::on_bind(const group_datagram& datagram, const protocol::request_line& bind, time_point now) {

@@ -21,13 +21,6 @@ namespace cles::core {
 
 class multicast_group;
 
-/// What becomes of a datagram from the group.
-enum class group_verdict : std::uint8_t {
-    taken,
-    malformed, ///< or of another kind than the group may send
-    refused,   ///< its publisher does not send from that source
-};
-
 /// Processes what a node receives from its multicast group on one interface (docs/protocol.md, "Multicast"): BIND of
 /// `all:` or of a node's name, which it serves on that interface, and updates, which all interfaces process together.
 /// Everything else is dropped and counted; nothing is answered.
@@ -51,7 +44,7 @@ class group_session final : public group_listener {
     /// Ends all bindings, including those that wait for a decision.
     void unbind_all();
 
-    bool on_datagram(const group_datagram& datagram) override;
+    void on_datagram(const group_datagram& datagram) override;
     void on_writable() override;
 
   private:
@@ -62,7 +55,7 @@ class group_session final : public group_listener {
         std::shared_ptr<local_request> handler{};
     };
 
-    group_verdict serve(const group_datagram& datagram, time_point now);
+    bool serve(const group_datagram& datagram, time_point now);
     bool on_bind(const group_datagram& datagram, const protocol::request_line& bind, time_point now);
     bool bind_noun(const group_datagram& datagram, const protocol::request_line& bind, time_point now);
     bool ask(const group_source& from, const identity& peer, const protocol::request_line& bind, time_point now);

@@ -204,46 +204,46 @@ bool multicast_group::is_authentic(const group_datagram& datagram) const {
                                update.body, update.sig);
 }
 
-group_verdict multicast_group::take(const group_datagram& datagram, time_point now) {
+bool multicast_group::take(const group_datagram& datagram, time_point now) {
     using verdict = publisher_sources::verdict;
     const auto& from = datagram.from;
     const auto& update = *datagram.request;
     const auto& noun = update.noun;
     if (!is_authentic(datagram)) {
-        return group_verdict::malformed;
+        return false;
     }
     if (noun.task == "cles") {
-        return take_announcement(from, update, now);
+        return datagram.accept(true) && take_announcement(from, update, now);
     }
     auto& counts = node_->counts;
     if (protocol::begins_with_error(update.body) || !feeds_.wants(update) || sources_.is_foreign(from, now) ||
         !permits(*node_, node_->name, noun.target, verb::bind, noun)) {
         ++counts.updates_dropped;
-        return group_verdict::taken;
+        return true;
     }
     const auto found = sources_.look(noun.target, from, now);
     if (found == verdict::another) {
         feeds_.forget(noun.target);
     }
-    if (found != verdict::refused && feeds_.take(update)) {
+    if (found != verdict::refused && datagram.accept() && feeds_.take(update)) {
         ++counts.updates_received;
     } else if (found == verdict::one_of_several) {
         ++counts.group_repeated;
     } else {
         ++counts.updates_dropped;
     }
-    return found == verdict::refused ? group_verdict::refused : group_verdict::taken;
+    return true;
 }
 
-group_verdict multicast_group::take_announcement(const group_source& from, const protocol::request_line& update,
-                                                 time_point now) {
+bool multicast_group::take_announcement(const group_source& from, const protocol::request_line& update,
+                                        time_point now) {
     if (!update.noun.parameters.empty() || !is_valid_json(update.body, node_->bounds.depth)) {
-        return group_verdict::malformed;
+        return false;
     }
     if (listener_ != nullptr) {
         listener_->on_announcement(from, update, now);
     }
-    return group_verdict::taken;
+    return true;
 }
 
 publisher_sources::verdict publisher_sources::look(std::string_view node, const group_source& from, time_point now) {

@@ -128,14 +128,14 @@ class multicast_group {
     [[nodiscard]] std::shared_ptr<void> keep_owner() const noexcept { return owner_.lock(); }
     /// A node looks for others.
     void solicited(bool by_name, time_point now);
-    /// An update under a node's name.
-    group_verdict take(const group_datagram& datagram, time_point now);
+    /// An update under a node's name. False if it is not authentic, or of the reserved task and malformed.
+    bool take(const group_datagram& datagram, time_point now);
 
   private:
     void join(environment& by, const network_interface& interface, const multicast_options& where, bool insecure);
     void join_all(environment& by, const multicast_options& where, bool insecure);
     void join_automatic(environment& by, const multicast_options& where, bool insecure);
-    group_verdict take_announcement(const group_source& from, const protocol::request_line& update, time_point now);
+    bool take_announcement(const group_source& from, const protocol::request_line& update, time_point now);
     [[nodiscard]] bool is_authentic(const group_datagram& datagram) const;
 
     std::shared_ptr<node_state> node_;

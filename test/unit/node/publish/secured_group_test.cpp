@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/announcement.hpp"
+#include "node/publish/multicast_group.hpp"
+#include "support/group_recorder.hpp"
+#include "support/scripted_security.hpp"
+#include "support/session_fixture.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace secured_group {
+namespace {
+
+using cles::test::scripted_security;
+using cles::test::source_at;
+
+/// Counts what the node accepts.
+struct admission final : cles::core::datagram_admission {
+    bool accept(bool is_signed) override {
+        ++(is_signed ? of_signed : of_others);
+        return answer;
+    }
+
+    bool answer = true;
+    int of_signed = 0;
+    int of_others = 0;
+};
+
+struct announcements final : cles::core::announcement_listener {
+    void on_solicitation(bool, cles::time_point) override { ++solicitations; }
+    void on_announcement(const cles::core::group_source&, const cles::protocol::request_line&,
+                         cles::time_point) override {
+        ++received;
+    }
+
+    int solicitations = 0;
+    int received = 0;
+};
+
+struct fixture {
+    fixture() {
+        group.set_listener(&heard);
+        node.open("pose");
+    }
+    ~fixture() { group.stop(); }
+    fixture(const fixture&) = delete;
+    fixture& operator=(const fixture&) = delete;
+
+    /// A datagram of that member was opened.
+    void hear(std::string_view member, std::string_view line, std::uint32_t epoch = 0x5f3a09c2) {
+        cles::protocol::request_line said;
+        const bool valid = cles::protocol::parse_group_message(line, said);
+        const auto from = source_at(4001);
+        session.on_datagram({.from = from,
+                             .text = line,
+                             .request = valid ? &said : nullptr,
+                             .member = member,
+                             .epoch = epoch,
+                             .admission = &asked});
+    }
+    static std::string announcement(const std::string& name, const std::string& signer,
+                                    const std::string& epoch = "5f3a09c2") {
+        const auto body = R"({"node":")" + name + R"(","endpoints":[],"interval_ms":1000,"tasks":"d"})";
+        return "UPDATE " + name + ":cles seq=5 epoch=" + epoch +
+               " sig=" + scripted_security::signature(signer, "cles", 5, epoch, body) + " " + body;
+    }
+
+    std::shared_ptr<scripted_security> security = std::make_shared<scripted_security>();
+    cles::test::test_node node{{}, {}, {}, {}, security};
+    cles::test::group_recorder port;
+    cles::core::multicast_group group{node.host, 1};
+    cles::core::group_session session{node.host, group, port.share(), 1};
+    announcements heard;
+    admission asked;
+};
+
+} // namespace
+} // namespace secured_group
+
+BOOST_FIXTURE_TEST_SUITE(secured_group, fixture)
+
+BOOST_AUTO_TEST_CASE(an_announcement_counts_if_its_node_signed_it) {
+    hear("car2", announcement("car2", "car2"));
+    BOOST_TEST(heard.received == 1);
+    BOOST_TEST(asked.of_signed == 1);
+    hear("car2", announcement("car2", "car3"));
+    BOOST_TEST(heard.received == 1);
+    BOOST_TEST(node.counts().group_dropped == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(an_announcement_of_another_member_does_not_count) {
+    hear("car3", announcement("car2", "car2"));
+    BOOST_TEST(heard.received == 0);
+}
+
+BOOST_AUTO_TEST_CASE(an_announcement_with_another_epoch_does_not_count) {
+    hear("car2", announcement("car2", "car2", "5f3a09c1"));
+    BOOST_TEST(heard.received == 0);
+}
+
+BOOST_AUTO_TEST_CASE(a_repeat_does_not_count) {
+    asked.answer = false;
+    hear("car2", announcement("car2", "car2"));
+    hear("car2", "BIND all:cles");
+    BOOST_TEST(heard.received == 0);
+    BOOST_TEST(heard.solicitations == 0);
+}
+
+BOOST_AUTO_TEST_CASE(members_look_for_others) {
+    hear("car2", "BIND all:cles");
+    BOOST_TEST(heard.solicitations == 1);
+    BOOST_TEST(asked.of_others == 1);
+    hear("car9", "BIND all:cles");
+    hear("", "BIND all:cles");
+    BOOST_TEST(heard.solicitations == 1);
+}
+
+BOOST_AUTO_TEST_CASE(a_binding_needs_the_right) {
+    security->denied = {"car2 BIND car1:pose"};
+    hear("car2", "BIND car1:pose");
+    node.publish_now("pose", "{\"x\":1}");
+    BOOST_TEST(port.take().empty());
+    hear("car3", "BIND car1:pose");
+    node.publish_now("pose", "{\"x\":2}");
+    BOOST_TEST(port.take().size() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(an_announcement_is_signed_with_the_version_of_the_roster) {
+    std::string line;
+    cles::core::append_announcement(line, {.node = "car1", .endpoints = {"tls://10.0.0.2:25370"}, .roster = 7}, 17,
+                                    "5f3a09c1", security.get());
+    BOOST_TEST(line.ends_with("\n"));
+    cles::protocol::request_line read;
+    BOOST_REQUIRE(cles::protocol::parse_group_message(line, read));
+    BOOST_TEST(security->is_signed("car1", "cles", 17, "5f3a09c1", read.body, read.sig));
+    cles::core::announcement said;
+    std::string why;
+    BOOST_REQUIRE_MESSAGE(cles::core::read_announcement(read, said, why), why);
+    BOOST_TEST(said.roster == 7U);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
