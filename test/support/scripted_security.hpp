@@ -58,12 +58,16 @@ class scripted_security final : public core::node_security {
     bool wants_roster(std::string_view from, std::uint32_t stated, time_point) override {
         return is_member(from) && stated > version;
     }
-    void observe(std::function<void()> changed) override { changed_ = std::move(changed); }
+    void begin(std::string_view, std::uint32_t, const core::clock&, core::security_observer& by) override {
+        observer_ = &by;
+    }
+    void end() override { observer_ = nullptr; }
+    void on_time(time_point) override {}
 
     /// The roster or the rules change.
     void change() {
-        if (changed_) {
-            changed_();
+        if (observer_ != nullptr) {
+            observer_->on_security_changed();
         }
     }
 
@@ -74,7 +78,7 @@ class scripted_security final : public core::node_security {
     std::string line = "{\"signature\":\"s\",\"roster\":{}}";
 
   private:
-    std::function<void()> changed_;
+    core::security_observer* observer_ = nullptr;
 };
 
 } // namespace cles::test

@@ -8,7 +8,6 @@
 #include "node/base/completion_drain.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/session/request_checks.hpp"
-#include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
@@ -130,11 +129,7 @@ void local_node::start(const std::vector<std::string>& listen_at) {
         routing_ = routing_wanted_->make(*this);
     }
     if (node_->security) {
-        node_->security->observe([weak = weak_from_this()] {
-            if (const auto self = weak.lock()) {
-                self->on_security_changed();
-            }
-        });
+        security_.emplace(*this);
     }
     for (const auto& where : listen_at) {
         listen(where);
@@ -160,21 +155,6 @@ void local_node::on_timer() {
         node_->peers.note_suspension(at);
     }
     node_->deadlines.expire(at);
-}
-
-void local_node::on_security_changed() {
-    if (stopped_) {
-        return;
-    }
-    const auto keep = shared_from_this();
-    const auto& security = *node_->security;
-    if (!security.is_member(node_->name)) {
-        post_log(log_level::error, node_->name + " was removed from the fleet by version " +
-                                       std::to_string(security.roster_version()) +
-                                       " of the roster: its requests are refused, and it refuses all");
-    }
-    connections_.on_security_changed();
-    feeds_.on_security_changed();
 }
 
 void local_node::check_shutdown() {
@@ -409,9 +389,7 @@ void local_node::stop() {
     const auto keep = shared_from_this();
     send_updates(node_->unsent, node_->published, now());
     stopped_ = true;
-    if (node_->security) {
-        node_->security->observe(nullptr);
-    }
+    security_.reset();
     listeners_.close();
     environment_->stop_timer();
     if (routing_) {

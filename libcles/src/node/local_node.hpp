@@ -9,6 +9,7 @@
 #include "node/base/deadlines.hpp"
 #include "node/base/ip_network.hpp"
 #include "node/flush_scheduler.hpp"
+#include "node/local_security.hpp"
 #include "node/membership/discovery.hpp"
 #include "node/node_state.hpp"
 #include "node/publish/feed_links.hpp"
@@ -127,7 +128,6 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     void run() override; // one turn
     void join_group();
     void on_timer();
-    void on_security_changed();
     void check_noun(std::string_view noun) const;
 
     std::shared_ptr<core::environment> environment_;
@@ -147,6 +147,7 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     const detail::routing_part* routing_wanted_;
     std::shared_ptr<router> routing_; // null: off
     core::flush_scheduler flush_scheduler_{*this, *node_};
+    std::optional<local_security> security_;             // nothing: the node is not secured
     std::optional<graceful_shutdown> graceful_shutdown_; // set once a graceful shutdown has started
     bool stopped_ = false;
 };

@@ -2,30 +2,62 @@
 #pragma once
 
 #include <cles/limits.hpp>
+#include <cles/log.hpp>
 #include <cles/verb.hpp>
 
+#include "port/environment.hpp"
 #include "port/group_port.hpp"
 #include "protocol/grammar.hpp"
 
 #include <cstdint>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::core {
+
+/// What a node learns from its security.
+class security_observer {
+  public:
+    security_observer() = default;
+    security_observer(const security_observer&) = delete;
+    security_observer& operator=(const security_observer&) = delete;
+
+    /// The roster or the rules have changed. May be called from inside a function of `node_security`, but not from one
+    /// that is const.
+    virtual void on_security_changed() = 0;
+    /// A member has stated this version of the roster in a session.
+    virtual void on_stated_roster(std::string_view name, std::uint32_t version) = 0;
+    /// A member that sends to the group did not answer by datagram. One of the endpoints that it announces may be
+    /// tried, so that both have the newer roster.
+    virtual void on_unanswered(std::string_view name, const std::vector<std::string>& endpoints) = 0;
+    /// `node_security::on_time` is to be called at that time instead of a later one.
+    virtual void on_due(time_point at) = 0;
+    virtual void on_security_log(log_level level, std::string text) = 0;
+
+  protected:
+    ~security_observer() = default;
+};
 
 /// What a secured node asks of its environment about its fleet (docs/security.md): who is a member, what members may
 /// do, and the roster. Nodes without security have none, so that they do not contain the code.
 ///
-/// Names are those of members. The functions are called on the node's executor, and call back only what `observe` says.
+/// Names are those of members. The functions are called on the node's executor.
 class node_security {
   public:
     node_security() = default;
     node_security(const node_security&) = delete;
     node_security& operator=(const node_security&) = delete;
     virtual ~node_security() = default;
+
+    /// Called once, before all others. The clock must outlive this, the observer live until `end`.
+    /// \throws cles::error if the node's name is not that of its key
+    virtual void begin(std::string_view name, std::uint32_t epoch, const clock& time, security_observer& observer) = 0;
+    /// Nothing is reported any more.
+    virtual void end() = 0;
+    virtual void on_time(time_point now) = 0;
 
     [[nodiscard]] virtual bool is_member(std::string_view name) const = 0;
     /// Whether `requester` may send this request to `provider`. For an update, `how` is BIND.
@@ -50,9 +82,6 @@ class node_security {
     virtual std::optional<std::string> offer_roster(std::string_view line) = 0;
     /// Whether to ask a member that states this version for its roster now; notes that it was asked.
     virtual bool wants_roster(std::string_view from, std::uint32_t version, time_point now) = 0;
-    /// From now on, `changed` is called after the roster or the rules have changed, and never after
-    /// `observe(nullptr)`.
-    virtual void observe(std::function<void()> changed) = 0;
 };
 
 } // namespace cles::core

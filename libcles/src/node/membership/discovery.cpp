@@ -312,7 +312,7 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
     switch (host_.node().peers.apply_announcement(said, *update.epoch, *update.seq, from, now)) {
     case membership::verdict::taken:
         ++counts.announcements_received;
-        ask_for_roster(said, now);
+        ask_for_roster(said.node, said.roster, now);
         break;
     case membership::verdict::duplicate: ++counts.group_repeated; break;
     case membership::verdict::old: ++counts.announcements_dropped; break;
@@ -326,14 +326,34 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
     }
 }
 
-// A node with a newer roster has announced itself.
-void discovery::ask_for_roster(const announcement& said, time_point now) {
+// At an address that the node itself has announced.
+void discovery::ask_for_roster(std::string_view node, std::uint32_t version, time_point now) {
     const auto& host = host_.shared_node();
-    if (host->security && host->security->wants_roster(said.node, said.roster, now)) {
-        const auto noun = said.node + ":cles/roster";
-        host_.peer_channels().send(said.node, {}, {.verb = verb::pull, .noun = noun},
+    if (host->security && host->security->wants_roster(node, version, now)) {
+        const auto noun = std::string{node} + ":cles/roster";
+        host_.peer_channels().send(node, {}, {.verb = verb::pull, .noun = noun},
                                    now + std::chrono::milliseconds{protocol::default_deadline_ms},
-                                   make_roster_reply(host, said.node), {});
+                                   make_roster_reply(host, std::string{node}), {});
+    }
+}
+
+void discovery::visit(std::string_view node, const std::string& url) {
+    const auto noun = std::string{node} + ":cles/roster";
+    const auto release = [url](local_node& host, const peer_answer&) {
+        post(host.environment(), [weak = host.weak_from_this(), url] {
+            if (const auto alive = weak.lock(); alive && !alive->stopped()) {
+                alive->peer_channels().release(url);
+            }
+        });
+    };
+    host_.peer_channels().send(node, url, {.verb = verb::pull, .noun = noun},
+                               host_.now() + std::chrono::milliseconds{protocol::default_deadline_ms},
+                               detail::pending_ptr{new peer_reply{host_.weak_from_this(), release}}, {});
+}
+
+void discovery::expedite_announcement() {
+    if (begun_ && !left_) {
+        announcer_.expedite(host_.now());
     }
 }
 

@@ -160,6 +160,12 @@ class discovery final : private announcement_listener, private membership::watch
     [[nodiscard]] bool expects_more() const noexcept { return !discovery_grace_.over(); }
     /// Whether a node that is known, but at no usable address, may still be received by another of its interfaces.
     [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
+    /// Asks that node for its roster, if it is wanted.
+    void ask_for_roster(std::string_view node, std::uint32_t version, time_point now);
+    /// Opens a link to a node that may be found there, and closes it when it is idle.
+    void visit(std::string_view node, const std::string& url);
+    /// Announces this node soon, since something has changed.
+    void expedite_announcement();
     /// Receives the changes of `membership`; a test may intercept them.
     [[nodiscard]] membership::watcher& membership_watcher() noexcept { return *this; }
     /// Why a name is unknown, as the start of a sentence; empty without a group and gossip.
@@ -178,7 +184,6 @@ class discovery final : private announcement_listener, private membership::watch
     void announce_to_group(announcement& said);
     [[nodiscard]] std::vector<std::string> endpoints_for_group(bool loopback) const;
     [[nodiscard]] std::vector<std::string> endpoints_of_interfaces() const;
-    void ask_for_roster(const announcement& said, time_point now);
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
     local_node& host_;

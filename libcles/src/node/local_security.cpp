@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/local_security.hpp"
+
+#include "node/local_node.hpp"
+#include "protocol/request_line.hpp"
+
+#include <chrono>
+#include <memory>
+#include <utility>
+
+namespace cles::core {
+
+local_security::local_security(local_node& host) : host_(host) {
+    auto& node = host_.node();
+    node.security->begin(node.name, protocol::parse_epoch(node.epoch).value_or(0), host_.environment(), *this);
+}
+
+local_security::~local_security() { host_.node().security->end(); }
+
+// In a task of its own: the line that brought the roster belongs to a link that may be closed.
+void local_security::on_security_changed() {
+    post(host_.environment(), [weak = host_.weak_from_this(), this] {
+        if (const auto host = weak.lock(); host && !host->stopped()) {
+            apply_change();
+        }
+    });
+}
+
+void local_security::apply_change() {
+    const auto& node = host_.node();
+    if (!node.security->is_member(node.name)) {
+        host_.write_log(log_level::error, node.name + " was removed from the fleet by version " +
+                                              std::to_string(node.security->roster_version()) + " of the roster");
+    }
+    host_.connections().on_security_changed();
+    host_.feeds().on_security_changed();
+    host_.discovery().expedite_announcement();
+}
+
+void local_security::on_stated_roster(std::string_view name, std::uint32_t version) {
+    host_.discovery().ask_for_roster(name, version, host_.now());
+}
+
+void local_security::on_unanswered(std::string_view name, const std::vector<std::string>& endpoints) {
+    for (const auto& where : endpoints) {
+        if (where.starts_with("tls:")) { // both ends have the newer roster once the link is open
+            host_.discovery().visit(name, where);
+            return;
+        }
+    }
+}
+
+void local_security::on_due(time_point at) {
+    if (!armed() || at < due()) {
+        host_.deadlines().arm(*this, at);
+    }
+}
+
+void local_security::on_deadline(time_point now) { host_.node().security->on_time(now); }
+
+void local_security::on_security_log(log_level level, std::string text) { host_.post_log(level, std::move(text)); }
+
+} // namespace cles::core

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "node/base/deadlines.hpp"
+#include "port/node_security.hpp"
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+class local_node;
+
+/// Connects a node with its security: has the links and bindings closed that are no longer permitted, asks for newer
+/// rosters, and calls it when it is due.
+class local_security final : private security_observer, private deadline {
+  public:
+    /// \pre the node is secured \throws cles::error if the node's name is not that of its key
+    explicit local_security(local_node& host);
+    local_security(const local_security&) = delete;
+    local_security& operator=(const local_security&) = delete;
+    ~local_security();
+
+  private:
+    // security_observer
+    void on_security_changed() override;
+    void on_stated_roster(std::string_view name, std::uint32_t version) override;
+    void on_unanswered(std::string_view name, const std::vector<std::string>& endpoints) override;
+    void on_due(time_point at) override;
+    void on_security_log(log_level level, std::string text) override;
+    // deadline
+    void on_deadline(time_point now) override;
+
+    void apply_change();
+
+    local_node& host_;
+};
+
+} // namespace cles::core
