@@ -44,12 +44,19 @@ flags of pkg-config's cles define it"
 
 namespace cles {
 
+namespace detail {
+class security_part;
+}
+
 /// The configuration of a service. Only the name is required.
 struct service_options {
     std::string name{};                         ///< 1 to 64 letters, digits, '_', '-', '.'; not self, any, all
     std::vector<std::string> listen{};          ///< link URLs, see docs/links.md; none: it does not listen
     std::map<std::string, std::string> peers{}; ///< URLs of other nodes, by name
     bool insecure = false;                      ///< allow listening beyond this host without credentials
+    /// `cles::security(directory)` authenticates all peers and encrypts what is sent to other hosts
+    /// (<cles/security.hpp>, docs/security.md). Each service needs its own.
+    std::shared_ptr<detail::security_part> security{};
     /// Networks ("10.0.0.0/8", "fd00::/8") whose source addresses are trusted, so the amount sent to them by UDP is not
     /// limited. All other hosts except loopback are sent less than 64 KiB a second, so that the node cannot be used to
     /// flood a third party.

@@ -4,6 +4,7 @@
 #include <cles/reply_operation.hpp>
 #include <cles/responder.hpp>
 
+#include "api/security_part.hpp"
 #include "node/session/call.hpp"
 
 #include <boost/asio/post.hpp>
@@ -24,11 +25,12 @@
 namespace cles::detail {
 namespace {
 
-core::local_node_options options_of(service_options&& all) {
+core::local_node_options options_of(service_options&& all, asio_port::asio_environment& by) {
     return {.node = {.name = std::move(all.name),
                      .pool = std::move(all.pool),
                      .bounds = all.limits,
                      .authorise = std::move(all.authorise),
+                     .security = all.security ? all.security->equip(by) : nullptr,
                      .log = std::move(all.log),
                      .metrics = std::move(all.metrics),
                      .load = std::move(all.load)},
@@ -286,7 +288,7 @@ engine::engine(const boost::asio::any_io_executor& executor, service_options opt
     : engine(std::make_shared<asio_port::asio_environment>(executor), std::move(options)) {}
 
 engine::engine(std::shared_ptr<asio_port::asio_environment> by, service_options options)
-    : local_node(by, options_of(std::move(options))), asio_(*by) {}
+    : local_node(by, options_of(std::move(options), *by)), asio_(*by) {}
 
 void engine::add(registration offered) {
     core::handler entry{.info = std::move(offered.info)};

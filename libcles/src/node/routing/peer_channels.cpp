@@ -208,6 +208,10 @@ void peer_channels::set_peer(std::string_view name, std::string_view where) {
 
 url peer_channels::checked_url(std::string_view where) const {
     auto address = parse_url(where);
+    if (address.scheme == "tcp" && host_.node().security) {
+        throw error(errc::denied,
+                    "plain TCP is refused with security: use 'tls' instead of '" + std::string{where} + "'");
+    }
     if (!host_.environment().has_transport(address.scheme)) {
         throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
     }

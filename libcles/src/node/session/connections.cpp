@@ -284,7 +284,11 @@ std::string listeners::listen(std::string_view where, bool insecure) {
     if (!environment.has_transport(address.scheme)) {
         throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
     }
-    if (!insecure && environment.is_exposed(address)) {
+    if (host_.node().security && address.scheme == "tcp") {
+        throw error(errc::insecure_listen,
+                    "plain TCP is refused with security: use 'tls' instead of '" + std::string{where} + "'");
+    }
+    if (!insecure && !host_.node().security && environment.is_exposed(address)) {
         throw error(errc::insecure_listen, "'" + std::string{where} +
                                                "' can be reached from other hosts, which are not authenticated; "
                                                "set 'insecure' to allow it");
