@@ -29,10 +29,10 @@ BOOST_AUTO_TEST_CASE(waiters_that_have_ended_are_not_kept) {
     auto waits = std::make_shared<int>();
     const auto tell = [kept, &told](auto*, std::string_view, const auto& /*mark*/, const auto& /*why*/) { ++told; };
     for (int i = 0; i < 100; ++i) {
-        from->join("car2", "pose", "hops=7 via=car1", waits, tell);
+        from->join("car2", {"pose"}, "hops=7 via=car1", waits, tell);
         waits = std::make_shared<int>();
     }
-    from->join("car2", "pose", "hops=7 via=car1", waits, tell);
+    from->join("car2", {"pose"}, "hops=7 via=car1", waits, tell);
     BOOST_TEST(kept.use_count() < 5);
     ways.bound("car2:pose").binds("{}");
     BOOST_TEST(told == 1);
