@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "security/fleet_fixture.hpp"
 #include "security/keys.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -12,24 +13,8 @@ namespace {
 
 using namespace cles::security;
 
-std::vector<std::uint8_t> from_hex(std::string_view hex) {
-    std::vector<std::uint8_t> bytes;
-    for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
-        bytes.push_back(static_cast<std::uint8_t>(std::stoi(std::string{hex.substr(i, 2)}, nullptr, 16)));
-    }
-    return bytes;
-}
-
-template <class Bytes>
-std::string to_hex(const Bytes& bytes) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string hex;
-    for (const std::uint8_t byte : bytes) {
-        hex.push_back(digits[byte >> 4U]);
-        hex.push_back(digits[byte & 15U]);
-    }
-    return hex;
-}
+using test::from_hex;
+using test::to_hex;
 
 template <class Key>
 Key key_of(std::string_view hex) {
