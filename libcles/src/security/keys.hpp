@@ -6,9 +6,11 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 /// Keys of members and fleets: Ed25519 (RFC 8032) for signatures, and its X25519 form (RFC 7748) for agreement.
 
@@ -24,12 +26,15 @@ using public_key = std::array<std::uint8_t, 32>;    ///< Ed25519
 using agreement_key = std::array<std::uint8_t, 32>; ///< X25519, public
 using signature = std::array<std::uint8_t, 64>;     ///< Ed25519
 
+/// What a sealed box adds to its content.
+inline constexpr std::size_t sealed_overhead = 48;
+
 /// An Ed25519 private key.
 class signing_key {
   public:
     /// A new key.
     static signing_key generate();
-    /// \param seed the 32 bytes of RFC 8032
+    /// \param seed the 32 bytes of RFC 8032 \throws security_error if it has another size
     explicit signing_key(secret_bytes seed);
 
     [[nodiscard]] const public_key& public_part() const noexcept { return public_; }
@@ -53,7 +58,10 @@ class signing_key {
 /// The X25519 form of a key; none if it is not a point of prime order in its only encoding.
 [[nodiscard]] std::optional<agreement_key> agreement_form(const public_key& key);
 
-/// Base64url without padding (RFC 4648, section 5).
+/// A sealed box of libsodium, which only the receiver can open.
+[[nodiscard]] std::vector<std::uint8_t> seal_box(const agreement_key& receiver, bytes_view content);
+
+/// Base64url without padding (RFC 4648, section 5). Not for secrets: their text must be in locked memory, too.
 [[nodiscard]] std::string to_base64url(bytes_view bytes);
 /// Reads exactly `out.size()` bytes. False for any other text, including other spellings of the same bytes.
 [[nodiscard]] bool read_base64url(std::string_view text, std::span<std::uint8_t> out);

@@ -18,11 +18,11 @@ struct member {
     std::uint32_t number = 0; ///< 1 to 2^24-1, never given again
     std::string name{};
     public_key key{};
-    agreement_key agreement{};      ///< the X25519 form of `key`
-    std::string group_keys{};       ///< sealed for this member, as written
+    agreement_key agreement{};                        ///< the X25519 form of `key`
+    std::string group_keys{};                         ///< sealed for this member, as written
     std::optional<std::vector<std::string>> may{};    ///< rights; none: everything
     std::optional<std::vector<std::string>> offers{}; ///< rights; none: everything
-    std::vector<std::string> forwards{}; ///< patterns of the names for which it may forward
+    std::vector<std::string> forwards{};              ///< patterns of the names for which it may forward
 
     /// Whether it is the same member, whatever its rights.
     [[nodiscard]] bool is(const member& other) const noexcept {

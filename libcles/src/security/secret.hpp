@@ -10,13 +10,18 @@ namespace cles::security {
 
 using bytes_view = std::span<const std::uint8_t>;
 
+/// Prepares libsodium, once for the process. Whatever calls libsodium without a secret or a key calls this first.
+/// \throws std::runtime_error if the system has no random numbers
+void prepare_sodium();
+
 /// Secret bytes. Their memory is locked, so that it is not written to swap space, left out of core dumps, and wiped
-/// when they are destroyed. If the system's limit of locked memory is reached, they are still wiped.
+/// when they are destroyed. If the system's limit of locked memory is reached, they are still left out and wiped.
 ///
-/// Move only; a moved-from secret is empty.
+/// Move only; a moved-from secret is empty. May be destroyed on any thread.
 class secret_bytes {
   public:
     secret_bytes() = default;
+    /// Zeros.
     explicit secret_bytes(std::size_t size);
     explicit secret_bytes(bytes_view from);
     /// From the operating system's generator.
@@ -26,6 +31,7 @@ class secret_bytes {
     [[nodiscard]] const std::uint8_t* data() const noexcept { return bytes_.get(); }
     [[nodiscard]] std::size_t size() const noexcept { return bytes_ ? bytes_.get_deleter().size : 0; }
     [[nodiscard]] bytes_view view() const noexcept { return {data(), size()}; }
+    [[nodiscard]] std::span<std::uint8_t> span() noexcept { return {data(), size()}; }
     [[nodiscard]] secret_bytes copy() const { return secret_bytes{view()}; }
 
   private:
