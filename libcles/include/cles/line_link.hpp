@@ -82,6 +82,9 @@ class link {
     /// Frees unused memory; called after the link has been idle for a while.
     virtual void shrink() {}
     [[nodiscard]] virtual const identity& peer() const noexcept = 0;
+    /// The epoch that the peer has stated when it proved its name: eight hexadecimal digits. Empty if the transport
+    /// authenticates no names. Complete when the first line arrives.
+    [[nodiscard]] virtual std::string_view epoch() const noexcept { return {}; }
 };
 
 using link_ptr = std::shared_ptr<link>;

@@ -10,6 +10,7 @@
 #include <functional>
 #include <memory>
 #include <string_view>
+#include <utility>
 
 namespace cles {
 
@@ -30,6 +31,12 @@ class link_transport {
     /// cancels; `done` is then not called.
     virtual std::function<void()> dial(const boost::asio::any_io_executor& executor, const url& where,
                                        const limits& bounds, dial_callback done) = 0;
+    /// As above, to the node of that name: a transport that authenticates its peers connects to no other. An empty name
+    /// stands for any node.
+    virtual std::function<void()> dial_node(const boost::asio::any_io_executor& executor, const url& where,
+                                            std::string_view, const limits& bounds, dial_callback done) {
+        return dial(executor, where, bounds, std::move(done));
+    }
 };
 
 /// The transport for this scheme; null if there is none.

@@ -111,19 +111,29 @@ void asio_environment::stop_timer() {
     }
 }
 
-bool asio_environment::has_transport(std::string_view scheme) const { return find_transport(scheme) != nullptr; }
+void asio_environment::add_transport(std::string scheme, std::unique_ptr<link_transport> carrier) {
+    own_transports_.insert_or_assign(std::move(scheme), std::move(carrier));
+}
+
+link_transport* asio_environment::find(std::string_view scheme) const {
+    const auto own = own_transports_.find(scheme);
+    return own != own_transports_.end() ? own->second.get() : find_transport(scheme);
+}
+
+bool asio_environment::has_transport(std::string_view scheme) const { return find(scheme) != nullptr; }
 
 bool asio_environment::is_exposed(const url& where) const {
-    const auto* by = find_transport(where.scheme);
+    const auto* by = find(where.scheme);
     return by != nullptr && by->is_exposed(where);
 }
 
 std::unique_ptr<acceptor> asio_environment::listen(const url& where, const limits& bounds) {
-    return find_transport(where.scheme)->listen(executor_, where, bounds);
+    return find(where.scheme)->listen(executor_, where, bounds);
 }
 
-std::function<void()> asio_environment::dial(const url& where, const limits& bounds, dial_callback done) {
-    return find_transport(where.scheme)->dial(executor_, where, bounds, std::move(done));
+std::function<void()> asio_environment::dial(const url& where, std::string_view name, const limits& bounds,
+                                             dial_callback done) {
+    return find(where.scheme)->dial_node(executor_, where, name, bounds, std::move(done));
 }
 
 std::string asio_environment::local_scope() const {

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/link.hpp>
+
 #include "port/environment.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <random>
 #include <string>
@@ -37,13 +40,15 @@ class boottime_timer final : public std::enable_shared_from_this<boottime_timer>
     bool waiting_ = false;
 };
 
-/// The environment of a node over Boost.Asio: the program's executor, its clock and timer, and the registered
-/// transports.
+/// The environment of a node over Boost.Asio: the program's executor, its clock and timer, its own transports, and
+/// the registered ones.
 class asio_environment final : public core::environment {
   public:
     explicit asio_environment(boost::asio::any_io_executor executor) : executor_(std::move(executor)) {}
 
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return executor_; }
+    /// Adds a transport of this node only, which has precedence over a registered one: it has the node's keys.
+    void add_transport(std::string scheme, std::unique_ptr<link_transport> carrier);
 
     [[nodiscard]] time_point now() const override { return time_point::clock::now(); }
     std::uint32_t random() override { return random_(); }
@@ -56,7 +61,8 @@ class asio_environment final : public core::environment {
     [[nodiscard]] bool has_transport(std::string_view scheme) const override;
     [[nodiscard]] bool is_exposed(const url& where) const override;
     std::unique_ptr<acceptor> listen(const url& where, const limits& bounds) override;
-    std::function<void()> dial(const url& where, const limits& bounds, dial_callback done) override;
+    std::function<void()> dial(const url& where, std::string_view name, const limits& bounds,
+                               dial_callback done) override;
 
     [[nodiscard]] std::string local_scope() const override;
     [[nodiscard]] bool is_open(const std::string& name) const override;
@@ -66,7 +72,10 @@ class asio_environment final : public core::environment {
     std::shared_ptr<core::group_port> join(const core::network_interface& by, const multicast_options& where) override;
 
   private:
+    [[nodiscard]] link_transport* find(std::string_view scheme) const;
+
     boost::asio::any_io_executor executor_;
+    std::map<std::string, std::unique_ptr<link_transport>, std::less<>> own_transports_;
     std::random_device random_;
     std::shared_ptr<boottime_timer> timer_;
 };

@@ -65,8 +65,9 @@ class environment : public clock {
     [[nodiscard]] virtual bool is_exposed(const url& where) const = 0;
     /// \throws boost::system::system_error if the address is not available
     virtual std::unique_ptr<acceptor> listen(const url& where, const limits& bounds) = 0;
-    /// See `link_transport::dial`.
-    virtual std::function<void()> dial(const url& where, const limits& bounds, dial_callback done) = 0;
+    /// See `link_transport::dial_node`.
+    virtual std::function<void()> dial(const url& where, std::string_view name, const limits& bounds,
+                                       dial_callback done) = 0;
 
     /// The prefix of the `inproc` names at which nodes that share this environment find each other.
     [[nodiscard]] virtual std::string local_scope() const = 0;

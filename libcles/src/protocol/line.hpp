@@ -17,6 +17,8 @@ class line_buffer {
     enum class status { line, need_more, overlong };
 
     explicit line_buffer(std::size_t limit) noexcept : limit_(limit) {}
+    /// For the lines that have not been returned yet.
+    void set_limit(std::size_t limit) noexcept { limit_ = limit; }
 
     /// Space for the next bytes; never empty. Invalidates views of earlier lines.
     std::span<char> prepare();
@@ -29,7 +31,7 @@ class line_buffer {
     /// The next line, without its LF. `overlong`: the line exceeds the limit, `line` is what has arrived of it, and no
     /// more lines follow.
     status next(std::string_view& line) noexcept;
-    /// What has arrived of a line whose end has not.
+    /// What has arrived of a line whose end has not; before `need_more`, everything that has not been returned.
     [[nodiscard]] std::string_view unfinished() const noexcept { return {data_.get() + begin_, end_ - begin_}; }
 
   private:

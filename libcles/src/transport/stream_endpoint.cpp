@@ -13,9 +13,9 @@ using boost::system::error_code;
 // --- Dialling ---
 
 stream_dialler::stream_dialler(const asio::any_io_executor& executor, const limits& bounds, identify_function identify,
-                               dial_callback done)
+                               dial_callback done, codec_maker make_codec)
     : socket_(executor), timeout_(executor, bounds.connect), bounds_(bounds), identify_(std::move(identify)),
-      done_(std::move(done)) {}
+      done_(std::move(done)), make_codec_(std::move(make_codec)) {}
 
 void stream_dialler::start(std::vector<stream_address> where) {
     where_ = std::move(where);
@@ -46,10 +46,31 @@ void stream_dialler::on_connected(error_code code) {
     } else if (code) {
         fail(code);
     } else {
-        const auto done = std::exchange(done_, nullptr);
-        timeout_.cancel();
-        auto peer = identify_(socket_);
-        done({}, std::make_shared<stream_link>(std::move(socket_), std::move(peer), bounds_));
+        make_link();
+    }
+}
+
+void stream_dialler::make_link() {
+    auto peer = identify_(socket_);
+    made_ = std::make_shared<stream_link>(std::move(socket_), std::move(peer), bounds_,
+                                          make_codec_ ? make_codec_() : nullptr);
+    if (make_codec_) {
+        made_->open([weak = weak_from_this()](error_code code) {
+            if (const auto self = weak.lock()) {
+                self->complete(code);
+            }
+        });
+    } else {
+        complete({});
+    }
+}
+
+void stream_dialler::complete(error_code code) {
+    const auto done = std::exchange(done_, nullptr);
+    auto made = std::exchange(made_, nullptr);
+    timeout_.cancel();
+    if (done) {
+        done(code, code ? nullptr : std::move(made));
     }
 }
 
@@ -66,6 +87,9 @@ void stream_dialler::give_up() {
     error_code ignored;
     socket_.close(ignored);
     timeout_.cancel();
+    if (const auto made = std::exchange(made_, nullptr)) {
+        made->close();
+    }
 }
 
 // --- Accepting ---
@@ -87,9 +111,10 @@ bool is_the_peers(const error_code& code) {
 
 } // namespace
 
-stream_acceptor::stream_acceptor(listening_socket socket, url local, const limits& bounds, identify_function identify)
+stream_acceptor::stream_acceptor(listening_socket socket, url local, const limits& bounds, identify_function identify,
+                                 codec_maker make_codec)
     : acceptor_(std::move(socket)), local_(std::move(local)), pause_(acceptor_.get_executor()), bounds_(bounds),
-      identify_(std::move(identify)) {}
+      identify_(std::move(identify)), make_codec_(std::move(make_codec)) {}
 
 void stream_acceptor::start(std::function<void(link_ptr)> on_link) {
     on_link_ = std::move(on_link);
@@ -117,7 +142,12 @@ void stream_acceptor::close() {
 
 void stream_acceptor::hand_over(stream_socket socket) {
     auto peer = identify_(socket);
-    on_link_(std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_));
+    const auto made = std::make_shared<stream_link>(std::move(socket), std::move(peer), bounds_,
+                                                    make_codec_ ? make_codec_() : nullptr);
+    if (make_codec_) {
+        made->open();
+    }
+    on_link_(made);
 }
 
 void stream_acceptor::accept() {

@@ -25,12 +25,16 @@ using listening_socket = boost::asio::basic_socket_acceptor<boost::asio::generic
 /// Prepares a connected socket and returns the identity of its peer.
 using identify_function = std::function<identity(stream_socket&)>;
 
+/// Makes the codec of a connection; empty for links without one.
+using codec_maker = std::function<std::unique_ptr<stream_codec>()>;
+
 /// Makes one connection, to the first of several endpoints that accepts it, within `limits::connect` in all since this
 /// was created.
 class stream_dialler : public std::enable_shared_from_this<stream_dialler> {
   public:
+    /// With a codec, the link is open when `done` receives it.
     stream_dialler(const boost::asio::any_io_executor& executor, const limits& bounds, identify_function identify,
-                   dial_callback done);
+                   dial_callback done, codec_maker make_codec = nullptr);
 
     /// \pre there is at least one
     void start(std::vector<stream_address> where);
@@ -42,12 +46,16 @@ class stream_dialler : public std::enable_shared_from_this<stream_dialler> {
   private:
     void connect();
     void on_connected(boost::system::error_code code);
+    void make_link();
+    void complete(boost::system::error_code code);
 
     stream_socket socket_;
     boost::asio::steady_timer timeout_;
     limits bounds_;
     identify_function identify_;
     dial_callback done_;
+    codec_maker make_codec_;
+    std::shared_ptr<stream_link> made_; // while it is being opened
     std::vector<stream_address> where_;
     std::size_t tried_ = 0;
 };
@@ -57,7 +65,9 @@ class stream_dialler : public std::enable_shared_from_this<stream_dialler> {
 /// If the process or the system runs out of descriptors or memory, it waits a little and continues.
 class stream_acceptor : public acceptor, public std::enable_shared_from_this<stream_acceptor> {
   public:
-    stream_acceptor(listening_socket socket, url local, const limits& bounds, identify_function identify);
+    /// With a codec, links are opened after they have been accepted.
+    stream_acceptor(listening_socket socket, url local, const limits& bounds, identify_function identify,
+                    codec_maker make_codec = nullptr);
 
     [[nodiscard]] url local() const override { return local_; }
     void start(std::function<void(link_ptr)> on_link) override;
@@ -74,6 +84,7 @@ class stream_acceptor : public acceptor, public std::enable_shared_from_this<str
     boost::asio::steady_timer pause_;
     limits bounds_;
     identify_function identify_;
+    codec_maker make_codec_;
     std::function<void(link_ptr)> on_link_;
     bool accepts_waiting_ = false; // even what completes after `close`
 };

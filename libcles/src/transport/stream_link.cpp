@@ -7,6 +7,7 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/post.hpp>
 
+#include <algorithm>
 #include <utility>
 
 #include <poll.h>
@@ -26,26 +27,95 @@ void release(std::string& text) noexcept { std::string{}.swap(text); }
 
 } // namespace
 
-stream_link::stream_link(socket_type socket, identity peer, const limits& bounds)
-    : socket_(std::move(socket)), peer_(std::move(peer)), bounds_(bounds), input_(bounds.line),
-      timeout_(socket_.get_executor()) {
+stream_link::stream_link(socket_type socket, identity peer, const limits& bounds, std::unique_ptr<stream_codec> codec)
+    : socket_(std::move(socket)), peer_(std::move(peer)), bounds_(bounds), codec_(std::move(codec)),
+      input_(bounds.line), timeout_(socket_.get_executor()), opening_(codec_ != nullptr) {
     error_code ignored;
     socket_.non_blocking(true, ignored);
 }
 
 void stream_link::start(std::shared_ptr<link_events> owner) {
     owner_ = std::move(owner);
-    read();
+    if (!codec_) {
+        read();
+    } else if (state_ == state::closed) { // it could not be opened
+        asio::post(socket_.get_executor(), [self = shared_from_this()] {
+            if (const auto told = std::exchange(self->owner_, nullptr)) {
+                told->on_lost(self->failure_);
+            }
+        });
+    } else if (!opening_) {
+        continue_later(); // the codec may have text already
+    }
+}
+
+// -- opening, with a codec -----------------------------------------------------------------------------------------
+
+void stream_link::open(std::function<void(error_code)> opened) {
+    opened_ = std::move(opened);
+    timeout_.expires_after(codec_->time_to_open());
+    timeout_.async_wait([self = shared_from_this()](error_code code) {
+        if (!code && self->opening_ && self->state_ == state::open) {
+            self->failure_ = asio::error::timed_out;
+            self->finish();
+        }
+    });
+    asio::post(socket_.get_executor(), [self = shared_from_this()] { self->continue_opening(); });
+}
+
+void stream_link::continue_opening() {
+    if (state_ != state::open) {
+        return;
+    }
+    const auto status = codec_->open(failure_);
+    flush();
+    if (status == stream_codec::status::done) {
+        on_opened();
+    } else if (status == stream_codec::status::need_input && !stream_ended_) {
+        read();
+    } else {
+        if (!failure_) {
+            failure_ = asio::error::connection_reset;
+        }
+        finish(); // the codec explains it to the peer
+    }
+}
+
+void stream_link::on_opened() {
+    opening_ = false;
+    timeout_.cancel();
+    codec_->describe(peer_);
+    codec_->watch([weak = weak_from_this()](error_code why) {
+        if (const auto self = weak.lock()) {
+            asio::post(self->socket_.get_executor(), [self, why] { self->fail(why); });
+        }
+    });
+    flush();
+    if (owner_) {
+        continue_later();
+    }
+    if (const auto opened = std::exchange(opened_, nullptr)) {
+        opened({});
+    }
+}
+
+// The codec may have an explanation for the peer, but the link ends now.
+void stream_link::fail(error_code why) {
+    if (state_ != state::closed) {
+        const auto self = shared_from_this();
+        flush();
+        lose(why);
+    }
 }
 
 // -- reading -------------------------------------------------------------------------------------------------------
 
 void stream_link::read() {
-    if (reading_ || ended_ || overlong_ || state_ == state::closed) {
+    if (reading_ || ended_ || stream_ended_ || overlong_ || state_ == state::closed) {
         return;
     }
     reading_ = true;
-    const auto space = input_.prepare();
+    const auto space = codec_ ? codec_->prepare() : input_.prepare();
     socket_.async_receive(
         asio::buffer(space.data(), space.size()),
         [self = shared_from_this()](error_code code, std::size_t count) { self->on_read(code, count); });
@@ -56,10 +126,12 @@ void stream_link::on_read(error_code code, std::size_t count) {
     if (state_ == state::closed) {
         return;
     }
-    received_ += count;
+    if (!codec_) {
+        received_ += count;
+    }
     if (std::exchange(shrinking_, false) && code == asio::error::operation_aborted) {
         if (state_ == state::open) {
-            input_.shrink();
+            release_input();
             read();
         } else {
             discard();
@@ -78,17 +150,50 @@ void stream_link::on_read(error_code code, std::size_t count) {
         return;
     }
     if (code == asio::error::eof) {
-        ended_ = true;
+        (codec_ ? stream_ended_ : ended_) = true;
     } else if (code) {
         lose(code);
         return;
     }
-    input_.commit(count);
-    hand_over();
+    if (!codec_) {
+        input_.commit(count);
+        hand_over();
+        return;
+    }
+    codec_->commit(count);
+    if (opening_) {
+        continue_opening();
+    } else {
+        hand_over();
+    }
+}
+
+// More input for lines, of what the codec has received. Returns false if there is none.
+bool stream_link::decode() {
+    const auto space = input_.prepare();
+    std::size_t count = 0;
+    const auto status = codec_->decode(space, count, failure_);
+    if (!codec_->encoded().empty()) {
+        flush();
+    }
+    switch (status) {
+    case stream_codec::status::done:
+        received_ += count;
+        input_.commit(count);
+        return true;
+    case stream_codec::status::ended: ended_ = true; break;
+    case stream_codec::status::need_input:
+        if (stream_ended_) { // anybody could have ended it
+            failure_ = asio::error::connection_reset;
+        }
+        break;
+    case stream_codec::status::failed: break;
+    }
+    return false;
 }
 
 void stream_link::hand_over() {
-    if (handing_ || overlong_ || state_ != state::open) {
+    if (handing_ || overlong_ || state_ != state::open || !owner_) {
         return;
     }
     const auto self = shared_from_this();
@@ -102,7 +207,9 @@ void stream_link::hand_over() {
         throw;
     }
     handing_ = false;
-    if (state_ == state::finishing || state_ == state::discarding) {
+    if (failure_) {
+        fail(failure_);
+    } else if (state_ == state::finishing || state_ == state::discarding) {
         discard();
     } else if (state_ == state::open && !paused_) {
         if (more) {
@@ -128,7 +235,7 @@ bool stream_link::hand_over_batch() {
             more = false;
             owner->on_overlong(line);
             break;
-        case protocol::line_buffer::status::need_more: more = false; break;
+        case protocol::line_buffer::status::need_more: more = codec_ && decode(); break;
         }
     }
     if (state_ == state::open && !more && ended_ && !end_reported_ && !overlong_) {
@@ -176,21 +283,21 @@ void stream_link::pause(bool stop) {
 // -- writing -------------------------------------------------------------------------------------------------------
 
 void stream_link::flush() {
-    if (state_ == state::closed || state_ == state::discarding || !sending_.empty()) {
+    if (state_ == state::closed || state_ == state::discarding || waiting_) {
         return;
     }
-    if (!urgent_.empty()) {
+    if (!urgent_.empty() && !opening_) {
         output_.insert(0, urgent_);
         if (urgent_.capacity() > roomy) {
             release(urgent_);
         }
         urgent_.clear();
     }
-    if (output_.empty()) {
+    if (output_.empty() && !codec_) {
         return;
     }
     error_code code;
-    const auto count = socket_.send(asio::buffer(output_), 0, code);
+    const auto count = codec_ ? send_encoded(code) : socket_.send(asio::buffer(output_), 0, code);
     if (code && code != asio::error::would_block) {
         // Reported later: the owner may be in the middle of something, and may read the explanation before that.
         asio::post(socket_.get_executor(), [self = shared_from_this(), code] { self->lose(code); });
@@ -198,29 +305,83 @@ void stream_link::flush() {
         return;
     }
     sent_ += count;
-    if (count == output_.size()) {
+    const bool all = codec_ ? codec_->encoded().empty() && encoded_.empty() : count == output_.size();
+    if (!all) {
+        waiting_ = true;
+        if (!opening_) {
+            sending_.swap(output_);
+            sending_at_ = count;
+        }
+        write_rest();
+    } else if (!opening_) {
         if (output_.capacity() > roomy) {
             release(output_);
         }
         output_.clear();
-        return;
     }
-    sending_.swap(output_);
-    sending_at_ = count;
-    write_rest();
+}
+
+// Encodes the output and sends it, in pieces. Returns the size of what was sent; the rest of the last piece is left in
+// `encoded_`.
+std::size_t stream_link::send_encoded(error_code& code) {
+    auto& bytes = codec_->encoded();
+    std::size_t done = 0;
+    for (;;) {
+        if (!bytes.empty()) {
+            const auto count = socket_.send(asio::buffer(bytes), 0, code);
+            if (count < bytes.size()) {
+                encoded_.swap(bytes);
+                encoded_at_ = count;
+                return done;
+            }
+            bytes.clear();
+            done += std::exchange(encoding_, 0);
+        }
+        if (opening_ || done == output_.size()) {
+            return done;
+        }
+        encoding_ = std::min(piece, output_.size() - done);
+        codec_->encode(std::string_view{output_}.substr(done, encoding_), code);
+        if (code) {
+            return done;
+        }
+    }
 }
 
 // Up to the end of a line, where urgent output may pass: of the current line, if such output is pending already.
 void stream_link::write_rest() {
+    if (encoded_at_ < encoded_.size()) {
+        async_send(std::string_view{encoded_}.substr(encoded_at_));
+        return;
+    }
     const auto line = sending_.find('\n', sending_at_ + (urgent_.empty() ? piece : 0));
     const auto end = line == std::string::npos ? sending_.size() : line + 1;
+    const auto text = std::string_view{sending_}.substr(sending_at_, end - sending_at_);
+    if (!codec_) {
+        async_send(text);
+        return;
+    }
+    if (codec_->encoded().empty()) {
+        error_code code;
+        codec_->encode(text, code);
+        if (code) {
+            asio::post(socket_.get_executor(), [self = shared_from_this(), code] { self->lose(code); });
+            return;
+        }
+        encoding_ = text.size();
+    }
+    encoded_.swap(codec_->encoded());
+    async_send(encoded_);
+}
+
+void stream_link::async_send(std::string_view bytes) {
     socket_.async_send(
-        asio::buffer(sending_.data() + sending_at_, end - sending_at_),
+        asio::buffer(bytes.data(), bytes.size()),
         [self = shared_from_this()](error_code code, std::size_t count) { self->on_written(code, count); });
 }
 
 void stream_link::let_urgent_pass() {
-    if (!urgent_.empty() && sending_[sending_at_ - 1] == '\n') {
+    if (!urgent_.empty() && !opening_ && (sending_at_ == 0 || sending_[sending_at_ - 1] == '\n')) {
         sending_.insert(sending_at_, urgent_);
         urgent_.clear();
     }
@@ -234,9 +395,22 @@ void stream_link::on_written(error_code code, std::size_t count) {
         lose(code);
         return;
     }
+    if (codec_) {
+        encoded_at_ += count;
+        if (encoded_at_ < encoded_.size()) {
+            write_rest();
+            return;
+        }
+        if (encoded_.capacity() > roomy) {
+            release(encoded_);
+        }
+        encoded_.clear();
+        encoded_at_ = 0;
+        count = std::exchange(encoding_, 0);
+    }
     sent_ += count;
     sending_at_ += count;
-    if (sending_at_ < sending_.size()) {
+    if (sending_at_ < sending_.size() || (codec_ && !codec_->encoded().empty())) {
         let_urgent_pass();
         write_rest();
         return;
@@ -246,8 +420,9 @@ void stream_link::on_written(error_code code, std::size_t count) {
     }
     sending_.clear();
     sending_at_ = 0;
+    waiting_ = false;
     flush();
-    if (!sending_.empty()) {
+    if (waiting_) {
         return;
     }
     if (state_ == state::finishing) {
@@ -261,10 +436,11 @@ void stream_link::on_written(error_code code, std::size_t count) {
 
 // The pending read holds the input's buffer; it is restarted with a smaller one.
 void stream_link::shrink() {
-    if (state_ != state::open || !sending_.empty() || handing_) {
+    if (state_ != state::open || waiting_ || handing_ || opening_) {
         return;
     }
     release(sending_);
+    release(encoded_);
     if (output_.empty()) {
         release(output_);
     }
@@ -272,11 +448,18 @@ void stream_link::shrink() {
         release(urgent_);
     }
     if (!reading_) {
-        input_.shrink();
+        release_input();
     } else if (!shrinking_) {
         shrinking_ = true;
         error_code ignored;
         socket_.cancel(ignored);
+    }
+}
+
+void stream_link::release_input() {
+    input_.shrink();
+    if (codec_) {
+        codec_->shrink();
     }
 }
 
@@ -305,7 +488,7 @@ void stream_link::finish() {
     }
     flush();
     state_ = state::finishing;
-    if (sending_.empty()) {
+    if (!waiting_) {
         shut_down_output();
     } else if (!handing_) {
         discard();
@@ -313,6 +496,16 @@ void stream_link::finish() {
 }
 
 void stream_link::shut_down_output() {
+    if (codec_ && !std::exchange(finished_, true)) {
+        codec_->finish();
+        flush();
+        if (waiting_) { // this continues when the socket has taken it
+            if (!handing_) {
+                discard();
+            }
+            return;
+        }
+    }
     state_ = state::discarding;
     error_code ignored;
     socket_.shutdown(asio::socket_base::shutdown_send, ignored);
@@ -345,14 +538,23 @@ void stream_link::lose(error_code why) {
     if (state_ == state::closed) {
         return;
     }
+    if (!failure_) {
+        failure_ = why;
+    }
     const auto owner = owner_;
+    const auto opened = opened_;
     close();
     if (owner) {
-        owner->on_lost(why);
+        owner->on_lost(failure_);
+    }
+    if (opened) {
+        opened(failure_);
     }
 }
 
 void stream_link::close() {
+    owner_.reset();
+    opened_ = nullptr;
     if (state_ == state::closed) {
         return;
     }
@@ -360,7 +562,6 @@ void stream_link::close() {
     error_code ignored;
     timeout_.cancel();
     socket_.close(ignored);
-    owner_.reset();
 }
 
 } // namespace cles::transport

@@ -4,14 +4,17 @@
 #include <cles/link.hpp>
 
 #include "protocol/line.hpp"
+#include "transport/stream_codec.hpp"
 
 #include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/steady_timer.hpp>
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
+#include <string_view>
 
 namespace cles::transport {
 
@@ -21,12 +24,17 @@ namespace cles::transport {
 /// reactor; only what the socket does not take waits for it. After a bounded number of lines, other links are served.
 /// In steady state neither allocates. After the peer's end of stream, it watches for a reset and for the hang-up of a
 /// Unix socket, which no read would show any more.
+///
+/// With a codec, the link is first opened, with or without an owner; until then it delivers no lines, and keeps output.
 class stream_link final : public link, public std::enable_shared_from_this<stream_link> {
   public:
     using socket_type = boost::asio::generic::stream_protocol::socket;
 
-    stream_link(socket_type socket, identity peer, const limits& bounds);
+    stream_link(socket_type socket, identity peer, const limits& bounds, std::unique_ptr<stream_codec> codec = nullptr);
 
+    /// Opens a link that has a codec. `opened` is called when it is open or has failed, unless it is closed before, and
+    /// never from inside this call.
+    void open(std::function<void(boost::system::error_code)> opened = nullptr);
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }
     std::string& urgent_output() override { return urgent_; }
@@ -40,10 +48,14 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void finish() override;
     void close() override;
     [[nodiscard]] std::size_t buffered() const noexcept override {
-        return input_.capacity() + output_.capacity() + urgent_.capacity() + sending_.capacity();
+        return input_.capacity() + output_.capacity() + urgent_.capacity() + sending_.capacity() + encoded_.capacity() +
+               (codec_ ? codec_->buffered() : 0);
     }
     void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return peer_; }
+    [[nodiscard]] std::string_view epoch() const noexcept override {
+        return codec_ && !opening_ ? codec_->epoch() : std::string_view{};
+    }
 
   private:
     enum class state : std::uint8_t { open, finishing, discarding, closed };
@@ -54,7 +66,11 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     bool hand_over_batch();
     [[nodiscard]] std::uint64_t written() const noexcept { return sent_ + unsent(); }
     void continue_later();
+    [[nodiscard]] bool decode();
+    void release_input();
+    [[nodiscard]] std::size_t send_encoded(boost::system::error_code& code);
     void write_rest();
+    void async_send(std::string_view bytes);
     void let_urgent_pass();
     void on_written(boost::system::error_code code, std::size_t count);
     void shut_down_output();
@@ -62,10 +78,17 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void watch_for_hangup();
     void on_error_condition();
     void lose(boost::system::error_code why);
+    // With a codec:
+    void continue_opening();
+    void on_opened();
+    void fail(boost::system::error_code why);
 
     socket_type socket_;
     identity peer_;
     limits bounds_;
+    std::unique_ptr<stream_codec> codec_; // null: lines are sent as they are
+    std::function<void(boost::system::error_code)> opened_;
+    boost::system::error_code failure_; // why it is lost
     std::shared_ptr<link_events> owner_;
     protocol::line_buffer input_;
     std::string output_;
@@ -73,16 +96,23 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     std::string sending_;   // what the socket did not take at once
     std::string discarded_; // buffer for input that is discarded
     std::size_t sending_at_ = 0;
+    std::string encoded_; // what the socket did not take at once, encoded
+    std::size_t encoded_at_ = 0;
+    std::size_t encoding_ = 0; // bytes of text in it
     boost::asio::steady_timer timeout_;
     std::uint64_t sent_ = 0;
     std::uint64_t received_ = 0;
     state state_ = state::open;
+    bool opening_ = false;   // by the codec
+    bool waiting_ = false;   // for the socket to take output
     bool reading_ = false;   // a read is pending
     bool shrinking_ = false; // and was cancelled, to continue with a smaller buffer
     bool handing_ = false;   // lines are being delivered, further up the stack
     bool posted_ = false;    // `hand_over` will continue
     bool paused_ = false;
-    bool ended_ = false; // the peer sends no more
+    bool ended_ = false;        // the peer sends no more
+    bool stream_ended_ = false; // the socket's stream has ended, with a codec
+    bool finished_ = false;     // the codec's output is complete
     bool end_reported_ = false;
     bool overlong_ = false;
 };

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "transport/tcp.hpp"
+
 #include "transport/ip_host.hpp"
 #include "transport/stream_endpoint.hpp"
 #include "transport/transports.hpp"
@@ -56,8 +58,8 @@ identity identify(stream_socket& socket, const url& where, const limits& bounds)
     notice_loss(socket, bounds);
     error_code gone;
     const auto peer = socket.remote_endpoint(gone);
-    return gone ? identity{.transport = "tcp", .address = {}, .name = {}, .uid = {}}
-                : identity_at("tcp", ip_endpoint(peer));
+    return gone ? identity{.transport = where.scheme, .address = {}, .name = {}, .uid = {}}
+                : identity_at(where.scheme, ip_endpoint(peer));
 }
 
 class tcp_transport final : public link_transport {
@@ -66,55 +68,65 @@ class tcp_transport final : public link_transport {
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
                                      const limits& bounds) override {
-        const tcp::endpoint endpoint{resolve(where), where.port};
-        listening_socket socket{executor};
-        socket.open(endpoint.protocol());
-        socket.set_option(asio::socket_base::reuse_address{true});
-        if (endpoint.address().is_v6()) {
-            socket.set_option(asio::ip::v6_only{true});
-        }
-        socket.bind(endpoint);
-        socket.listen();
-        auto local = url_of("tcp", ip_endpoint(socket.local_endpoint()));
-        return handle_of(std::make_shared<stream_acceptor>(
-            std::move(socket), std::move(local), bounds,
-            [where, bounds](stream_socket& accepted) { return identify(accepted, where, bounds); }));
+        return listen_tcp(executor, where, bounds);
     }
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
-        const auto dialler = std::make_shared<stream_dialler>(
-            executor, bounds, [where, bounds](stream_socket& made) { return identify(made, where, bounds); },
-            std::move(done));
-        const auto connect = [dialler, port = where.port](const std::vector<asio::ip::address>& found) {
-            std::vector<stream_address> endpoints;
-            endpoints.reserve(found.size());
-            for (const auto& address : found) {
-                endpoints.emplace_back(tcp::endpoint{address, port});
-            }
-            dialler->start(std::move(endpoints));
-        };
-        if (const auto literal = literal_address(where)) {
-            connect({*literal});
-            return [dialler] { dialler->give_up(); };
-        }
-        const auto lookup = std::make_shared<host_lookup>(executor);
-        lookup->start(where, bounds.connect,
-                      [dialler, connect](error_code code, const std::vector<asio::ip::address>& found) {
-                          if (code) {
-                              dialler->fail(code);
-                          } else {
-                              connect(found);
-                          }
-                      });
-        return [lookup, dialler] {
-            lookup->give_up();
-            dialler->give_up();
-        };
+        return dial_tcp(executor, where, bounds, std::move(done));
     }
 };
 
 } // namespace
+
+std::unique_ptr<acceptor> listen_tcp(const asio::any_io_executor& executor, const url& where, const limits& bounds,
+                                     codec_maker make_codec) {
+    const tcp::endpoint endpoint{resolve(where), where.port};
+    listening_socket socket{executor};
+    socket.open(endpoint.protocol());
+    socket.set_option(asio::socket_base::reuse_address{true});
+    if (endpoint.address().is_v6()) {
+        socket.set_option(asio::ip::v6_only{true});
+    }
+    socket.bind(endpoint);
+    socket.listen();
+    auto local = url_of(where.scheme, ip_endpoint(socket.local_endpoint()));
+    return handle_of(std::make_shared<stream_acceptor>(
+        std::move(socket), std::move(local), bounds,
+        [where, bounds](stream_socket& accepted) { return identify(accepted, where, bounds); }, std::move(make_codec)));
+}
+
+std::function<void()> dial_tcp(const asio::any_io_executor& executor, const url& where, const limits& bounds,
+                               dial_callback done, codec_maker make_codec) {
+    const auto dialler = std::make_shared<stream_dialler>(
+        executor, bounds, [where, bounds](stream_socket& made) { return identify(made, where, bounds); },
+        std::move(done), std::move(make_codec));
+    const auto connect = [dialler, port = where.port](const std::vector<asio::ip::address>& found) {
+        std::vector<stream_address> endpoints;
+        endpoints.reserve(found.size());
+        for (const auto& address : found) {
+            endpoints.emplace_back(tcp::endpoint{address, port});
+        }
+        dialler->start(std::move(endpoints));
+    };
+    if (const auto literal = literal_address(where)) {
+        connect({*literal});
+        return [dialler] { dialler->give_up(); };
+    }
+    const auto lookup = std::make_shared<host_lookup>(executor);
+    lookup->start(where, bounds.connect,
+                  [dialler, connect](error_code code, const std::vector<asio::ip::address>& found) {
+                      if (code) {
+                          dialler->fail(code);
+                      } else {
+                          connect(found);
+                      }
+                  });
+    return [lookup, dialler] {
+        lookup->give_up();
+        dialler->give_up();
+    };
+}
 
 std::unique_ptr<link_transport> make_tcp() { return std::make_unique<tcp_transport>(); }
 

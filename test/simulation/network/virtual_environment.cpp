@@ -144,7 +144,8 @@ std::unique_ptr<acceptor> virtual_environment::listen(const url& where, const li
     return std::make_unique<door>(where, open, [port] { port->accept(nullptr); });
 }
 
-std::function<void()> virtual_environment::dial(const url& where, const limits& bounds, dial_callback done) {
+std::function<void()> virtual_environment::dial(const url& where, std::string_view, const limits& bounds,
+                                                dial_callback done) {
     auto wanted = std::make_shared<bool>(true);
     const auto to = endpoint_of(where);
     auto arrive = [this, wanted, done = std::move(done)](boost::system::error_code code, const link_ptr& made) {

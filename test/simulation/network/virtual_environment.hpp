@@ -41,7 +41,8 @@ class virtual_environment final : public core::environment {
     [[nodiscard]] bool has_transport(std::string_view scheme) const override;
     [[nodiscard]] bool is_exposed(const url&) const override { return true; }
     std::unique_ptr<acceptor> listen(const url& where, const limits& bounds) override;
-    std::function<void()> dial(const url& where, const limits& bounds, dial_callback done) override;
+    std::function<void()> dial(const url& where, std::string_view name, const limits& bounds,
+                               dial_callback done) override;
 
     [[nodiscard]] std::string local_scope() const override { return "simulation"; }
     [[nodiscard]] bool is_open(const std::string&) const override { return false; }

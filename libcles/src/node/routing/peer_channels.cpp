@@ -19,6 +19,14 @@ constexpr std::string_view undiscovered = "undiscovered:";
 // Key suffix after a URL, which contains no zero byte: the links for urgent requests.
 constexpr std::string_view urgent_suffix{"\0urgent", 7};
 
+// Key suffix after a URL: the links that lead to the node of this name, and to no other that answers there.
+std::string name_suffix(std::string_view name) { return name.empty() ? std::string{} : '\0' + std::string{name}; }
+
+// The name that the transport has to check. An address that was given without one may be anybody's.
+std::string_view name_to_check(std::string_view target, std::string_view at, std::string_view address) {
+    return at.empty() && address.starts_with("tls://") ? target : std::string_view{};
+}
+
 } // namespace
 
 // -- one channel ---------------------------------------------------------------------------------------------------
@@ -111,7 +119,7 @@ void peer_channel::dial() {
     if (give_up_ || !where_) {
         return;
     }
-    give_up_ = host_->environment().dial(*where_, host_->bounds(),
+    give_up_ = host_->environment().dial(*where_, name_, host_->bounds(),
                                          [weak = weak_from_this()](boost::system::error_code code, link_ptr made) {
                                              if (const auto self = weak.lock()) {
                                                  self->on_dialled(code, std::move(made));
@@ -288,13 +296,14 @@ peer_channel* peer_channels::find(std::string_view target, std::string_view at, 
     try {
         const auto address = at.empty() ? address_of(target) : std::string{at};
         const bool waits = at.empty() && address.starts_with(undiscovered);
-        const auto key = urgent && !waits ? address + std::string{urgent_suffix} : address;
+        const auto name = name_to_check(target, at, address);
+        const auto key = address + name_suffix(name) + (urgent && !waits ? std::string{urgent_suffix} : std::string{});
         if (const auto found = channels_.find(key); found != channels_.end()) {
             return found->second.get();
         }
         const auto where = waits ? std::nullopt : std::optional{checked_url(address)};
-        auto made = std::make_shared<peer_channel>(host_.shared_from_this(),
-                                                   where ? to_string(*where) : std::string{target}, where);
+        auto made = std::make_shared<peer_channel>(
+            host_.shared_from_this(), where ? to_string(*where) : std::string{target}, where, std::string{name});
         if (waits) {
             host_.discovery().solicit(target);
         }

@@ -32,8 +32,9 @@ class local_node;
 class peer_channel : public std::enable_shared_from_this<peer_channel> {
   public:
     /// Without a URL, to a node that is not discovered yet: holds its requests until `hand_over` or `fail`.
-    peer_channel(std::shared_ptr<local_node> host, std::string address, std::optional<url> where)
-        : host_(std::move(host)), address_(std::move(address)), where_(std::move(where)) {}
+    /// \param name of the node that must answer there; empty: any
+    peer_channel(std::shared_ptr<local_node> host, std::string address, std::optional<url> where, std::string name)
+        : host_(std::move(host)), address_(std::move(address)), where_(std::move(where)), name_(std::move(name)) {}
 
     /// Receives a link, or null with an error code and a message.
     using ready_function =
@@ -93,6 +94,7 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     std::shared_ptr<local_node> host_;
     std::string address_;      // its URL, or the node
     std::optional<url> where_; // nothing: not known yet
+    std::string name_;         // of the node that must answer there, if any
     std::vector<std::shared_ptr<connection>> links_;
     waiting_requests requests_;
     std::list<waiting_feed> feeds_; // that wait for a link
@@ -139,7 +141,7 @@ class peer_channels {
 
     local_node& host_;
     std::map<std::string, std::string, std::less<>> directory_;                  // the configured URLs, by node
-    std::map<std::string, std::shared_ptr<peer_channel>, std::less<>> channels_; // by URL, and whether urgent
+    std::map<std::string, std::shared_ptr<peer_channel>, std::less<>> channels_; // by URL, name, and whether urgent
     std::string recent_target_; // most requests have the same target as the last
     peer_channel* recent_ = nullptr;
 };

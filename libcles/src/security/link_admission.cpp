@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "security/link_admission.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "protocol/reply_line.hpp"
+#include "protocol/request_line.hpp"
+#include "security/roster.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::security {
+namespace {
+
+constexpr std::size_t max_short_line = 1024; // any but the roster's
+constexpr std::size_t max_quoted = 200;      // of what the other end says
+constexpr std::string_view roster_head = "PUSH self:cles/roster reply=no ";
+
+struct hello {
+    std::uint32_t version = 0;
+    std::string epoch{};
+};
+
+void append_push(std::string& out, std::string_view noun, std::string_view body = {}) {
+    protocol::append_request(out, {.verb = verb::push, .noun = noun, .wants_reply = false, .body = body});
+}
+
+void append_refusal(std::string& out, errc code, const std::string& message) {
+    protocol::append_failure(out, {.code = code, .message = message});
+    out.push_back('\n');
+}
+
+std::optional<hello> read_hello(std::string_view body) {
+    hello said;
+    json_reader reader{body};
+    std::string_view key;
+    reader.begin_object();
+    while (reader.next_key(key)) {
+        std::string_view raw;
+        if (key == "version" && said.version == 0 && reader.read_raw(raw)) {
+            said.version = static_cast<std::uint32_t>(protocol::number_between(raw, 1, max_version).value_or(0));
+            if (said.version == 0) {
+                return std::nullopt;
+            }
+        } else if (key == "epoch" && said.epoch.empty() && reader.read(raw)) {
+            if (!protocol::parse_epoch(raw)) {
+                return std::nullopt;
+            }
+            said.epoch = raw;
+        } else {
+            reader.skip();
+        }
+    }
+    return reader.at_end() && said.version != 0 && !said.epoch.empty() ? std::optional{said} : std::nullopt;
+}
+
+// The message of a failure, without control characters.
+std::string quoted_message(std::string_view body) {
+    protocol::failure said;
+    if (!protocol::parse_failure(body, said)) {
+        return {};
+    }
+    said.message.resize(std::min(said.message.size(), max_quoted));
+    for (auto& c : said.message) {
+        if (static_cast<unsigned char>(c) < ' ' || c == '\x7F') {
+            c = '?';
+        }
+    }
+    return said.message;
+}
+
+} // namespace
+
+link_admission::link_admission(std::shared_ptr<admission_terms> terms, std::string expected)
+    : terms_(std::move(terms)), expected_(std::move(expected)) {}
+
+link_admission::~link_admission() { release_roster(); }
+
+void link_admission::begin(const public_key& peer, std::string& out) {
+    key_ = peer;
+    stated_ = terms_->fleet->in_force().version();
+    append_push(out, "self:cles/hello",
+                R"({"version":)" + std::to_string(stated_) + R"(,"epoch":")" + terms_->epoch + R"("})");
+}
+
+std::size_t link_admission::max_line() const noexcept {
+    return stage_ == stage::roster ? roster_head.size() + max_roster_line : max_short_line;
+}
+
+link_admission::verdict link_admission::on_line(std::string_view line, std::string& out) {
+    if (protocol::is_failure(line)) {
+        return refuse(reason::by_peer, "the other end refused the link: " + quoted_message(line));
+    }
+    protocol::request_line said;
+    protocol::malformed_request wrong;
+    if (protocol::parse_request(line, said, wrong) && said.verb == verb::push && said.noun.target == "self" &&
+        said.noun.task == "cles" && said.noun.parameters.size() == 1 && !said.wants_reply) {
+        const auto what = said.noun.parameters.front();
+        if (stage_ == stage::hello && what == "hello") {
+            return on_hello(said.body, out);
+        }
+        if (stage_ == stage::roster && what == "roster") {
+            return on_roster(said.body, out);
+        }
+        if (stage_ == stage::welcome && what == "welcome") {
+            return on_welcome();
+        }
+    }
+    return refuse(reason::protocol, "the other end sent another line before its welcome");
+}
+
+// Both ends compare the versions that were stated, so that they agree on who sends a roster, even if one of them has
+// received a newer one meanwhile.
+link_admission::verdict link_admission::on_hello(std::string_view body, std::string& out) {
+    const auto said = read_hello(body);
+    if (!said) {
+        return refuse(reason::protocol, "the other end's hello is malformed");
+    }
+    epoch_ = said->epoch;
+    if (said->version > stated_) {
+        if (find_peer() == nullptr) {
+            if (terms_->rosters_of_strangers >= admission_terms::max_rosters_of_strangers) {
+                append_refusal(out, errc::busy, "too many rosters arrive at the same time");
+                return refuse(reason::busy, "too many rosters arrive at the same time");
+            }
+            ++terms_->rosters_of_strangers;
+            counted_ = true;
+        }
+        stage_ = stage::roster;
+        return verdict::pending;
+    }
+    if (said->version < stated_ && find_peer() != nullptr) {
+        out.append(roster_head).append(terms_->fleet->in_force().line()).push_back('\n');
+    }
+    return look_up(out);
+}
+
+link_admission::verdict link_admission::on_roster(std::string_view body, std::string& out) {
+    release_roster();
+    std::string why;
+    if (terms_->fleet->offer(body, &why) == fleet::verdict::refused) {
+        append_refusal(out, errc::denied, "the roster was refused: " + why);
+        return refuse(reason::not_member, "the other end's roster was refused: " + why);
+    }
+    return look_up(out);
+}
+
+link_admission::verdict link_admission::look_up(std::string& out) {
+    const auto* found = find_peer();
+    if (found == nullptr) {
+        const auto version = std::to_string(terms_->fleet->in_force().version());
+        append_refusal(out, errc::denied, "the key of this node is not in roster " + version);
+        return refuse(reason::not_member, "the other end's key is not in roster " + version);
+    }
+    if (!expected_.empty() && found->name != expected_) {
+        return refuse(reason::other_name, "the other end is " + found->name + ", not " + expected_);
+    }
+    name_ = found->name;
+    number_ = found->number;
+    if (const auto* self = terms_->fleet->self()) {
+        own_number_ = self->number;
+    }
+    append_push(out, "self:cles/welcome");
+    stage_ = stage::welcome;
+    return verdict::pending;
+}
+
+link_admission::verdict link_admission::on_welcome() {
+    if (!is_in_force()) {
+        return refuse(reason::not_member, "a member was removed while the link was opened");
+    }
+    stage_ = stage::done;
+    return verdict::admitted;
+}
+
+link_admission::verdict link_admission::refuse(reason r, std::string why) {
+    release_roster();
+    stage_ = stage::done;
+    reason_ = r;
+    why_ = std::move(why);
+    return verdict::refused;
+}
+
+const member* link_admission::find_peer() { return terms_->fleet->in_force().find(key_); }
+
+bool link_admission::is_in_force() const {
+    const auto* peer = terms_->fleet->in_force().find(key_);
+    const auto* self = terms_->fleet->self();
+    return peer != nullptr && peer->number == number_ && peer->name == name_ &&
+           (!own_number_ || (self != nullptr && self->number == *own_number_));
+}
+
+void link_admission::release_roster() noexcept {
+    if (std::exchange(counted_, false)) {
+        --terms_->rosters_of_strangers;
+    }
+}
+
+} // namespace cles::security

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/link.hpp>
+
+#include "security/fleet.hpp"
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+
+namespace cles::tls {
+
+struct tls_options {
+    std::shared_ptr<security::fleet> fleet; ///< of the node; used on the executor of its links
+    std::string epoch;                      ///< of the node
+    /// Receives, for people, why a link was refused.
+    std::function<void(std::string_view)> report{};
+};
+
+/// `tls://host:port` for one node (docs/security.md, "Streams"). The peer of a link is the member that its key belongs
+/// to, and the link ends when the roster no longer has that member, or this node.
+/// \throws security::security_error if OpenSSL refuses the key
+std::unique_ptr<link_transport> make_tls_transport(tls_options options);
+
+} // namespace cles::tls
