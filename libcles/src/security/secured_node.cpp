@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "security/secured_node.hpp"
+
+#include <cles/error.hpp>
+
+#include "protocol/request_line.hpp"
+#include "security/rules_file.hpp"
+#include "security/sealed_group_port.hpp"
+#include "security/signed_text.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <sys/stat.h>
+
+namespace cles::security {
+
+secured_node::secured_node(const std::string& directory) : directory_(directory) {
+    auto found = directory_.read_node();
+    warnings_ = std::move(found.warnings);
+    fleet_ = std::make_shared<security::fleet>(found.own.name, std::move(found.own.key), std::move(found.newest));
+    datagrams_ = std::make_shared<sealed_datagrams>(*fleet_);
+    read_rules();
+    files_ = file_state();
+}
+
+secured_node::~secured_node() = default;
+
+void secured_node::log(log_level level, std::string text) const {
+    if (observer_ != nullptr) {
+        observer_->on_security_log(level, std::move(text));
+    }
+}
+
+// -- its node ------------------------------------------------------------------------------------------------------
+
+void secured_node::begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
+                         core::security_observer& observer) {
+    if (name != fleet_->name()) {
+        throw error(errc::invalid_name, "the key in " + directory_.folder().path() + " is that of '" + fleet_->name() +
+                                            "', and this node is '" + std::string{name} + "'");
+    }
+    observer_ = &observer;
+    *epoch_text_ = protocol::epoch_text(epoch);
+    datagrams_->begin(epoch, time,
+                      {.due =
+                           [this](time_point at) {
+                               next_datagrams_ = at;
+                               if (observer_ != nullptr) {
+                                   observer_->on_due(at);
+                               }
+                           },
+                       .stated =
+                           [this](std::uint32_t number, std::uint32_t version) {
+                               const auto* const who = fleet_->in_force().find(number);
+                               if (who != nullptr && observer_ != nullptr) {
+                                   observer_->on_stated_roster(who->name, version);
+                               }
+                           }});
+    for (auto& each : std::exchange(warnings_, {})) {
+        log(log_level::warning, std::move(each));
+    }
+    if (rules_.denies_everything()) {
+        log(log_level::error, "every request is denied: " + rules_.error());
+    }
+    store(); // what came in a .join file
+    next_check_ = time.now() + check_interval;
+    observer.on_due(next_check_);
+}
+
+void secured_node::end() {
+    observer_ = nullptr;
+    datagrams_->end();
+}
+
+void secured_node::on_time(time_point now) {
+    if (now >= next_datagrams_) {
+        next_datagrams_ = time_point::max();
+        datagrams_->on_time(now);
+    }
+    if (now >= next_check_) {
+        next_check_ = now + check_interval;
+        check_files();
+    }
+    if (observer_ != nullptr) {
+        observer_->on_due(std::min(next_check_, next_datagrams_));
+    }
+}
+
+// -- who may do what -----------------------------------------------------------------------------------------------
+
+bool secured_node::is_member(std::string_view name) const { return fleet_->in_force().find(name) != nullptr; }
+
+bool secured_node::allows(std::string_view requester, std::string_view provider, verb how,
+                          const protocol::noun_view& noun) const {
+    if (requester == name() && provider == name()) {
+        return true;
+    }
+    noun_.assign(provider, noun);
+    return requester == name() ? policy_->sent({}, how, noun_).allowed()
+                               : policy_->received(requester, {}, how, noun_).allowed();
+}
+
+bool secured_node::may_forward(std::string_view forwarder, std::string_view requester) const {
+    return is_member(requester) && policy_->may_forward(forwarder, requester);
+}
+
+// -- signatures ----------------------------------------------------------------------------------------------------
+
+std::string secured_node::sign_update(std::string_view path, std::uint64_t seq, std::string_view epoch,
+                                      std::string_view body) const {
+    return sign(fleet_->own_key(), fleet_->in_force().fleet(),
+                signed_update{.publisher = name(), .noun = path, .seq = seq, .epoch = epoch, .body = body});
+}
+
+bool secured_node::is_signed(std::string_view publisher, std::string_view path, std::uint64_t seq,
+                             std::string_view epoch, std::string_view body, std::string_view sig) const {
+    const auto* const who = fleet_->in_force().find(publisher);
+    return who != nullptr &&
+           verify(who->key, fleet_->in_force().fleet(),
+                  signed_update{.publisher = publisher, .noun = path, .seq = seq, .epoch = epoch, .body = body}, sig);
+}
+
+std::shared_ptr<core::group_port> secured_node::seal(std::shared_ptr<core::group_port> port) {
+    return std::make_shared<sealed_group_port>(datagrams_, std::move(port),
+                                               [this](std::uint32_t member, const std::vector<std::string>& endpoints) {
+                                                   report_unanswered(member, endpoints);
+                                               });
+}
+
+void secured_node::report_unanswered(std::uint32_t member, const std::vector<std::string>& endpoints) const {
+    const auto* const who = fleet_->in_force().find(member);
+    if (who != nullptr && observer_ != nullptr) {
+        observer_->on_unanswered(who->name, endpoints);
+    }
+}
+
+// -- rosters -------------------------------------------------------------------------------------------------------
+
+std::optional<std::string> secured_node::offer_roster(std::string_view line) {
+    std::string why;
+    const auto found = fleet_->offer(line, &why);
+    if (found == fleet::verdict::refused) {
+        return why;
+    }
+    if (!why.empty()) {
+        log(log_level::error, why);
+    }
+    if (found == fleet::verdict::adopted) {
+        log(log_level::info, "version " + std::to_string(roster_version()) + " of the roster is in force");
+        store();
+        adopt_changes();
+    }
+    return {};
+}
+
+bool secured_node::wants_roster(std::string_view from, std::uint32_t version, time_point now) {
+    if (version <= roster_version() || !is_member(from)) {
+        return false;
+    }
+    auto at = asked_.find(from);
+    if (at == asked_.end()) {
+        at = asked_.emplace(std::string{from}, asked_member{}).first;
+    } else if (at->second.version >= version && now - at->second.at < ask_again_after) {
+        return false;
+    }
+    at->second = {.version = version, .at = now};
+    return true;
+}
+
+// A node that cannot store it goes on with it, and receives it again after a restart.
+void secured_node::store() {
+    try {
+        static_cast<void>(directory_.store_roster(fleet_->in_force()));
+    } catch (const security_error& e) {
+        log(log_level::error, std::string{"the roster cannot be stored: "} + e.what());
+    }
+    files_ = file_state();
+}
+
+void secured_node::adopt_changes() {
+    policy_ = std::make_unique<access_policy>(name(), fleet_->share(), rules_);
+    std::erase_if(asked_, [this](const auto& each) { return !is_member(each.first); });
+    if (observer_ != nullptr) {
+        observer_->on_security_changed();
+    }
+}
+
+// -- files ---------------------------------------------------------------------------------------------------------
+
+void secured_node::read_rules() {
+    rules_ = read_local_rules(directory_.folder());
+    policy_ = std::make_unique<access_policy>(name(), fleet_->share(), rules_);
+}
+
+// Which files there are, and when they were changed: enough to see whether to read them.
+std::string secured_node::file_state() const {
+    std::vector<std::string> names{"rules", "roster"};
+    try {
+        for (auto& each : directory_.folder().names_ending(".join")) {
+            names.push_back(std::move(each));
+        }
+    } catch (const security_error&) { // reported when they are read
+    }
+    std::string state;
+    for (const auto& each : names) {
+        struct stat what {};
+        if (::lstat(directory_.folder().path_of(each).c_str(), &what) == 0) {
+            state.append(each);
+            for (const auto part :
+                 {static_cast<long long>(what.st_ino), static_cast<long long>(what.st_size),
+                  static_cast<long long>(what.st_mtim.tv_sec), static_cast<long long>(what.st_mtim.tv_nsec),
+                  static_cast<long long>(what.st_mode), static_cast<long long>(what.st_uid)}) {
+                state.append(" ").append(std::to_string(part));
+            }
+            state.push_back('\n');
+        }
+    }
+    return state;
+}
+
+void secured_node::check_files() {
+    if (auto now = file_state(); now == files_) {
+        return;
+    } else {
+        files_ = std::move(now);
+    }
+    rules_ = read_local_rules(directory_.folder());
+    if (rules_.denies_everything()) {
+        log(log_level::error, "every request is denied: " + rules_.error());
+    }
+    try {
+        std::vector<std::string> warnings;
+        const auto newest = directory_.read_newest_roster(warnings);
+        for (auto& each : warnings) {
+            log(log_level::warning, std::move(each));
+        }
+        if (newest && newest->version() > roster_version()) {
+            if (const auto why = offer_roster(newest->line())) {
+                log(log_level::error, "a roster in " + directory_.folder().path() + " is refused: " + *why);
+            }
+        }
+    } catch (const security_error& e) {
+        log(log_level::error, e.what());
+    }
+    adopt_changes();
+}
+
+} // namespace cles::security

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "port/node_security.hpp"
+#include "security/access_policy.hpp"
+#include "security/fleet.hpp"
+#include "security/key_directory.hpp"
+#include "security/sealed_datagrams.hpp"
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::security {
+
+/// The security of a node, from its directory: its key, the roster in force, the local rules, and what it seals. It
+/// stores newer rosters there, and notices when somebody else changes the rules or adds a roster.
+class secured_node final : public core::node_security {
+  public:
+    /// How often the files are looked at.
+    static constexpr std::chrono::seconds check_interval{1};
+    /// How long a member that did not deliver its roster is not asked again.
+    static constexpr std::chrono::minutes ask_again_after{1};
+
+    /// \throws security_error
+    explicit secured_node(const std::string& directory);
+    ~secured_node() override;
+
+    [[nodiscard]] const std::string& name() const noexcept { return fleet_->name(); }
+    [[nodiscard]] const std::shared_ptr<security::fleet>& members() const noexcept { return fleet_; }
+    /// As `begin` was told: eight hexadecimal digits.
+    [[nodiscard]] const std::shared_ptr<std::string>& epoch() const noexcept { return epoch_text_; }
+    [[nodiscard]] const std::shared_ptr<sealed_datagrams>& datagrams() const noexcept { return datagrams_; }
+    /// Writes to the node's log.
+    void log(log_level level, std::string text) const;
+
+    // node_security
+    void begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
+               core::security_observer& observer) override;
+    void end() override;
+    void on_time(time_point now) override;
+    [[nodiscard]] bool is_member(std::string_view name) const override;
+    [[nodiscard]] bool allows(std::string_view requester, std::string_view provider, verb how,
+                              const protocol::noun_view& noun) const override;
+    [[nodiscard]] bool may_forward(std::string_view forwarder, std::string_view requester) const override;
+    [[nodiscard]] std::string sign_update(std::string_view path, std::uint64_t seq, std::string_view epoch,
+                                          std::string_view body) const override;
+    [[nodiscard]] bool is_signed(std::string_view publisher, std::string_view path, std::uint64_t seq,
+                                 std::string_view epoch, std::string_view body, std::string_view sig) const override;
+    [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
+    [[nodiscard]] std::uint32_t roster_version() const override { return fleet_->in_force().version(); }
+    [[nodiscard]] const std::string& roster_line() const override { return fleet_->in_force().line(); }
+    std::optional<std::string> offer_roster(std::string_view line) override;
+    bool wants_roster(std::string_view from, std::uint32_t version, time_point now) override;
+
+  private:
+    struct asked_member {
+        std::uint32_t version = 0;
+        time_point at{};
+    };
+
+    void adopt_changes();
+    void store();
+    void read_rules();
+    void check_files();
+    [[nodiscard]] std::string file_state() const;
+    void report_unanswered(std::uint32_t member, const std::vector<std::string>& endpoints) const;
+
+    key_directory directory_;
+    std::vector<std::string> warnings_; // of the start
+    std::shared_ptr<security::fleet> fleet_;
+    local_rules rules_;
+    std::unique_ptr<access_policy> policy_;
+    mutable decoded_noun noun_; // scratch space
+    std::shared_ptr<sealed_datagrams> datagrams_;
+    std::shared_ptr<std::string> epoch_text_ = std::make_shared<std::string>();
+    core::security_observer* observer_ = nullptr;
+    std::map<std::string, asked_member, std::less<>> asked_;
+    std::string files_; // the state of the files at the last check
+    time_point next_check_{};
+    time_point next_datagrams_{time_point::max()};
+};
+
+} // namespace cles::security
