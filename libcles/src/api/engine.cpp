@@ -26,11 +26,13 @@ namespace cles::detail {
 namespace {
 
 core::local_node_options options_of(service_options&& all, asio_port::asio_environment& by) {
+    const auto epoch = by.random();
     return {.node = {.name = std::move(all.name),
                      .pool = std::move(all.pool),
+                     .epoch = epoch,
                      .bounds = all.limits,
                      .authorise = std::move(all.authorise),
-                     .security = all.security ? all.security->equip(by) : nullptr,
+                     .security = all.security ? all.security->equip(by, epoch) : nullptr,
                      .log = std::move(all.log),
                      .metrics = std::move(all.metrics),
                      .load = std::move(all.load)},

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 namespace cles::asio_port {
@@ -22,8 +23,9 @@ class security_part {
     security_part& operator=(const security_part&) = delete;
     virtual ~security_part() = default;
 
-    /// Adds its transports to the service's environment. Called once.
-    virtual std::shared_ptr<core::node_security> equip(asio_port::asio_environment& environment) = 0;
+    /// Adds its transports to the service's environment. Called once. \throws cles::error
+    virtual std::shared_ptr<core::node_security> equip(asio_port::asio_environment& environment,
+                                                       std::uint32_t epoch) = 0;
 };
 
 } // namespace cles::detail

@@ -71,7 +71,7 @@ node_options complete(node_options setup, const std::shared_ptr<environment>& by
     // Leaves space for the ids that one incarnation may draw, and is small enough for clients that read numbers as
     // doubles.
     constexpr std::uint64_t apart = 1U << 20U;
-    setup.epoch = by->random();
+    setup.epoch = setup.epoch != 0 ? setup.epoch : by->random();
     setup.first_datagram_id = std::uint64_t{by->random()} * apart;
     setup.complete = [drain = std::make_shared<completion_drain>(by)](completion due) { drain->put(std::move(due)); };
     return setup;

@@ -32,7 +32,7 @@ class node_security;
 struct node_options {
     std::string name;
     std::string pool{};                  ///< empty: the pool without a name
-    std::uint32_t epoch = 0;             ///< random for each incarnation
+    std::uint32_t epoch = 0;             ///< random for each incarnation; 0: the node draws it
     std::uint64_t first_datagram_id = 0; ///< likewise; request ids by datagram count from here
     cles::limits bounds{};
     authoriser authorise{};

@@ -3,7 +3,6 @@
 
 #include <cles/error.hpp>
 
-#include "protocol/request_line.hpp"
 #include "security/rules_file.hpp"
 #include "security/sealed_group_port.hpp"
 #include "security/signed_text.hpp"
@@ -41,7 +40,6 @@ void secured_node::begin(std::string_view name, std::uint32_t epoch, const core:
                                             "', and this node is '" + std::string{name} + "'");
     }
     observer_ = &observer;
-    *epoch_text_ = protocol::epoch_text(epoch);
     datagrams_->begin(epoch, time,
                       {.due =
                            [this](time_point at) {

@@ -32,8 +32,6 @@ class secured_node final : public core::node_security {
 
     [[nodiscard]] const std::string& name() const noexcept { return fleet_->name(); }
     [[nodiscard]] const std::shared_ptr<security::fleet>& members() const noexcept { return fleet_; }
-    /// As `begin` was told: eight hexadecimal digits.
-    [[nodiscard]] const std::shared_ptr<std::string>& epoch() const noexcept { return epoch_text_; }
     [[nodiscard]] const std::shared_ptr<sealed_datagrams>& datagrams() const noexcept { return datagrams_; }
     /// Writes to the node's log.
     void log(log_level level, std::string text) const;
@@ -77,7 +75,6 @@ class secured_node final : public core::node_security {
     std::unique_ptr<access_policy> policy_;
     mutable decoded_noun noun_; // scratch space
     std::shared_ptr<sealed_datagrams> datagrams_;
-    std::shared_ptr<std::string> epoch_text_ = std::make_shared<std::string>();
     core::security_observer* observer_ = nullptr;
     std::map<std::string, asked_member, std::less<>> asked_;
     std::string files_; // the state of the files at the last check

@@ -3,6 +3,8 @@
 
 #include <cles/link.hpp>
 
+#include <cstdint>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -11,9 +13,13 @@ namespace cles::transport {
 /// The maximum number of lines per turn of one link, so that a flooded one leaves others their turn.
 inline constexpr int lines_per_turn = 1024;
 
-/// `unix:///path` (a socket file, for its owner only; one on which nothing listens any more is replaced) and
-/// `unix://@name` (abstract). The kernel reports the peer's user id.
-std::unique_ptr<link_transport> make_unix();
+/// The names of nodes as which users connect, by user id.
+using user_names = std::map<std::uint32_t, std::string>;
+
+/// `unix:///path` (a socket file; one on which nothing listens any more is replaced) and `unix://@name` (abstract). The
+/// kernel reports the peer's user id; a user in `users` has that name. A file is for its owner only, unless `users` has
+/// others, besides root.
+std::unique_ptr<link_transport> make_unix(user_names users = {});
 
 /// `udp://host:port`: requests, replies and updates as one datagram each.
 std::unique_ptr<link_transport> make_udp();

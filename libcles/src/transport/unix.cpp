@@ -5,6 +5,7 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 
@@ -31,12 +32,15 @@ identity identify(const std::string& address) {
     return {.transport = "unix", .address = address, .name = {}, .uid = {}, .local = true};
 }
 
-identity identify_client(stream_socket& socket, const std::string& address) {
+identity identify_client(stream_socket& socket, const std::string& address, const user_names& users) {
     auto who = identify(address);
     ucred credentials{};
     socklen_t size = sizeof credentials;
     if (::getsockopt(socket.native_handle(), SOL_SOCKET, SO_PEERCRED, &credentials, &size) == 0) {
         who.uid = credentials.uid;
+        if (const auto known = users.find(credentials.uid); known != users.end()) {
+            who.name = known->second;
+        }
     }
     return who;
 }
@@ -58,9 +62,10 @@ bool is_stale(const std::string& path, const stream_address& endpoint) {
 // Removes its socket file.
 class unix_acceptor final : public stream_acceptor {
   public:
-    unix_acceptor(listening_socket socket, const url& where, const limits& bounds)
-        : stream_acceptor(std::move(socket), where, bounds,
-                          [address = to_string(where)](stream_socket& s) { return identify_client(s, address); }) {
+    unix_acceptor(listening_socket socket, const url& where, const limits& bounds, const user_names& users)
+        : stream_acceptor(std::move(socket), where, bounds, [address = to_string(where), users](stream_socket& s) {
+              return identify_client(s, address, users);
+          }) {
         struct stat made {};
         if (!where.path.starts_with('@') && ::stat(where.path.c_str(), &made) == 0) {
             device_ = made.st_dev;
@@ -86,6 +91,8 @@ class unix_acceptor final : public stream_acceptor {
 
 class unix_transport final : public link_transport {
   public:
+    explicit unix_transport(user_names users) : users_(std::move(users)) {}
+
     [[nodiscard]] bool is_exposed(const url&) const override { return false; }
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
@@ -94,16 +101,16 @@ class unix_transport final : public link_transport {
         listening_socket socket{executor};
         socket.open(endpoint.protocol());
         error_code code;
-        bind_privately(socket, endpoint, code);
+        bind(socket, endpoint, code);
         if (code == asio::error::address_in_use && !where.path.starts_with('@') && is_stale(where.path, endpoint)) {
             ::unlink(where.path.c_str());
-            bind_privately(socket, endpoint, code);
+            bind(socket, endpoint, code);
         }
         if (code) {
             throw boost::system::system_error{code};
         }
         socket.listen();
-        return handle_of(std::make_shared<unix_acceptor>(std::move(socket), where, bounds));
+        return handle_of(std::make_shared<unix_acceptor>(std::move(socket), where, bounds, users_));
     }
 
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
@@ -121,14 +128,22 @@ class unix_transport final : public link_transport {
 
   private:
     // The file must never have wider permissions, not even for a moment: fchmod before bind sets those that it gets.
-    static void bind_privately(listening_socket& socket, const stream_address& endpoint, error_code& code) {
-        ::fchmod(socket.native_handle(), S_IRUSR | S_IWUSR);
+    void bind(listening_socket& socket, const stream_address& endpoint, error_code& code) const {
+        constexpr mode_t owner = S_IRUSR | S_IWUSR;
+        constexpr mode_t everybody = owner | S_IRGRP | S_IWGRP | S_IROTH | S_IWOTH;
+        const bool has_others =
+            std::ranges::any_of(users_, [](const auto& each) { return each.first != 0 && each.first != ::geteuid(); });
+        ::fchmod(socket.native_handle(), has_others ? everybody : owner);
         socket.bind(endpoint, code);
     }
+
+    user_names users_;
 };
 
 } // namespace
 
-std::unique_ptr<link_transport> make_unix() { return std::make_unique<unix_transport>(); }
+std::unique_ptr<link_transport> make_unix(user_names users) {
+    return std::make_unique<unix_transport>(std::move(users));
+}
 
 } // namespace cles::transport

@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+
+/// Security for services (docs/security.md). Link the CMake target cles::tls.
+
+namespace cles {
+
+namespace detail {
+class security_part;
+}
+
+struct security_options {
+    /// The node's directory: its key, the roster of its fleet, and local rules. `cles keys new` and `cles fleet` make
+    /// these files.
+    std::string directory;
+    /// Which members other users of this host are, by user id, when they connect to a Unix socket of the node. Root and
+    /// the user of the process count as the node itself; all others are refused.
+    std::map<std::uint32_t, std::string> local_users{};
+};
+
+/// The security of one service, for `service_options::security`:
+///
+/// ```
+/// cles::service car{io, {.name = "car1", .listen = {"tls://0.0.0.0:25370"}, .security =
+/// cles::secured("/etc/cles/keys")}};
+/// ```
+///
+/// The service's name must be the one of the key. It listens and connects by `tls` and Unix sockets, and refuses plain
+/// TCP and UDP. What it receives from its multicast group must be sealed by a member. Members may do what the roster
+/// and the local rules permit; changes of both take effect without a restart.
+///
+/// \throws cles::error with `denied` if the files cannot be used; the message names the file and what mends it
+std::shared_ptr<detail::security_part> secured(security_options options);
+std::shared_ptr<detail::security_part> secured(const std::string& directory);
+
+} // namespace cles
