@@ -9,6 +9,7 @@
 #include "daemon/command_line.hpp"
 #include "daemon/daemon.hpp"
 #include "daemon/daemon_log.hpp"
+#include "daemon/daemon_security.hpp"
 #include "daemon/service_manager.hpp"
 #include "plugins/plugin_trial.hpp"
 
@@ -62,6 +63,7 @@ config_sources sources_of(const command_line_options& wanted) {
 
 // Plugins are tried, each in a process of its own, but not started: a running daemon may use their devices.
 int check_plugins(config setup) {
+    security_of(setup); // only reads the files
     try_plugins(setup);
     for (const auto& plugin : setup.plugins) {
         if (!plugin.trial_error.empty()) {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <set>
+#include <string_view>
 
 namespace cles::runtime {
 namespace {
@@ -19,6 +20,16 @@ std::string to_valid_node_name(const std::string& host) {
         c = valid ? c : '-';
     }
     return name.empty() || name == "self" || name == "any" || name == "all" ? "node" : name;
+}
+
+void check_url(const config& setup, const std::string& key, const std::string& text) {
+    const auto where = parse_url(text);
+    if (where.scheme == "tls" && !setup.security.is_on()) {
+        throw config_error(setup.location_of(key), "'" + text + "' requires 'security'");
+    }
+    if ((where.scheme == "tcp" || where.scheme == "udp") && setup.security.is_on()) {
+        throw config_error(setup.location_of(key), "'" + text + "' is refused with 'security': use 'tls'");
+    }
 }
 
 void check_exposure(const config& setup, const std::string& key, const std::string& text) {
@@ -54,11 +65,39 @@ config default_config(const std::string& host, std::uint32_t cores) {
     return made;
 }
 
+void apply_security_defaults(config& setup) {
+    if (!setup.security.is_on()) {
+        return;
+    }
+    const auto is_set = [&](std::string_view key) {
+        return std::ranges::any_of(setup.origins, [key](const auto& origin) {
+            const auto& known = origin.first;
+            return known == key || known.starts_with(std::string{key} + "[") ||
+                   known.starts_with(std::string{key} + ".");
+        });
+    };
+    if (!is_set("listen")) {
+        setup.listen = {"tls://0.0.0.0:25370"};
+    }
+    if (!is_set("multicast")) {
+        setup.multicast.interface = "auto";
+    }
+}
+
 void check(const config& setup) {
     for (std::size_t i = 0; i < setup.listen.size(); ++i) {
-        check_exposure(setup, "listen[" + std::to_string(i) + "]", setup.listen[i]);
+        const auto key = "listen[" + std::to_string(i) + "]";
+        check_url(setup, key, setup.listen[i]);
+        check_exposure(setup, key, setup.listen[i]);
     }
-    if (setup.multicast.is_on() && setup.multicast.interface != "lo" && !setup.insecure) { // `auto` may choose any
+    for (std::size_t i = 0; i < setup.seeds.size(); ++i) {
+        check_url(setup, "seeds[" + std::to_string(i) + "]", setup.seeds[i]);
+    }
+    for (const auto& [name, url] : setup.peers) {
+        check_url(setup, "peers." + name, url);
+    }
+    if (setup.multicast.is_on() && setup.multicast.interface != "lo" && !setup.insecure &&
+        !setup.security.is_on()) { // `auto` may choose any
         throw config_error(setup.location_of("multicast"),
                            "'" + setup.multicast.interface +
                                "' can be reached from other hosts, which requires 'insecure: true'");

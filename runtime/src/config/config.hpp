@@ -35,6 +35,15 @@ struct plugin_config {
     bool operator==(const plugin_config&) const = default;
 };
 
+/// The security of the node; see <cles/security.hpp>.
+struct security_config {
+    std::string keys;                               ///< the node's directory; empty: no security
+    std::map<std::string, std::string> local_users; ///< members, by the names or ids of users
+
+    [[nodiscard]] bool is_on() const noexcept { return !keys.empty(); }
+    bool operator==(const security_config&) const = default;
+};
+
 /// The configuration of a daemon, combined from all its sources (docs/runtime.md).
 struct config {
     std::string node;
@@ -42,6 +51,7 @@ struct config {
     bool allow_clash = false; ///< continue if another live node had the name first
     std::vector<std::string> listen;
     bool insecure = false;
+    security_config security;
     std::vector<std::string> networks;
     multicast_options multicast;
     std::vector<std::string> seeds;
@@ -73,6 +83,10 @@ struct config {
 
 /// \param host the host's name \param cores the host's number of processor cores
 config default_config(const std::string& host, std::uint32_t cores);
+
+/// With security, a node is reachable from other hosts by default: it listens by TLS on all interfaces, and takes part
+/// in multicast on all.
+void apply_security_defaults(config& setup);
 
 /// Checks what depends on several values. \throws config_error
 void check(const config& setup);

@@ -101,6 +101,27 @@ std::map<std::string, std::string> peers_of(const yaml_value& from) {
     return peers;
 }
 
+security_config security_of(const yaml_value& from) {
+    const auto to_directory = [](const std::string& text) { return text == "off" ? std::string{} : text; };
+    security_config read;
+    if (from.is_scalar()) {
+        read.keys = from.as(to_directory);
+        return read;
+    }
+    const auto read_users = [](const yaml_value& users) {
+        std::map<std::string, std::string> all;
+        users.read_names(
+            [&](const std::string& user, const yaml_value& member) { all[user] = member.as(to_node_name); });
+        return all;
+    };
+    from.read_map(
+        {{"keys", part(read.keys, scalar(to_directory))}, {"local_users", part(read.local_users, read_users)}});
+    if (!read.is_on()) {
+        from.fail("has no 'keys', the directory of the node's key");
+    }
+    return read;
+}
+
 std::vector<plugin_config> plugins_of(const yaml_value& from) {
     const auto to_path = [](const std::string& path) {
         if (path.empty()) {
@@ -197,6 +218,15 @@ std::string text_of(const std::map<std::string, std::string>& peers) {
     return "{" + all + "}";
 }
 
+std::string text_of(const security_config& security) {
+    if (!security.is_on()) {
+        return "off";
+    }
+    return security.local_users.empty()
+               ? text_of(security.keys)
+               : "{keys: " + text_of(security.keys) + ", local_users: " + text_of(security.local_users) + "}";
+}
+
 std::string text_of(const log_config& log) {
     return "{level: " + std::string{to_string(log.level)} + ", format: " + std::string{to_string(log.format)} + "}";
 }
@@ -257,6 +287,7 @@ const std::vector<setting>& settings() {
                                           value("allow_clash", &config::allow_clash, scalar(to_bool)),
                                           value("listen", &config::listen, list(to_url)),
                                           value("insecure", &config::insecure, scalar(to_bool)),
+                                          value("security", &config::security, security_of),
                                           value("networks", &config::networks, list(to_network)),
                                           value("multicast", &config::multicast, multicast_of),
                                           value("seeds", &config::seeds, list(to_url)),

@@ -62,6 +62,7 @@ overrides from_environment(const std::function<const char*(const char*)>& variab
     read("CLES_LISTEN", "listen", true);
     read("CLES_SEEDS", "seeds", true);
     read("CLES_MULTICAST", "multicast");
+    read("CLES_KEYS", "security");
     read("CLES_LOG", "log");
     return found;
 }
@@ -84,6 +85,7 @@ config load(const config_sources& from) {
     }
     apply_overrides(from_environment(from.variable), made);
     apply_overrides(from.flags, made);
+    apply_security_defaults(made);
     check(made);
     return made;
 }

@@ -64,6 +64,7 @@ std::variant<command_line_options, std::string> parse_command_line(int argc, con
         ->multi_option_policy(take_all);
     add_setting("multicast", "-m,--multicast", "IFACE[,IFACE...][,GROUP[:PORT]]|auto|off",
                 "The interfaces on which other nodes are discovered");
+    add_setting("security", "--keys", "DIR", "The node's key directory: authenticates and encrypts");
     add_setting("log", "--log", "LEVEL[,FORMAT]",
                 "The level and format of the log: debug, info, warning, error; text, json");
     try {
