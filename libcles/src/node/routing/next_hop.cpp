@@ -20,15 +20,15 @@
 namespace cles::core {
 namespace {
 
-// A request has at most 16 adverbs, and this node writes up to seven: id, deadline, progress, urgent, hops, via, from.
-constexpr std::size_t max_foreign = protocol::max_adverbs - 7;
+// A request has at most 16 adverbs, and this node writes up to six: id, deadline, progress, urgent, hops, via.
+constexpr std::size_t max_foreign = protocol::max_adverbs - 6;
 
-void append_foreign(std::string& out, const protocol::request_line& r) {
+void append_foreign(std::string& out, const protocol::request_line& r, std::size_t most) {
     protocol::part_reader parts{r.text};
     parts.next(); // verb
     parts.next(); // noun
     std::size_t count = 0;
-    for (auto part = parts.next(); !part.empty() && count < max_foreign; part = parts.next()) {
+    for (auto part = parts.next(); !part.empty() && count < most; part = parts.next()) {
         protocol::adverb a;
         if (protocol::split_adverb(part, a) && !protocol::is_known_adverb(a.key, r.verb)) {
             out.append(" ").append(part);
@@ -192,10 +192,11 @@ std::string forwarded_adverbs(const protocol::request_line& r, std::string_view 
         out.append(r.via).push_back(',');
     }
     out.append(own_name);
-    if (!requester.empty() && requester != own_name) {
+    const bool states_requester = !requester.empty() && requester != own_name;
+    if (states_requester) {
         out.append(" from=").append(requester);
     }
-    append_foreign(out, r);
+    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0));
     return out;
 }
 

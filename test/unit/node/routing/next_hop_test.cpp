@@ -39,7 +39,7 @@ BOOST_AUTO_TEST_CASE(number_of_adverbs_is_bounded) {
         line += std::string{" x"} + c + "=1";
     }
     const auto passed = adverbs(line);
-    BOOST_TEST(std::count(passed.begin(), passed.end(), '=') == 2 + 9);
+    BOOST_TEST(std::count(passed.begin(), passed.end(), '=') == 2 + 10);
 }
 
 BOOST_AUTO_TEST_SUITE_END()
