@@ -10,11 +10,11 @@
 #include <string>
 #include <vector>
 
-using namespace cles::security::test;
-using cles::errc;
-
 namespace secured_service {
 namespace {
+
+using namespace cles::security::test;
+using cles::errc;
 
 struct fixture {
     /// car1 serves, car2 asks.
@@ -45,8 +45,6 @@ bool is_denied(const std::string& outcome) {
 
 } // namespace
 } // namespace secured_service
-
-using namespace secured_service;
 
 BOOST_FIXTURE_TEST_SUITE(secured_service, fixture)
 
