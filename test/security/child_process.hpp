@@ -6,7 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-namespace cles::test {
+namespace cles::security::test {
 
 /// Whether a function returns true in a child process.
 template <class F>
@@ -21,4 +21,4 @@ template <class F>
     return WIFEXITED(status) && WEXITSTATUS(status) == 0;
 }
 
-} // namespace cles::test
+} // namespace cles::security::test

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/datagram_format.hpp"
-
 #include "security/datagram_path.hpp"
 #include "security/sealed_network.hpp"
-#include "security/vectors.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -15,7 +13,7 @@ namespace datagram_format {
 namespace {
 
 using namespace cles::security;
-using namespace cles::test;
+using namespace cles::security::test;
 
 bytes of_kind(int kind, std::size_t size) {
     bytes made(size);
@@ -43,28 +41,27 @@ BOOST_AUTO_TEST_CASE(the_first_byte_distinguishes_sealed_datagrams_from_lines) {
 }
 
 BOOST_AUTO_TEST_CASE(heads_of_the_vectors_are_read) {
-    const vectors known;
-    const auto hello = read_head(from_hex(known.text("handshake", "hello")));
+    const auto hello = read_head(from_hex(vector_text("handshake", "hello")));
     BOOST_REQUIRE(hello);
     BOOST_TEST((hello->kind == datagram_kind::hello));
     BOOST_TEST(hello->sender == 1U);
     BOOST_TEST(hello->index == 0x8d00cab345b28793U);
-    const auto welcome = read_head(from_hex(known.text("handshake", "welcome")));
+    const auto welcome = read_head(from_hex(vector_text("handshake", "welcome")));
     BOOST_REQUIRE(welcome);
     BOOST_TEST((welcome->kind == datagram_kind::welcome));
     BOOST_TEST(welcome->sender == 3U);
     BOOST_TEST(welcome->index == hello->index);
-    const auto data = read_head(from_hex(known.data()[1].datagram));
+    const auto data = read_head(from_hex(text_at(vectors().at("data").at(1).as_object(), "datagram")));
     BOOST_REQUIRE(data);
     BOOST_TEST((data->kind == datagram_kind::data));
     BOOST_TEST(data->index == hello->index);
     BOOST_TEST(data->counter == 9U);
-    const auto group = read_head(from_hex(known.text("group", "datagram")));
+    const auto group = read_head(from_hex(vector_text("group", "datagram")));
     BOOST_REQUIRE(group);
     BOOST_TEST((group->kind == datagram_kind::group));
     BOOST_TEST(group->sender == 3U);
     BOOST_TEST(group->generation == 5U);
-    BOOST_TEST(to_hex(group->salt) == known.text("group", "salt"));
+    BOOST_TEST(to_hex(group->salt) == vector_text("group", "salt"));
     BOOST_TEST(group->counter == 17U);
 }
 
@@ -76,8 +73,7 @@ BOOST_AUTO_TEST_CASE(heads_are_written_as_they_are_read) {
     group_salt salt{};
     salt.fill(0x55);
     write_group_head(1, 0x01020304, salt, 0x1112131415161718, group.data());
-    BOOST_TEST(to_hex(group).substr(0, 64) ==
-               "8400000101020304555555555555555555555555555555551112131415161718");
+    BOOST_TEST(to_hex(group).substr(0, 64) == "8400000101020304555555555555555555555555555555551112131415161718");
     const auto head = read_head(group);
     BOOST_REQUIRE(head);
     BOOST_TEST(head->salt == salt);
@@ -111,19 +107,17 @@ BOOST_AUTO_TEST_CASE(a_statement_is_read_as_it_was_written) {
     node_statement stated{.roster = 0x01020304, .epoch = 0x5f3a09c1, .counter = 0x0102030405060708};
     stated.salt.fill(0x77);
     const auto payload = write_statement(0x1112131415161718, stated);
-    BOOST_TEST(to_hex(payload) ==
-               "1112131415161718010203045f3a09c1777777777777777777777777777777770102030405060708");
+    BOOST_TEST(to_hex(payload) == "1112131415161718010203045f3a09c1777777777777777777777777777777770102030405060708");
     std::uint64_t index = 0;
     BOOST_TEST((read_statement(payload, index) == stated));
     BOOST_TEST(index == 0x1112131415161718U);
 }
 
 BOOST_AUTO_TEST_CASE(the_prologue_is_that_of_the_vectors) {
-    const vectors known;
-    const auto hello = from_hex(known.text("handshake", "hello"));
-    BOOST_TEST(to_hex(hello_prologue(known.key("fleet").public_part(), 3,
+    const auto hello = from_hex(vector_text("handshake", "hello"));
+    BOOST_TEST(to_hex(hello_prologue(vector_key("fleet").public_part(), 3,
                                      std::span<const std::uint8_t>{hello}.first<hello_head_bytes>())) ==
-               known.text("handshake", "prologue"));
+               vector_text("handshake", "prologue"));
 }
 
 BOOST_AUTO_TEST_CASE(a_path_is_an_address_a_port_and_a_socket) {

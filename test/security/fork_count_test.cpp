@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/fork_count.hpp"
-
 #include "security/child_process.hpp"
+#include "security/fork_count.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 namespace fork_count {
 
 using namespace cles::security;
-using cles::test::in_child;
+using cles::security::test::in_child;
 
 BOOST_AUTO_TEST_SUITE(fork_count)
 

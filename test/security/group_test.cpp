@@ -3,7 +3,6 @@
 #include "security/group_receiver.hpp"
 #include "security/group_sender.hpp"
 #include "security/sealed_network.hpp"
-#include "security/vectors.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -20,7 +19,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using namespace cles::security;
-using namespace cles::test;
+using namespace cles::security::test;
 using cles::time_point;
 using ordered_by = group_receiver::ordered_by;
 using verdict = group_receiver::verdict;
@@ -82,26 +81,24 @@ struct three_cars {
 BOOST_FIXTURE_TEST_SUITE(group, three_cars)
 
 BOOST_AUTO_TEST_CASE(the_vector_is_opened) {
-    const vectors known;
     seeded_entropy random{1};
-    fleet car1{"car1", known.key("car1"), roster::read(known.roster(), known.key("fleet").public_part())};
+    cles::security::fleet car1{"car1", vector_key("car1"), reread(text_at(vectors(), "roster"))};
     group_sender sender{car1, random};
     group_receiver receiver{car1, sender, random};
-    const auto datagram = from_hex(known.text("group", "datagram"));
+    const auto datagram = from_hex(vector_text("group", "datagram"));
     BOOST_TEST((receiver.open(at(2), datagram, now).what == verdict::unknown_salt));
     node_statement stated{.epoch = 0x5f3a09c1, .counter = 17};
-    std::ranges::copy(from_hex(known.text("group", "salt")), stated.salt.begin());
+    std::ranges::copy(from_hex(vector_text("group", "salt")), stated.salt.begin());
     receiver.learn(3, stated);
     const auto result = receiver.open(at(2), datagram, now);
     BOOST_REQUIRE((result.what == verdict::opened));
-    BOOST_TEST(result.line == known.text("group", "line"));
+    BOOST_TEST(result.line == vector_text("group", "line"));
     BOOST_TEST(result.epoch == 0x5f3a09c1U);
     BOOST_TEST(result.accepted_by.counter == 17U);
     BOOST_TEST(receiver.accept(result.accepted_by, ordered_by::counter));
 }
 
 BOOST_AUTO_TEST_CASE(the_vector_is_made) {
-    const vectors known;
     class vector_salt final : public entropy {
       public:
         explicit vector_salt(bytes salt) : salt_(std::move(salt)) {}
@@ -109,10 +106,10 @@ BOOST_AUTO_TEST_CASE(the_vector_is_made) {
 
       private:
         bytes salt_;
-    } random{from_hex(known.text("group", "salt"))};
-    fleet car2{"car2", known.key("car2"), roster::read(known.roster(), known.key("fleet").public_part())};
-    group_sender sender{car2, random, known.number("group", "counter")};
-    BOOST_TEST(to_hex(sender.seal(known.text("group", "line"))) == known.text("group", "datagram"));
+    } random{from_hex(vector_text("group", "salt"))};
+    cles::security::fleet car2{"car2", vector_key("car2"), reread(text_at(vectors(), "roster"))};
+    group_sender sender{car2, random, vectors().at("group").at("counter").to_number<std::uint64_t>()};
+    BOOST_TEST(to_hex(sender.seal(vector_text("group", "line"))) == vector_text("group", "datagram"));
 }
 
 BOOST_AUTO_TEST_CASE(a_line_is_opened_by_who_has_a_session_with_the_sender) {
@@ -154,10 +151,11 @@ BOOST_AUTO_TEST_CASE(no_bit_can_be_changed) {
             opened += open(car2, forged).what == verdict::dropped ? 0 : 1;
         }
         for (std::size_t length = 0; length < datagram.size(); ++length) {
-            opened += open(car2, bytes(datagram.begin(), datagram.begin() + static_cast<std::ptrdiff_t>(length))).what ==
-                              verdict::dropped
-                          ? 0
-                          : 1;
+            opened +=
+                open(car2, bytes(datagram.begin(), datagram.begin() + static_cast<std::ptrdiff_t>(length))).what ==
+                        verdict::dropped
+                    ? 0
+                    : 1;
         }
     }
     BOOST_TEST(opened == 0U);
@@ -490,6 +488,24 @@ BOOST_AUTO_TEST_CASE(one_source_does_not_decide_which_is_contacted) {
         honest += contact->path == at(2) ? 1 : 0;
     }
     BOOST_TEST(honest > 20);
+}
+
+BOOST_AUTO_TEST_CASE(sources_from_before_a_new_roster_are_not_contacted_for_later_generations) {
+    const auto two_ahead = [&](member_end& car) {
+        fleet.authority.rotate();
+        fleet.authority.rotate();
+        car.adopt(fleet);
+        return car.seal("line");
+    };
+    BOOST_TEST(open(car2, two_ahead(car1), at(2)).contact.has_value());
+    car2.adopt(fleet);
+    const auto datagram = two_ahead(car1);
+    for (int i = 0; i < 20; ++i) {
+        now += 120ms;
+        const auto contact = open(car2, datagram, at(9)).contact;
+        BOOST_REQUIRE(contact);
+        BOOST_TEST((contact->path == at(9)));
+    }
 }
 
 BOOST_AUTO_TEST_CASE(a_removed_member_is_not_received_and_receives_nothing) {

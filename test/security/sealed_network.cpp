@@ -2,30 +2,8 @@
 #include "security/sealed_network.hpp"
 
 #include <algorithm>
-#include <array>
-#include <stdexcept>
 
-namespace cles::test {
-
-using namespace security;
-
-bytes from_hex(std::string_view hex) {
-    bytes made;
-    for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
-        made.push_back(static_cast<std::uint8_t>(std::stoul(std::string{hex.substr(i, 2)}, nullptr, 16)));
-    }
-    return made;
-}
-
-std::string to_hex(bytes_view from) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string made;
-    for (const auto byte : from) {
-        made += digits[byte >> 4U];
-        made += digits[byte & 15U];
-    }
-    return made;
-}
+namespace cles::security::test {
 
 signing_key key_from(std::uint8_t seed) {
     secret_bytes bytes{32};
@@ -45,8 +23,8 @@ void test_fleet::add(int car) { authority.add({.name = name_of(car), .key = key_
 
 // -- a node --------------------------------------------------------------------------------------------------------
 
-sealed_node::sealed_node(sealed_network& in, const test_fleet& of, int car, datagram_path where, std::uint32_t own_epoch,
-                         datagram_limits limits)
+sealed_node::sealed_node(sealed_network& in, const test_fleet& of, int car, datagram_path where,
+                         std::uint32_t own_epoch, datagram_limits limits)
     : network(in), at(where), number(static_cast<std::uint32_t>(car)), epoch(own_epoch), random(in.random()),
       fleet(test_fleet::name_of(car), test_fleet::key_of(car), of.authority.share()), group(fleet, random),
       group_in(fleet, group, random), sessions(fleet, *this, random, limits) {
@@ -82,7 +60,8 @@ void sealed_node::send(const datagram_path& to, bytes_view datagram) {
 }
 
 node_statement sealed_node::statement() {
-    return {.roster = fleet.in_force().version(), .epoch = epoch, .salt = group.salt(), .counter = group.next_counter()};
+    return {
+        .roster = fleet.in_force().version(), .epoch = epoch, .salt = group.salt(), .counter = group.next_counter()};
 }
 
 void sealed_node::established(const datagram_source& with, const node_statement& stated, bool restarted) {
@@ -147,4 +126,4 @@ std::size_t sealed_network::count(datagram_kind kind) const {
         sent, [&](const auto& d) { return d.content.front() == static_cast<std::uint8_t>(kind); }));
 }
 
-} // namespace cles::test
+} // namespace cles::security::test

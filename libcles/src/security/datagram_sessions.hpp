@@ -21,7 +21,7 @@
 namespace cles::security {
 
 struct datagram_limits {
-    std::uint32_t hellos_per_second = 1000; ///< new ones that are opened, and as many WELCOME
+    std::uint32_t hellos_per_second = 500; ///< new ones that are opened, and as many WELCOME
     std::chrono::nanoseconds rekey_after = std::chrono::minutes{15};
     std::chrono::nanoseconds forget_after = std::chrono::minutes{20};
     std::uint64_t rekey_datagrams = std::uint64_t{1} << 48U;
