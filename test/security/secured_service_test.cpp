@@ -4,7 +4,6 @@
 
 #include <boost/test/unit_test.hpp>
 
-#include <chrono>
 #include <fstream>
 #include <memory>
 #include <string>
@@ -39,6 +38,8 @@ struct fixture {
     cles::service car2{io, fleet.knowing("car2", car1)};
 };
 
+const std::string speed = "{\"value\":7}";
+
 bool is_denied(const std::string& outcome) {
     return contains(outcome, "does not allow") || contains(outcome, "may not");
 }
@@ -49,7 +50,7 @@ bool is_denied(const std::string& outcome) {
 BOOST_FIXTURE_TEST_SUITE(secured_service, fixture)
 
 BOOST_AUTO_TEST_CASE(members_reach_each_other) {
-    BOOST_TEST(ask(io, car2, "PULL car1:speed") == "7");
+    BOOST_TEST(ask(io, car2, "PULL car1:speed") == speed);
     BOOST_TEST(car1.endpoints().front().starts_with("tls://127.0.0.1:"));
 }
 
@@ -61,7 +62,7 @@ BOOST_AUTO_TEST_CASE(a_handler_sees_who_asks) {
         transport = r.peer().transport;
         return 1;
     });
-    BOOST_TEST(ask(io, car2, "PULL car1:who") == "1");
+    BOOST_TEST(ask(io, car2, "PULL car1:who") == "{\"value\":1}");
     BOOST_TEST(name == "car2");
     BOOST_TEST(transport == "tls");
 }
@@ -85,8 +86,11 @@ BOOST_AUTO_TEST_CASE(updates_arrive) {
 BOOST_AUTO_TEST_CASE(a_key_that_is_not_in_the_roster_is_refused) {
     secured_fleet other{"car3"};
     cles::service car3{io, other.knowing("car3", car1)};
-    const auto outcome = ask(io, car3, "PULL car1:speed");
-    BOOST_TEST(outcome != "7");
+    BOOST_TEST(ask(io, car3, "PULL car1:speed") != speed);
+    // It passes for car2 in a roster of its own.
+    secured_fleet forged{"car1", "car2"};
+    cles::service impostor{io, forged.knowing("car2", car1)};
+    const auto outcome = ask(io, impostor, "PULL car1:speed");
     BOOST_TEST(contains(outcome, "cannot connect"), outcome);
 }
 
@@ -103,7 +107,7 @@ BOOST_AUTO_TEST_CASE(another_member_does_not_pass_for_the_one_that_is_meant) {
 BOOST_AUTO_TEST_CASE(plain_links_are_refused) {
     BOOST_CHECK_EXCEPTION(car1.listen("tcp://127.0.0.1:0"), cles::error,
                           [](const cles::error& e) { return e.code() == errc::insecure_listen; });
-    BOOST_TEST(contains(ask(io, car2, "PULL car1:speed"), "7"));
+    BOOST_TEST(ask(io, car2, "PULL car1:speed") == speed);
     std::string why;
     std::optional<boost::system::error_code> code;
     car2.async_request("PULL self:cles", cles::call_options{}.at("tcp://127.0.0.1:1").diagnostics(why),
@@ -138,7 +142,7 @@ BOOST_AUTO_TEST_CASE(unusable_files_are_named) {
 BOOST_AUTO_TEST_SUITE(rights)
 
 BOOST_AUTO_TEST_CASE(they_change_without_a_restart) {
-    BOOST_TEST(ask(io, car2, "PULL car1:speed") == "7");
+    BOOST_TEST(ask(io, car2, "PULL car1:speed") == speed);
     fleet.authority.set_rights("car2", {.may = std::vector<std::string>{"push *:note"}});
     offer(car1);
     const auto outcome = ask(io, car2, "PULL car1:speed");
@@ -146,17 +150,17 @@ BOOST_AUTO_TEST_CASE(they_change_without_a_restart) {
     BOOST_TEST(ask(io, car2, "PUSH car1:note {\"value\":\"hi\"}") == "{}");
     fleet.authority.set_rights("car2", {});
     offer(car1);
-    BOOST_TEST(ask(io, car2, "PULL car1:speed") == "7");
+    cles::test::run_until(io, [&] { return ask(io, car2, "PULL car1:speed") == speed; }); // car2 hears of it, too
 }
 
 BOOST_AUTO_TEST_CASE(local_rules_narrow_them_within_a_second) {
-    BOOST_TEST(ask(io, car2, "PULL car1:speed") == "7");
+    BOOST_TEST(ask(io, car2, "PULL car1:speed") == speed);
     std::ofstream{fleet.directory_of("car1") + "/rules"} << "deny car2 may pull *:speed\n";
     cles::test::run_until(io, [&] { return is_denied(ask(io, car2, "PULL car1:speed")); });
     std::ofstream{fleet.directory_of("car1") + "/rules"} << "nonsense\n";
     cles::test::run_until(io, [&] { return is_denied(ask(io, car2, "PUSH car1:note {\"value\":\"hi\"}")); });
     std::filesystem::remove(fleet.directory_of("car1") + "/rules");
-    cles::test::run_until(io, [&] { return ask(io, car2, "PULL car1:speed") == "7"; });
+    cles::test::run_until(io, [&] { return ask(io, car2, "PULL car1:speed") == speed; });
 }
 
 BOOST_AUTO_TEST_CASE(a_binding_ends_with_the_right_to_it) {
@@ -188,7 +192,7 @@ BOOST_AUTO_TEST_SUITE_END()
 BOOST_AUTO_TEST_SUITE(rosters)
 
 BOOST_AUTO_TEST_CASE(a_newer_one_spreads_over_open_links) {
-    BOOST_TEST(ask(io, car2, "PULL car1:speed") == "7");
+    BOOST_TEST(ask(io, car2, "PULL car1:speed") == speed);
     fleet.with_newest = false;
     fleet.add("car3");
     offer(car1);
@@ -203,7 +207,7 @@ BOOST_AUTO_TEST_CASE(a_new_member_brings_it_along) {
     fleet.with_newest = false;
     fleet.add("car3");
     cles::service car3{io, fleet.knowing("car3", car1)};
-    BOOST_TEST(ask(io, car3, "PULL car1:speed") == "7");
+    BOOST_TEST(ask(io, car3, "PULL car1:speed") == speed);
     BOOST_TEST(version_of(io, car1) == fleet.authority.newest().version());
 }
 
@@ -214,16 +218,13 @@ BOOST_AUTO_TEST_CASE(one_that_is_copied_to_the_directory_is_adopted) {
     cles::test::run_until(io, [&] { return version_of(io, car1) == fleet.authority.newest().version(); });
 }
 
-BOOST_AUTO_TEST_CASE(a_removed_member_is_out_within_a_second) {
-    BOOST_TEST(ask(io, car2, "PULL car1:speed") == "7");
+BOOST_AUTO_TEST_CASE(a_removed_member_gets_nothing) {
+    BOOST_TEST(ask(io, car2, "PULL car1:speed") == speed);
     fleet.authority.remove("car2");
-    const auto begun = std::chrono::steady_clock::now();
     offer(car1);
-    std::optional<std::string> outcome;
-    cles::test::run_until(io, [&] { return ask(io, car2, "PULL car1:speed") != "7"; });
-    BOOST_TEST((std::chrono::steady_clock::now() - begun < cles::test::patience));
+    cles::test::run_until(io, [&] { return ask(io, car2, "PULL car1:speed") != speed; });
     for (int i = 0; i < 5; ++i) {
-        BOOST_TEST(ask(io, car2, "PULL car1:speed") != "7");
+        BOOST_TEST(ask(io, car2, "PULL car1:speed") != speed);
     }
 }
 
@@ -248,7 +249,7 @@ BOOST_AUTO_TEST_CASE(members_discover_each_other) {
     cles::service sat1{io, std::move(first)};
     cles::service sat2{io, std::move(second)};
     sat1.on_pull("power", [] { return 3; });
-    cles::test::run_until(io, [&] { return ask(io, sat2, "PULL sat1:power") == "3"; });
+    cles::test::run_until(io, [&] { return ask(io, sat2, "PULL sat1:power") == "{\"value\":3}"; });
     cles::test::run_until(io, [&] { return contains(ask(io, sat1, "PULL self:cles/peers"), "sat2"); });
 }
 
@@ -289,8 +290,9 @@ BOOST_AUTO_TEST_CASE(a_node_that_restarts_is_heard_again) {
         second.multicast = where;
         cles::service sat2{io, std::move(second)};
         sat2.on_pull("incarnation", [incarnation] { return incarnation; });
-        cles::test::run_until(io,
-                              [&] { return ask(io, sat1, "PULL sat2:incarnation") == std::to_string(incarnation); });
+        cles::test::run_until(io, [&] {
+            return ask(io, sat1, "PULL sat2:incarnation") == "{\"value\":" + std::to_string(incarnation) + "}";
+        });
     }
 }
 

@@ -15,11 +15,11 @@ constexpr std::size_t max_unknown = 256; // members
 constexpr std::size_t max_endpoints = 16;
 constexpr std::size_t depth = 8; // of an announcement
 
-bytes_view bytes_of(std::string_view text) noexcept {
+bytes_view as_bytes(std::string_view text) noexcept {
     return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
 }
 
-std::string_view text_of(bytes_view bytes) noexcept {
+std::string_view as_text(bytes_view bytes) noexcept {
     return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
@@ -96,7 +96,7 @@ core::datagrams_done sealed_group_port::send(core::datagram_list all) {
         auto line = rest.first();
         line.remove_suffix(line.ends_with('\n') ? 1 : 0);
         const auto datagram = all_->seal_for_group(line);
-        sealed_.append(text_of(datagram));
+        sealed_.append(as_text(datagram));
         sizes_.push_back(static_cast<std::uint16_t>(datagram.size()));
     }
     if (sealed_.empty()) { // this node is not in the roster
@@ -124,20 +124,20 @@ void sealed_group_port::on_writable() {
 // -- receiving -----------------------------------------------------------------------------------------------------
 
 void sealed_group_port::on_datagram(const core::group_datagram& datagram) {
-    if (owner_ == nullptr || !is_sealed(bytes_of(datagram.text))) {
+    if (owner_ == nullptr || !is_sealed(as_bytes(datagram.text))) {
         return;
     }
     if (datagram.to_group) {
         on_group(datagram);
     } else {
-        all_->receive(path_of(datagram.from), bytes_of(datagram.text));
+        all_->receive(path_of(datagram.from), as_bytes(datagram.text));
     }
 }
 
 void sealed_group_port::on_group(const core::group_datagram& datagram) {
-    const auto found = all_->open_group(path_of(datagram.from), bytes_of(datagram.text));
+    const auto found = all_->open_group(path_of(datagram.from), as_bytes(datagram.text));
     if (found.what == group_receiver::verdict::unknown_salt) {
-        note_unknown(read_head(bytes_of(datagram.text))->sender, found.line);
+        note_unknown(read_head(as_bytes(datagram.text))->sender, found.line);
         return;
     }
     const auto* const sender = found.what == group_receiver::verdict::opened
@@ -193,7 +193,7 @@ void sealed_group_port::on_gave_up(const datagram_source& with) {
 
 void sealed_group_port::send_sealed(const datagram_path& to, bytes_view datagram) {
     if (to.is_v4()) {
-        port_->send_to({.address = to.v4_address(), .port = to.port}, text_of(datagram));
+        port_->send_to({.address = to.v4_address(), .port = to.port}, as_text(datagram));
     }
 }
 

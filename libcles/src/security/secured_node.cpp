@@ -19,6 +19,7 @@ secured_node::secured_node(const std::string& directory) : directory_(directory)
     warnings_ = std::move(found.warnings);
     fleet_ = std::make_shared<security::fleet>(found.own.name, std::move(found.own.key), std::move(found.newest));
     datagrams_ = std::make_shared<sealed_datagrams>(*fleet_);
+    observation_ = fleet_->observe([this](const roster&) { on_roster(); }); // links bring rosters, too
     read_rules();
     files_ = file_state();
 }
@@ -144,12 +145,14 @@ std::optional<std::string> secured_node::offer_roster(std::string_view line) {
     if (!why.empty()) {
         log(log_level::error, why);
     }
-    if (found == fleet::verdict::adopted) {
-        log(log_level::info, "version " + std::to_string(roster_version()) + " of the roster is in force");
-        store();
-        adopt_changes();
-    }
     return {};
+}
+
+void secured_node::on_roster() {
+    log(log_level::info, "version " + std::to_string(roster_version()) + " of the roster is in force");
+    store();
+    std::erase_if(asked_, [this](const auto& each) { return !is_member(each.first); });
+    adopt_changes();
 }
 
 bool secured_node::wants_roster(std::string_view from, std::uint32_t version, time_point now) {
@@ -178,7 +181,6 @@ void secured_node::store() {
 
 void secured_node::adopt_changes() {
     policy_ = std::make_unique<access_policy>(name(), fleet_->share(), rules_);
-    std::erase_if(asked_, [this](const auto& each) { return !is_member(each.first); });
     if (observer_ != nullptr) {
         observer_->on_security_changed();
     }

@@ -61,6 +61,7 @@ class secured_node final : public core::node_security {
         time_point at{};
     };
 
+    void on_roster();
     void adopt_changes();
     void store();
     void read_rules();
@@ -76,6 +77,7 @@ class secured_node final : public core::node_security {
     mutable decoded_noun noun_; // scratch space
     std::shared_ptr<sealed_datagrams> datagrams_;
     core::security_observer* observer_ = nullptr;
+    std::shared_ptr<void> observation_; // of the fleet
     std::map<std::string, asked_member, std::less<>> asked_;
     std::string files_; // the state of the files at the last check
     time_point next_check_{};
