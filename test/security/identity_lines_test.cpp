@@ -18,7 +18,7 @@ std::string text_of(const secret_bytes& secret) { return {secret.view().begin(),
 
 bytes_view bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
 
-const std::string car1_seed = "NsW-hllSlgkTSmGo1LU97bhqmF0-03YxCE17Dm4zR4U";
+const std::string car1_seed = "NsW-hllSlggTSmGo1LU964aphdPtN2MQhNew5rM0eF4";
 // The seed and the public key of car1 in the vectors.
 const std::string car1_key = "TXqpzm-x5K34kGI37MPz17rZTZOx8qmlc5gOpn6h9YA";
 

@@ -70,6 +70,10 @@ BOOST_AUTO_TEST_CASE(an_existing_key_is_never_replaced) {
     BOOST_TEST(refusal([&] { return files.create_key("car2"); }) == "cannot create " + path("key") + ": File exists");
     BOOST_TEST(read_file(own / "key") == before);
     BOOST_TEST(own.names() == (std::vector<std::string>{"car1.pub", "key"}), boost::test_tools::per_element());
+    // What can be derived from it can be written again.
+    fs::remove(own / "car1.pub");
+    files.write_public_identity(files.read_key().public_part());
+    BOOST_TEST((files.read_public_identity("car1.pub").key == files.read_key().key.public_part()));
     BOOST_TEST(contains(refusal([&] { return files.create_key("any"); }), "reserved"));
     BOOST_TEST(contains(refusal([&] { return files.create_key("../car1"); }), "not a name"));
 }

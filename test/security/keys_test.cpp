@@ -114,6 +114,7 @@ BOOST_AUTO_TEST_CASE(a_sealed_box_opens_for_its_receiver_only) {
     box.back() ^= 1U;
     BOOST_TEST(receiver.open_box(box).size() == 0U);
     BOOST_TEST(receiver.open_box(bytes_view{box}.first(sealed_overhead - 1)).size() == 0U);
+    BOOST_TEST(receiver.open_box(bytes_view{box}.first(sealed_overhead)).size() == 0U);
     BOOST_TEST(receiver.open_box({}).size() == 0U);
 }
 
@@ -128,6 +129,19 @@ BOOST_AUTO_TEST_CASE(base64url_has_one_spelling) {
     }
     BOOST_TEST(!read_base64url(std::string_view{"-_8\0", 4}, two));
     BOOST_TEST(!read_base64url(std::string_view{"-\0_8", 4}, two));
+    // No other byte stands for one of these characters.
+    for (std::size_t at = 0; at < 3; ++at) {
+        std::string text{"AAA"};
+        std::size_t accepted = 0;
+        for (unsigned byte = 0; byte < 256; ++byte) {
+            text[at] = static_cast<char>(byte);
+            if (read_base64url(text, two)) {
+                BOOST_TEST(to_base64url(two) == text);
+                ++accepted;
+            }
+        }
+        BOOST_TEST(accepted == (at == 2 ? 16U : 64U));
+    }
     std::vector<std::uint8_t> none;
     BOOST_TEST(read_base64url("", none));
     BOOST_TEST(!read_base64url("A", none));

@@ -57,8 +57,13 @@ node_identity key_directory::create_key(const std::string& name) const {
     node_identity made{name, signing_key::generate()};
     // The private key comes first: while it exists, no other one is created.
     folder_.create_file(key_file, to_line(made).view(), file_access::secret);
-    folder_.replace_file(name + ".pub", bytes_of_text(to_line(made.public_part())), file_access::readable);
+    write_public_identity(made.public_part());
     return made;
+}
+
+void key_directory::write_public_identity(const public_identity& identity) const {
+    require_node_name(identity.name);
+    folder_.replace_file(identity.name + ".pub", bytes_of_text(to_line(identity)), file_access::readable);
 }
 
 node_identity key_directory::read_key() const {
@@ -89,14 +94,14 @@ public_identity key_directory::read_public_identity(const std::string& name) con
     return naming(folder_.path_of(name), [&] { return security::read_public_identity(*content); });
 }
 
-std::shared_ptr<const roster> key_directory::read_roster_file(const std::string& name) const {
+std::shared_ptr<const roster> key_directory::read_roster_file(const std::string& name, const roster* known) const {
     const auto content = folder_.read_text(name, max_roster_line + 1);
     if (!content) {
         return nullptr;
     }
     std::string_view line{*content};
     line.remove_suffix(line.ends_with('\n') ? 1 : 0);
-    return naming(folder_.path_of(name), [&] { return roster::read(line, roster::named_fleet(line)); });
+    return naming(folder_.path_of(name), [&] { return roster::read(line, roster::named_fleet(line), known); });
 }
 
 std::shared_ptr<const roster> key_directory::read_newest_roster(std::vector<std::string>& warnings) const {
@@ -105,7 +110,7 @@ std::shared_ptr<const roster> key_directory::read_newest_roster(std::vector<std:
     std::shared_ptr<const roster> newest;
     std::string from;
     for (const auto& name : names) {
-        auto read = read_roster_file(name);
+        auto read = read_roster_file(name, newest.get());
         if (!read) {
             continue;
         }
@@ -140,7 +145,7 @@ node_credentials key_directory::read_node() const {
 
 bool key_directory::store_roster(const roster& newest) const {
     const auto guard = folder_.lock(roster_lock);
-    const auto stored = read_roster_file(roster_file);
+    const auto stored = read_roster_file(roster_file, &newest);
     if (stored && stored->fleet() != newest.fleet()) {
         throw security_error{folder_.path_of(roster_file) + " is of another fleet"};
     }

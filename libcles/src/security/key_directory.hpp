@@ -34,6 +34,8 @@ class key_directory {
     /// Creates `key` with a new private key, and `NAME.pub`. An existing key is never replaced.
     node_identity create_key(const std::string& name) const;
     [[nodiscard]] node_identity read_key() const;
+    /// Writes `NAME.pub`.
+    void write_public_identity(const public_identity& identity) const;
     /// Creates `fleet.key`. An existing one is never replaced.
     void create_fleet_key(const signing_key& key) const;
     [[nodiscard]] signing_key read_fleet_key() const;
@@ -54,7 +56,7 @@ class key_directory {
 
   private:
     explicit key_directory(protected_folder folder) : folder_(std::move(folder)) {}
-    [[nodiscard]] std::shared_ptr<const roster> read_roster_file(const std::string& name) const;
+    [[nodiscard]] std::shared_ptr<const roster> read_roster_file(const std::string& name, const roster* known) const;
 
     protected_folder folder_;
 };

@@ -120,7 +120,9 @@ secret_bytes::secret_bytes(bytes_view from) : secret_bytes(from.size()) { std::c
 
 secret_bytes secret_bytes::random(std::size_t size) {
     secret_bytes made{size};
-    randombytes_buf(made.data(), size);
+    if (size != 0) {
+        randombytes_buf(made.data(), size);
+    }
     return made;
 }
 
