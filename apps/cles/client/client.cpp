@@ -2,6 +2,7 @@
 #include "client/client.hpp"
 
 #include "client/logging.hpp"
+#include "client/member_key.hpp"
 #include "client/offered_tasks.hpp"
 #include "client/suggestion.hpp"
 #include "options/arguments.hpp"
@@ -35,6 +36,9 @@ cles::service_options options_of(const address_book& addresses, int verbosity, b
     options.name = "cles-" + std::to_string(::getpid());
     if (const char* pool = std::getenv("CLES_POOL"); pool != nullptr) {
         options.pool = pool;
+    }
+    if (addresses.is_secured()) {
+        use_member_key(options, addresses.keys());
     }
     options.peers = addresses.peers();
     if (in_group || addresses.finds_by_name()) {

@@ -82,7 +82,7 @@ asio::awaitable<void> send_all(client& requester, const request_arguments& args,
     }
     std::vector<std::string> routers;
     if (needs_router(args.addresses, args.noun)) {
-        auto found = co_await possible_routers(requester);
+        auto found = co_await possible_routers(requester, args.addresses);
         routers = std::move(found);
     }
     auto next = std::chrono::steady_clock::now();

@@ -106,7 +106,7 @@ class live_search {
     }
 
     candidates urls() {
-        candidates out{{std::string{default_url}, "the default address of a node"}};
+        candidates out{{std::string{addresses_.default_node()}, "the default address of a node"}};
         if (!has_no_nodes()) {
             auto more = ask([&](client& requester) { return live_urls(requester, addresses_, until_); });
             std::move(more.begin(), more.end(), std::back_inserter(out));

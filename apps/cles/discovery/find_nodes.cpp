@@ -99,7 +99,7 @@ bool needs_router(const address_book& addresses, std::string_view noun) {
     return (node == "any" || node == "all") && addresses.finds_by_name();
 }
 
-asio::awaitable<std::vector<std::string>> possible_routers(client& requester) {
+asio::awaitable<std::vector<std::string>> possible_routers(client& requester, const address_book& addresses) {
     const auto until = steady::now() + discovery_time;
     auto known = requester.node().peers();
     while (steady::now() < until && std::none_of(known.begin(), known.end(), [](const cles::peer& node) {
@@ -118,7 +118,7 @@ asio::awaitable<std::vector<std::string>> possible_routers(client& requester) {
         urls.push_back(node.endpoints.front());
     }
     if (urls.empty()) {
-        urls.emplace_back(default_url);
+        urls.emplace_back(addresses.default_node());
     }
     co_return urls;
 }

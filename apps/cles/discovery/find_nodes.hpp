@@ -35,7 +35,7 @@ bool needs_router(const address_book& addresses, std::string_view noun);
 
 /// URLs of the nodes that may route, the most likely first. It waits for a likely one while nodes announce themselves
 /// after the start. If there is no node, it is the default address.
-boost::asio::awaitable<std::vector<std::string>> possible_routers(client& requester);
+boost::asio::awaitable<std::vector<std::string>> possible_routers(client& requester, const address_book& addresses);
 
 /// The time until then; at least a millisecond, because a deadline of zero means the default.
 std::chrono::milliseconds time_left(std::chrono::steady_clock::time_point until);

@@ -24,13 +24,6 @@ cles::multicast_options parse_group(const std::string& text, const std::string& 
     }
 }
 
-void check_url(const std::string& text) {
-    const auto scheme = cles::parse_url(text).scheme;
-    if (cles::find_transport(scheme) == nullptr) {
-        throw usage_error("'" + text + "': there is no transport " + scheme);
-    }
-}
-
 } // namespace
 
 void multicast_option::add_to(CLI::App& command, const std::string& help) {
@@ -41,24 +34,24 @@ void multicast_option::add_to(CLI::App& command, const std::string& help) {
                 parse_group(text, "--multicast");
                 given_ = text;
             },
-            help + " (default CLES_MULTICAST, otherwise lo)")
+            help + " (default CLES_MULTICAST, otherwise lo; auto with --keys)")
         ->type_name("IFACE[,IFACE...][,GROUP[:PORT]]|auto|off");
 }
 
-cles::multicast_options multicast_option::group() const {
+cles::multicast_options multicast_option::group(bool secured) const {
     if (is_given()) {
         return parse_group(given_, "--multicast");
     }
     if (const char* variable = std::getenv("CLES_MULTICAST"); variable != nullptr && *variable != '\0') {
         return parse_group(variable, "CLES_MULTICAST");
     }
-    cles::multicast_options loopback{.interface = "lo"};
-    loopback.required = false;
-    return loopback;
+    cles::multicast_options wanted{.interface = secured ? "auto" : "lo"};
+    wanted.required = false;
+    return wanted;
 }
 
-void multicast_option::restrict_to(const std::vector<std::string>& interfaces) {
-    const auto all = group();
+void multicast_option::restrict_to(const std::vector<std::string>& interfaces, bool secured) {
+    const auto all = group(secured);
     given_ = interfaces.empty() ? "off" : joined(interfaces, ",") + "," + all.group + ":" + std::to_string(all.port);
 }
 
@@ -79,11 +72,26 @@ void address_book::add_options(CLI::App& command, const std::string& multicast_h
     auto* peer = command.add_option("-p,--peer", peers_, "The URL of the node with this name; may be repeated");
     peer->type_name("NAME=URL")->expected(1)->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
     multicast_.add_to(command, multicast_help);
+    keys_.add_optional_to(command, "The key directory of a member of the fleet, as which secured nodes are reached");
 }
 
 std::string address_book::at() const {
     const char* variable = std::getenv("CLES_AT");
     return at_.empty() && variable != nullptr ? variable : at_;
+}
+
+void address_book::check_url(const std::string& text) const {
+    const auto scheme = cles::parse_url(text).scheme;
+    if (scheme == "tls") {
+        if (!is_secured()) {
+            throw usage_error("'" + text + "' needs the key of a member: give --keys DIR, or set CLES_KEYS");
+        }
+    } else if (cles::find_transport(scheme) == nullptr) {
+        throw usage_error("'" + text + "': there is no transport " + scheme);
+    } else if ((scheme == "tcp" || scheme == "udp") && is_secured()) {
+        throw usage_error("'" + text + "' is refused with --keys: write tls://" +
+                          text.substr(text.find("://") + std::string_view{"://"}.size()));
+    }
 }
 
 void address_book::check() const {
@@ -130,7 +138,7 @@ std::string address_book::url_for(std::string_view node) const {
     if (finds_by_name() && node != "self" && node != "any" && node != "all") {
         return {};
     }
-    return url.empty() ? std::string{default_url} : url;
+    return url.empty() ? std::string{default_node()} : url;
 }
 
 std::string address_book::endpoint_of(std::string_view node) const {

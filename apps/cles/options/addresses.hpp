@@ -3,6 +3,8 @@
 
 #include <cles/multicast.hpp>
 
+#include "options/keys_option.hpp"
+
 #include <map>
 #include <string>
 #include <string_view>
@@ -17,9 +19,11 @@ namespace tool {
 
 /// Where a node listens by default.
 inline constexpr std::string_view default_url = "tcp://127.0.0.1:25370";
+/// The same with security.
+inline constexpr std::string_view default_secured_url = "tls://127.0.0.1:25370";
 
 /// --multicast: the interfaces and the group to use for multicast. The default is CLES_MULTICAST, and without that the
-/// loopback interface, if the group can be joined there.
+/// loopback interface, or all of them with security, where the group can be joined.
 class multicast_option {
   public:
     /// `help` says what the command uses it for.
@@ -28,9 +32,9 @@ class multicast_option {
     /// On the command line; the environment does not count.
     [[nodiscard]] bool is_given() const noexcept { return !given_.empty(); }
     /// \throws usage_error if it is invalid
-    [[nodiscard]] cles::multicast_options group() const;
+    [[nodiscard]] cles::multicast_options group(bool secured) const;
     /// Restricts multicast to these of its interfaces; none turns it off.
-    void restrict_to(const std::vector<std::string>& interfaces);
+    void restrict_to(const std::vector<std::string>& interfaces, bool secured);
 
   private:
     std::string given_;
@@ -39,7 +43,7 @@ class multicast_option {
 /// "lo, eth0"
 std::string joined(const std::vector<std::string>& names, const char* separator = ", ");
 
-/// --at, --peer and --multicast: where the command finds the nodes that it talks to.
+/// --at, --peer and --multicast: where the command finds the nodes that it talks to. --keys: as whom it does so.
 class address_book {
   public:
     void add_options(CLI::App& command,
@@ -56,9 +60,16 @@ class address_book {
     /// --at or CLES_AT is set.
     [[nodiscard]] bool has_url() const { return !at().empty(); }
     /// The multicast group, which not every command joins.
-    [[nodiscard]] cles::multicast_options group() const { return multicast_.group(); }
+    [[nodiscard]] cles::multicast_options group() const { return multicast_.group(is_secured()); }
     /// Restricts multicast to these interfaces; none turns it off.
-    void restrict_group_to(const std::vector<std::string>& interfaces) { multicast_.restrict_to(interfaces); }
+    void restrict_group_to(const std::vector<std::string>& interfaces) {
+        multicast_.restrict_to(interfaces, is_secured());
+    }
+    /// The directory with the key of this command; empty without security.
+    [[nodiscard]] std::string keys() const { return keys_.given_directory(); }
+    [[nodiscard]] bool is_secured() const { return !keys().empty(); }
+    /// Where a node of this host listens by default.
+    [[nodiscard]] std::string_view default_node() const { return is_secured() ? default_secured_url : default_url; }
     /// --multicast was given.
     [[nodiscard]] bool has_group() const noexcept { return multicast_.is_given(); }
     /// The URL to which requests for this node are sent; empty if it is one of the peers, or found by its name.
@@ -75,10 +86,12 @@ class address_book {
 
   private:
     [[nodiscard]] std::string at() const;
+    void check_url(const std::string& text) const;
 
     std::string at_;
     std::vector<std::string> peers_;
     multicast_option multicast_;
+    keys_option keys_;
 };
 
 } // namespace tool

@@ -24,12 +24,15 @@ void keys_option::add_to(CLI::App& command, const std::string& help) {
         ->type_name("DIR");
 }
 
+void keys_option::add_optional_to(CLI::App& command, const std::string& help) {
+    command.add_option("-k,--keys", given_, help + " (default CLES_KEYS, otherwise none)")->type_name("DIR");
+}
+
+std::string keys_option::given_directory() const { return given_.empty() ? variable("CLES_KEYS") : given_; }
+
 std::string keys_option::directory() const {
-    if (!given_.empty()) {
-        return given_;
-    }
-    if (const auto set = variable("CLES_KEYS"); !set.empty()) {
-        return set;
+    if (auto given = given_directory(); !given.empty()) {
+        return given;
     }
     if (const auto configuration = variable("XDG_CONFIG_HOME"); !configuration.empty()) {
         return configuration + "/cles/keys";

@@ -9,15 +9,19 @@ class App;
 
 namespace tool {
 
-/// --keys: the directory with the key of a node or of a fleet. The default is CLES_KEYS, and without that a folder
-/// beside the user's configuration.
+/// --keys: the directory with the key of a node or of a fleet. The default is CLES_KEYS. Commands that manage such a
+/// directory otherwise use a folder beside the user's configuration; those that talk to nodes use no key.
 class keys_option {
   public:
-    /// `help` says what is in the directory.
+    /// For commands that manage the directory; `help` says what is in it.
     void add_to(CLI::App& command, const std::string& help);
+    /// For commands that talk to nodes.
+    void add_optional_to(CLI::App& command, const std::string& help);
 
     /// \throws usage_error if none was given and there is no default
     [[nodiscard]] std::string directory() const;
+    /// The directory of --keys or CLES_KEYS; empty without both.
+    [[nodiscard]] std::string given_directory() const;
 
   private:
     std::string given_;

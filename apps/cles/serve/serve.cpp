@@ -3,8 +3,10 @@
 #include <cles/wake_bound.hpp>
 
 #include "client/logging.hpp"
+#include "client/member_key.hpp"
 #include "commands.hpp"
 #include "options/addresses.hpp"
+#include "options/keys_option.hpp"
 #include "output/errors.hpp"
 #include "output/terminal.hpp"
 #include "serve/demo_node.hpp"
@@ -32,7 +34,8 @@ namespace asio = boost::asio;
 namespace {
 
 struct serve_arguments {
-    std::string name = "car1";
+    std::string name;
+    keys_option keys;
     std::string pool;
     bool allow_clash = false;
     std::vector<std::string> listen;
@@ -47,12 +50,18 @@ struct serve_arguments {
 
 cles::service_options options_of(const serve_arguments& args, const cles::log_sink& log) {
     cles::service_options options;
-    options.name = args.name;
+    const auto keys = args.keys.given_directory();
+    if (!keys.empty()) {
+        use_member_key(options, keys);
+    }
+    if (!args.name.empty() || keys.empty()) {
+        options.name = args.name.empty() ? "car1" : args.name;
+    }
     const char* pool = std::getenv("CLES_POOL");
     options.pool = args.pool.empty() && pool != nullptr ? pool : args.pool;
     options.listen = args.listen;
     if (options.listen.empty()) {
-        options.listen.emplace_back(default_url);
+        options.listen.emplace_back(keys.empty() ? default_url : "tls://0.0.0.0:25370");
     }
     for (const auto& where : options.listen) {
         if (where.starts_with("inproc:")) {
@@ -61,7 +70,7 @@ cles::service_options options_of(const serve_arguments& args, const cles::log_si
     }
     options.insecure = args.insecure;
     options.networks = args.networks;
-    options.multicast = args.multicast.group();
+    options.multicast = args.multicast.group(!keys.empty());
     options.log = log;
     return options;
 }
@@ -77,9 +86,10 @@ int serve(const serve_arguments& args, int verbosity) {
     int code = exit_code::success;
     demo_node* running = nullptr;
     auto options = options_of(args, log);
+    const auto name = options.name;
     if (!args.allow_clash) {
         options.on_name_taken = [&](std::string_view where) {
-            log(cles::log_level::error, "stopping: the node at " + std::string{where} + " had the name '" + args.name +
+            log(cles::log_level::error, "stopping: the node at " + std::string{where} + " had the name '" + name +
                                             "' first; choose another name (--name), or allow it (--allow-clash)");
             code = exit_code::local_failure;
             signals.cancel();
@@ -96,7 +106,7 @@ int serve(const serve_arguments& args, int verbosity) {
         }
     });
     for (const auto& endpoint : node.service().endpoints()) {
-        write_output(args.name + " listening on " + endpoint + "\n");
+        write_output(name + " listening on " + endpoint + "\n");
     }
     cles::run(io, {.busy_poll = std::chrono::microseconds{args.busy_poll_us},
                    .fifo_priority = args.real_time,
@@ -109,7 +119,8 @@ int serve(const serve_arguments& args, int verbosity) {
 void add_serve(CLI::App& app, context& shared) {
     auto args = std::make_shared<serve_arguments>();
     auto* command = app.add_subcommand("serve", "Run a node for experiments");
-    command->add_option("--name", args->name, "The name of the node (default car1)")->type_name("NAME");
+    command->add_option("--name", args->name, "The name of the node (default: that of the key, otherwise car1)")
+        ->type_name("NAME");
     command
         ->add_option("--pool", args->pool, "The pool of the node; nodes of other pools are ignored (default CLES_POOL)")
         ->type_name("NAME");
@@ -117,7 +128,7 @@ void add_serve(CLI::App& app, context& shared) {
     command
         ->add_option("-l,--listen", args->listen,
                      "A URL to listen at; port 0: a free port; may be repeated (default " + std::string{default_url} +
-                         ")")
+                         ", with --keys tls on all interfaces)")
         ->type_name("URL")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -148,6 +159,7 @@ void add_serve(CLI::App& app, context& shared) {
         ->type_name("NETWORK")
         ->expected(1)
         ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+    args->keys.add_optional_to(*command, "The key directory of the node, which then authenticates and encrypts");
     args->multicast.add_to(*command, "Interfaces on which it is found by its name, and publishes updates by multicast");
     command->footer("Tasks: PULL and BIND localization, PULL echo/..., PUSH and DELEGATE echo, DELEGATE sleep/<ms>,\n"
                     "DELEGATE fail, BIND and UPDATE notice. SIGTERM and Ctrl-C stop the node.\n\n"
@@ -156,7 +168,8 @@ void add_serve(CLI::App& app, context& shared) {
                     "  cles serve --name car2 --listen tcp://127.0.0.1:0 --listen unix:///tmp/car2.sock --rate 50\n"
                     "  cles serve --listen tcp://0.0.0.0 --insecure\n"
                     "  cles serve --listen tcp://127.0.0.1 --listen udp://127.0.0.1\n"
-                    "  cles serve --multicast eth0 --insecure");
+                    "  cles serve --multicast eth0 --insecure\n"
+                    "  cles serve --keys /etc/cles/keys");
     command->callback([args, &shared] { shared.exit_code = serve(*args, shared.verbosity); });
 }
 

@@ -146,6 +146,7 @@ void sealed_group_port::on_group(const core::group_datagram& datagram) {
     if (sender == nullptr) {
         return;
     }
+    received_.insert(found.accepted_by.member);
     // Both outlive the call, in which another roster may come into force, or another datagram be opened.
     const std::string name = sender->name;
     auto line = std::exchange(line_, {});
@@ -177,10 +178,12 @@ void sealed_group_port::note_unknown(std::uint32_t member, std::string_view line
     }
 }
 
-// It is asked to announce itself: what it has announced under this salt so far was dropped.
+// It is asked to announce itself: what it has announced under this salt so far was dropped. So was what this node has
+// asked the group since its start, if the peer did not know its salt either.
 void sealed_group_port::on_established(const datagram_source& with, bool) {
     const auto* const peer = all_->members().in_force().find(with.member);
-    if (unknown_.erase(with.member) != 0 && peer != nullptr) {
+    const bool was_unknown = unknown_.erase(with.member) != 0;
+    if ((was_unknown || !received_.contains(with.member)) && peer != nullptr) {
         static_cast<void>(send(std::string_view{"BIND " + peer->name + ":cles\n"}));
     }
 }

@@ -4,6 +4,8 @@
 #include "port/group_port.hpp"
 #include "security/sealed_datagrams.hpp"
 
+#include <boost/unordered/unordered_flat_set.hpp>
+
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -59,6 +61,7 @@ class sealed_group_port final : public core::group_port, private core::group_lis
     std::string sealed_;
     std::vector<std::uint16_t> sizes_;
     std::map<std::uint32_t, std::vector<std::string>> unknown_; // announced endpoints of members with unknown salts
+    boost::unordered_flat_set<std::uint32_t> received_;         // members of which lines have been opened
 };
 
 } // namespace cles::security

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "client/member_key.hpp"
+
+#ifdef CLES_SECURITY
+
+#include <cles/error.hpp>
+#include <cles/security.hpp>
+#include <cles/security/node_files.hpp>
+
+#include <stdexcept>
+
+namespace tool {
+
+void use_member_key(cles::service_options& options, const std::string& directory) {
+    try {
+        options.security = cles::secured(directory);
+    } catch (const cles::error& e) { // of this host, not of a node
+        throw std::runtime_error(e.message());
+    }
+    options.name = cles::security::describe_node(directory).name;
+}
+
+} // namespace tool
+
+#else
+
+#include "output/errors.hpp"
+
+namespace tool {
+
+void use_member_key(cles::service_options& /*options*/, const std::string& directory) {
+    throw usage_error("--keys " + directory + ": this cles was built without security");
+}
+
+} // namespace tool
+
+#endif

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/service.hpp>
+
+#include <string>
+
+namespace tool {
+
+/// Makes the service the member of a fleet whose key is in this directory: sets its security and its name.
+/// \throws std::runtime_error that says what is wrong in the directory, and what corrects it
+void use_member_key(cles::service_options& options, const std::string& directory);
+
+} // namespace tool
