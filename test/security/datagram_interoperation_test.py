@@ -1,0 +1,195 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Datagrams that the library seals are opened by the reference implementation, and the other way round.
+
+    datagram_interoperation_test.py PROGRAM [unittest options]       PROGRAM is cles_security_datagrams
+"""
+
+import os
+import subprocess
+import sys
+import unittest
+
+try:
+    import nacl  # noqa: F401
+except ImportError:
+    # Debian installs python3-nacl for its own Python, which need not be the one that runs the tests.
+    sys.path.append("/usr/lib/python3/dist-packages")
+try:
+    import reference as r
+except ImportError as error:
+    print(f"skipped: {error} (package python3-nacl)")
+    sys.exit(77)
+from nacl import bindings as sodium
+
+PROGRAM = ""
+VERSION, GENERATION = 41, 7
+EPOCH = "5f3a09c1"  # of the library's node, which is car1 and has the number 5
+CAR1, CAR2 = 5, 2**24 - 1
+
+
+class Library(unittest.TestCase):
+    """car1 is a node of the library, car2 the reference implementation."""
+
+    def setUp(self):
+        self.fleet, self.other_fleet, self.car2, self.stranger = (r.Identity(os.urandom(32)) for _ in range(4))
+        seed = os.urandom(32)
+        self.car1 = r.Identity(seed)
+        self.group_keys = os.urandom(32), os.urandom(32)
+        self.salt = os.urandom(16)
+        roster = {"fleet": r.text(self.fleet.public), "version": VERSION, "last": CAR2, "generation": GENERATION,
+                  "oldest": GENERATION, "keys": self.sealed(self.fleet), "members": [
+                      {"number": number, "name": name, "key": r.text(who.public), "keys": self.sealed(who)}
+                      for number, name, who in ((CAR1, "car1", self.car1), (CAR2, "car2", self.car2))]}
+        self.program = subprocess.Popen([PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self.addCleanup(self.program.stdout.close)
+        self.addCleanup(self.program.wait)
+        self.addCleanup(self.program.stdin.close)
+        line = r.sign_roster(self.fleet, roster).decode()
+        self.assertEqual(self.command(f"node car1 {seed.hex()} {self.fleet.public.hex()} {EPOCH} {line}"), [])
+
+    def sealed(self, receiver: r.Identity) -> str:
+        return r.text(sodium.crypto_box_seal(b"".join(self.group_keys), receiver.dh_public))
+
+    def command(self, text: str) -> list:
+        self.program.stdin.write(text + "\n")
+        self.program.stdin.flush()
+        done = []
+        for line in self.program.stdout:
+            if line == ".\n":
+                return done
+            done.append(line[:-1])
+        self.fail(f"the program ended at: {text}")
+
+    def receive(self, datagram: bytes) -> list:
+        return self.command("receive " + datagram.hex())
+
+    def datagram(self, line: str) -> bytes:
+        self.assertTrue(line.startswith("datagram "), line)
+        return bytes.fromhex(line.removeprefix("datagram "))
+
+    def check_statement(self, payload: bytes) -> None:
+        self.assertEqual(int.from_bytes(payload[8:12], "big"), VERSION)
+        self.assertEqual(payload[12:16].hex(), EPOCH)
+
+    def hello(self, me=None, fleet=None, number=CAR1, member=CAR2, epoch="0a0b0c0d", counter=40) -> bytes:
+        """car2's HELLO, or one that is wrong somewhere. Its handshake is in `self.handshake`."""
+        self.index = os.urandom(8)
+        start = r.head(r.HELLO, member) + self.index
+        self.handshake = r.Handshake(me or self.car2, self.car1.public, True,
+                                     r.prologue((fleet or self.fleet).public, number, start), os.urandom(32))
+        return start + self.handshake.write(r.hello_payload(VERSION - 1, epoch, self.salt, counter))
+
+    def welcome(self, hello: bytes, epoch="0a0b0c0d") -> bytes:
+        """car2's answer to a HELLO of the library."""
+        self.assertEqual((len(hello), hello[:4]), (100, r.head(r.HELLO, CAR1)))
+        handshake = r.Handshake(self.car2, self.car1.public, False, r.prologue(self.fleet.public, CAR2, hello[:12]),
+                                os.urandom(32))
+        payload = handshake.read(hello[12:])
+        self.check_statement(payload)
+        self.assertEqual(payload[:8], bytes(8))
+        self.index, self.peer_index, self.handshake = os.urandom(8), hello[4:12], handshake
+        return r.head(r.WELCOME, CAR2) + hello[4:12] + handshake.write(
+            r.welcome_payload(self.index, VERSION, epoch, self.salt, 40))
+
+    def connect(self) -> None:
+        """A session that car2 began."""
+        welcome = self.datagram(self.receive(self.hello())[0])
+        self.assertEqual((len(welcome), welcome[:12]), (100, r.head(r.WELCOME, CAR1) + self.index))
+        payload = self.handshake.read(welcome[12:])
+        self.check_statement(payload)
+        self.peer_index, self.stated_salt = payload[:8], payload[16:32]
+        self.stated_counter = int.from_bytes(payload[32:], "big")
+        self.sending, self.receiving = self.handshake.split()
+
+    def data(self, counter: int, line: bytes) -> bytes:
+        return r.seal_data(self.sending, CAR2, self.peer_index, counter, line)
+
+    def open(self, datagram: bytes) -> tuple:
+        """The counter and the line of DATA from the library."""
+        self.assertEqual(datagram[:12], r.head(r.DATA, CAR1) + self.index)
+        return int.from_bytes(datagram[12:20], "big"), r.open_data(self.receiving, datagram)
+
+    def test_a_session_that_the_reference_begins(self):
+        self.connect()
+        self.assertEqual(self.receive(self.data(0, b"PULL car1:speed id=1")),
+                         [f"established {CAR2} {VERSION - 1} 0a0b0c0d {self.salt.hex()} 40 -",
+                          f"opened {CAR2} 0a0b0c0d PULL car1:speed id=1"])
+        sent = self.command(f'send {CAR2} id=1 {{"v":27.5}}')
+        self.assertEqual([self.open(self.datagram(line)) for line in sent], [(0, b'id=1 {"v":27.5}')])
+        self.assertEqual(self.receive(self.data(0, b"PULL car1:speed id=1")), [])
+        self.assertEqual(self.receive(self.data(5, b"x" * 1200)), [f"opened {CAR2} 0a0b0c0d " + "x" * 1200])
+        self.assertEqual(self.receive(self.data(3, b"late")), [f"opened {CAR2} 0a0b0c0d late"])
+
+    def test_an_empty_line_is_answered(self):
+        self.connect()
+        established, *rest = sorted(self.receive(self.data(0, b"")), reverse=True)
+        self.assertTrue(established.startswith("established"))
+        self.assertEqual([self.open(self.datagram(line)) for line in rest], [(0, b"")])
+
+    def test_a_session_that_the_library_begins(self):
+        hello, = self.command(f"send {CAR2} PULL car2:speed id=1")
+        self.assertEqual(self.command("wait 200"), [hello])
+        sent, established = self.receive(self.welcome(self.datagram(hello)))
+        self.assertEqual(established, f"established {CAR2} {VERSION} 0a0b0c0d {self.salt.hex()} 40 -")
+        self.sending, self.receiving = self.handshake.split()
+        self.assertEqual(self.open(self.datagram(sent)), (0, b"PULL car2:speed id=1"))
+        empty, = self.command("wait 200")
+        self.assertEqual(self.open(self.datagram(empty)), (1, b""))
+        self.assertEqual(self.receive(self.data(0, b"id=1 {}")), [f"opened {CAR2} 0a0b0c0d id=1 {{}}"])
+        self.assertEqual(self.receive(self.data(1, b"")), [])
+        self.assertEqual(self.command("wait 5000"), [])
+
+    def test_a_restart(self):
+        self.connect()
+        self.receive(self.data(0, b"one"))
+        self.receive(self.hello(epoch="0a0b0c0e"))
+        welcome, = self.receive(self.hello(epoch="0a0b0c0e"))
+        payload = self.handshake.read(self.datagram(welcome)[12:])
+        self.peer_index, (self.sending, self.receiving) = payload[:8], self.handshake.split()
+        self.assertEqual(self.receive(self.data(0, b"two")),
+                         [f"established {CAR2} {VERSION - 1} 0a0b0c0e {self.salt.hex()} 40 restarted",
+                          f"opened {CAR2} 0a0b0c0e two"])
+
+    def test_hellos_that_are_not_answered(self):
+        for wrong in ({"me": self.stranger}, {"fleet": self.other_fleet}, {"number": CAR2}, {"member": CAR1}, {"member": 6},
+                      {"me": self.car1}):
+            self.assertEqual(self.receive(self.hello(**wrong)), [], str(wrong))
+
+    def test_no_bit_of_data_can_be_changed(self):
+        self.connect()
+        self.receive(self.data(0, b"first"))
+        datagram = self.data(1, b"PUSH car1:target id=1")
+        for place in range(len(datagram)):
+            for bit in range(8):
+                changed = bytearray(datagram)
+                changed[place] ^= 1 << bit
+                self.assertEqual(self.receive(bytes(changed)), [])
+        self.assertEqual(len(self.receive(datagram)), 1)
+
+    def test_group(self):
+        key = self.group_keys[0]
+        self.connect()
+        received = self.command("open " + r.seal_group(key, CAR2, GENERATION, self.salt, 40, b"early").hex())
+        self.assertEqual(received, [f"unknown {CAR2}"])
+        self.receive(self.data(0, b""))
+        sealed = [r.seal_group(key, CAR2, GENERATION, self.salt, counter, b"UPDATE car2:speed") for counter in (39, 40, 45)]
+        self.assertEqual([self.command("open " + datagram.hex()) for datagram in sealed], [
+            [f"refused {CAR2} 0a0b0c0d UPDATE car2:speed"], [f"accepted {CAR2} 0a0b0c0d UPDATE car2:speed"],
+            [f"accepted {CAR2} 0a0b0c0d UPDATE car2:speed"]])
+        following = r.seal_group(self.group_keys[1], CAR2, GENERATION + 1, self.salt, 46, b"with the next key")
+        self.assertEqual(self.command("open " + following.hex()), [f"accepted {CAR2} 0a0b0c0d with the next key"])
+
+        window = r.ReplayWindow(self.stated_counter)
+        for number in range(3):
+            text, = self.command(f"seal UPDATE car1:speed {number}")
+            datagram = bytes.fromhex(text.removeprefix("sealed "))
+            self.assertEqual(datagram[:8], r.head(r.GROUP, CAR1) + GENERATION.to_bytes(4, "big"))
+            self.assertEqual(datagram[8:24], self.stated_salt)
+            self.assertEqual(r.open_group(key, datagram), f"UPDATE car1:speed {number}".encode())
+            self.assertTrue(window.accept(int.from_bytes(datagram[24:32], "big")))
+
+
+if __name__ == "__main__":
+    PROGRAM = sys.argv.pop(1)
+    unittest.main(verbosity=2)

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: BSL-1.0
+// A node that seals and opens datagrams, driven by datagram_interoperation_test.py: commands by standard input, one a
+// line; what the node does by standard output, and a line with a point after each command.
+//
+//   node NAME SEED FLEET EPOCH ROSTER   comes first: the name, keys and epoch in hexadecimal digits, the roster line
+//   send MEMBER LINE                    to the only address that there is
+//   contact MEMBER
+//   receive DATAGRAM                    in hexadecimal digits
+//   wait MILLISECONDS
+//   seal LINE                           for the group
+//   open DATAGRAM                       from the group
+#include "security/datagram_sessions.hpp"
+#include "security/group_receiver.hpp"
+#include "security/group_sender.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <iomanip>
+#include <iostream>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace {
+
+using namespace cles::security;
+
+constexpr auto peer_at = datagram_path::v4(0x7f000001, 25370);
+
+std::vector<std::uint8_t> from_hex(std::string_view hex) {
+    std::vector<std::uint8_t> bytes;
+    for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
+        bytes.push_back(static_cast<std::uint8_t>(std::stoul(std::string{hex.substr(i, 2)}, nullptr, 16)));
+    }
+    return bytes;
+}
+
+std::string hex_of(bytes_view bytes) {
+    constexpr std::string_view digits = "0123456789abcdef";
+    std::string hex;
+    for (const auto byte : bytes) {
+        hex.push_back(digits[byte >> 4U]);
+        hex.push_back(digits[byte & 15U]);
+    }
+    return hex;
+}
+
+std::string hex_of(std::uint32_t number) {
+    std::ostringstream text;
+    text << std::hex << std::setfill('0') << std::setw(8) << number;
+    return text.str();
+}
+
+std::shared_ptr<const roster> read_roster(const std::string& line, bytes_view fleet_key) {
+    public_key key{};
+    std::ranges::copy(fleet_key, key.begin());
+    return roster::read(line, key);
+}
+
+class node final : public datagram_sink {
+  public:
+    node(std::string name, std::string_view seed, std::string_view fleet_key, std::uint32_t epoch,
+         const std::string& roster_line)
+        : epoch_(epoch), fleet_(std::move(name), signing_key{secret_bytes{from_hex(seed)}},
+                                read_roster(roster_line, from_hex(fleet_key))),
+          sender_(fleet_, system_entropy()), receiver_(fleet_, sender_, system_entropy()),
+          sessions_(fleet_, *this, system_entropy()) {}
+
+    void run(const std::string& command, const std::string& rest) {
+        if (command == "send") {
+            const auto space = rest.find(' ');
+            sessions_.send(to(rest), rest.substr(space + 1), now_);
+        } else if (command == "contact") {
+            sessions_.contact(to(rest), now_);
+        } else if (command == "receive") {
+            sessions_.receive(peer_at, from_hex(rest), now_);
+        } else if (command == "wait") {
+            now_ += std::chrono::milliseconds{std::stoi(rest)};
+            sessions_.on_time(now_);
+        } else if (command == "seal") {
+            std::cout << "sealed " << hex_of(sender_.seal(rest)) << "\n";
+        } else if (command == "open") {
+            open(from_hex(rest));
+        } else {
+            throw std::runtime_error{"unknown command " + command};
+        }
+    }
+
+  private:
+    static datagram_source to(const std::string& text) {
+        return {.path = peer_at, .member = static_cast<std::uint32_t>(std::stoul(text))};
+    }
+    void open(bytes_view datagram) {
+        const auto result = receiver_.open(peer_at, datagram, now_);
+        if (result.what == group_receiver::verdict::opened) {
+            const bool accepted = receiver_.accept(result.accepted_by, group_receiver::ordered_by::counter);
+            std::cout << (accepted ? "accepted " : "refused ") << result.accepted_by.member << " "
+                      << hex_of(result.epoch) << " " << result.line << "\n";
+        }
+        if (result.contact) {
+            std::cout << "unknown " << result.contact->member << "\n";
+        }
+    }
+
+    void send(const datagram_path&, bytes_view datagram) override {
+        std::cout << "datagram " << hex_of(datagram) << "\n";
+    }
+    node_statement statement() override {
+        return {.roster = fleet_.in_force().version(),
+                .epoch = epoch_,
+                .salt = sender_.salt(),
+                .counter = sender_.next_counter()};
+    }
+    void established(const datagram_source& with, const node_statement& stated, bool restarted) override {
+        receiver_.learn(with.member, stated);
+        std::cout << "established " << with.member << " " << stated.roster << " " << hex_of(stated.epoch) << " "
+                  << hex_of(stated.salt) << " " << stated.counter << " " << (restarted ? "restarted" : "-") << "\n";
+    }
+    void opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) override {
+        std::cout << "opened " << from.member << " " << hex_of(epoch) << " " << line << "\n";
+    }
+    void gave_up(const datagram_source& with) override { std::cout << "gave_up " << with.member << "\n"; }
+
+    std::uint32_t epoch_;
+    cles::time_point now_{std::chrono::hours{1}};
+    fleet fleet_;
+    group_sender sender_;
+    group_receiver receiver_;
+    datagram_sessions sessions_;
+};
+
+} // namespace
+
+int main() {
+    try {
+        std::unique_ptr<node> made;
+        for (std::string line; std::getline(std::cin, line);) {
+            std::istringstream words{line};
+            std::string command;
+            words >> command;
+            if (command == "node") {
+                std::string name;
+                std::string seed;
+                std::string fleet_key;
+                std::string epoch;
+                words >> name >> seed >> fleet_key >> epoch >> std::ws;
+                std::string roster_line;
+                std::getline(words, roster_line);
+                made = std::make_unique<node>(name, seed, fleet_key,
+                                              static_cast<std::uint32_t>(std::stoul(epoch, nullptr, 16)), roster_line);
+            } else if (made) {
+                made->run(command, line.substr(std::min(line.size(), command.size() + 1)));
+            }
+            std::cout << "." << std::endl;
+        }
+    } catch (const std::exception& e) {
+        std::cerr << e.what() << "\n";
+        return 1;
+    }
+}
