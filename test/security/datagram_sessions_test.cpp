@@ -626,6 +626,25 @@ BOOST_AUTO_TEST_CASE(forged_hellos_count_too) {
     BOOST_TEST(network.count(datagram_kind::welcome) == 1U);
 }
 
+BOOST_AUTO_TEST_CASE(welcomes_per_second_are_limited) {
+    limits.hellos_per_second = 100;
+    restart(car1, 0x11111112);
+    network.drop = [](const auto& d) { return d.content[0] == 0x82; };
+    car1->contact(*car2);
+    network.run(10ms);
+    const auto welcome = last(datagram_kind::welcome, *car2);
+    for (int i = 0; i < 10; ++i) {
+        auto forged = welcome;
+        forged[50] ^= static_cast<std::uint8_t>(i + 1);
+        car1->receive(car2->at, forged);
+    }
+    car1->receive(car2->at, welcome);
+    BOOST_TEST(car1->established_log.empty());
+    network.run(100ms);
+    car1->receive(car2->at, welcome);
+    BOOST_TEST(car1->established_log.size() == 1U);
+}
+
 BOOST_AUTO_TEST_CASE(sessions_without_data_are_1024_of_the_newest_for_ten_seconds) {
     limits.hellos_per_second = 1'000'000;
     restart(car2, 0x22222223);
@@ -702,6 +721,20 @@ BOOST_AUTO_TEST_CASE(a_member_has_a_limited_number_of_sources) {
     BOOST_TEST(car2->count("known") == 1U);
 }
 
+BOOST_AUTO_TEST_CASE(handshakes_that_this_node_has_begun_are_not_replaced_by_others) {
+    limits.sources_per_member = 2;
+    restart(car1, 0x11111112);
+    network.drop = [](const auto&) { return true; };
+    for (int port = 1; port <= 2; ++port) {
+        BOOST_TEST(car1->sessions.contact({.path = at(2, static_cast<std::uint16_t>(port)), .member = 2}, network.now));
+    }
+    BOOST_TEST(!car1->sessions.contact({.path = at(2, 3), .member = 2}, network.now));
+    BOOST_TEST(!car1->sessions.send({.path = at(2, 3), .member = 2}, "line", network.now));
+    BOOST_TEST(car1->sessions.contact({.path = at(3, 3), .member = 3}, network.now));
+    network.run(2s);
+    BOOST_TEST(car1->gave_up_log.size() == 3U);
+}
+
 // -- time ----------------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(the_initiator_begins_a_new_session_after_15_minutes) {
@@ -765,6 +798,18 @@ BOOST_AUTO_TEST_CASE(a_session_is_not_used_after_20_minutes_even_if_the_timer_is
     BOOST_TEST(network.count(datagram_kind::hello) == 1U);
 }
 
+BOOST_AUTO_TEST_CASE(a_session_without_data_is_forgotten_if_the_timer_is_late) {
+    network.drop = [](const auto& d) { return d.content[0] == 0x83; };
+    car1->contact(*car2);
+    network.run(100ms);
+    network.now += 21min;
+    car1->sessions.on_time(network.now);
+    car2->sessions.on_time(network.now);
+    BOOST_TEST(car1->sessions.sources() == 0U);
+    BOOST_TEST(car2->sessions.half_open() == 0U);
+    BOOST_TEST(!car1->sessions.next_deadline());
+}
+
 BOOST_AUTO_TEST_CASE(the_initiator_begins_a_new_session_after_many_datagrams) {
     limits.rekey_datagrams = 10;
     for (const bool initiator_sends : {true, false}) {
@@ -815,9 +860,29 @@ BOOST_AUTO_TEST_CASE(a_peer_that_has_answered_since_is_not_checked) {
     car1->sessions.check_peer(car2->source(), network.now, network.now);
     BOOST_TEST(network.count(datagram_kind::hello) == 1U);
     car1->sessions.check_peer(car2->source(), network.now, network.now); // one has begun
+    car1->contact(*car2);
     BOOST_TEST(network.count(datagram_kind::hello) == 1U);
     network.run(100ms);
     BOOST_TEST(!car1->established_log.back().restarted);
+}
+
+BOOST_AUTO_TEST_CASE(what_arrived_with_the_first_copy_is_no_answer_to_it) {
+    establish();
+    car2->send(*car1, "at the same time");
+    network.run(1ms);
+    BOOST_REQUIRE(car1->count("at the same time") == 1U);
+    car1->sessions.check_peer(car2->source(), network.now, network.now + 200ms);
+    BOOST_TEST(network.count(datagram_kind::hello) == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(no_further_session_begins_until_data_has_arrived_in_the_last_one) {
+    network.drop = [](const auto& d) { return d.content[0] == 0x83; };
+    car1->contact(*car2);
+    network.run(100ms);
+    BOOST_TEST(car1->established_log.size() == 1U);
+    car1->contact(*car2);
+    car1->sessions.check_peer(car2->source(), network.now, network.now);
+    BOOST_TEST(network.count(datagram_kind::hello) == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(a_restarted_initiator_is_reported_to_the_responder) {
@@ -941,6 +1006,19 @@ BOOST_AUTO_TEST_CASE(a_member_with_a_new_number_is_another_one) {
     BOOST_TEST(car1->sessions.send({.path = car2->at, .member = 4}, "line", network.now));
     network.run(100ms);
     BOOST_TEST(car2->count("line") == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_member_with_a_new_name_is_another_one) {
+    establish();
+    fleet.authority.rotate(); // for the next version
+    const auto line = fleet.authority.newest().line();
+    const auto start = line.find("\"roster\":") + 9;
+    const auto content = replaced(line.substr(start, line.size() - start - 1), "\"car2\"", "\"car7\"");
+    const auto signed_by = to_base64url(key_from(200).sign("cles roster 1\n" + content));
+    std::string why;
+    const auto verdict = car1->fleet.offer(R"({"signature":")" + signed_by + R"(","roster":)" + content + "}", &why);
+    BOOST_REQUIRE_MESSAGE((verdict == cles::security::fleet::verdict::adopted), why);
+    BOOST_TEST(car1->sessions.sources() == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(a_roster_may_change_while_a_line_is_delivered) {

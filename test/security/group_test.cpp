@@ -490,6 +490,24 @@ BOOST_AUTO_TEST_CASE(one_source_does_not_decide_which_is_contacted) {
     BOOST_TEST(honest > 20);
 }
 
+BOOST_AUTO_TEST_CASE(sources_from_before_a_new_roster_are_not_contacted_for_later_generations) {
+    const auto two_ahead = [&](member_end& car) {
+        fleet.authority.rotate();
+        fleet.authority.rotate();
+        car.adopt(fleet);
+        return car.seal("line");
+    };
+    BOOST_TEST(open(car2, two_ahead(car1), at(2)).contact.has_value());
+    car2.adopt(fleet);
+    const auto datagram = two_ahead(car1);
+    for (int i = 0; i < 20; ++i) {
+        now += 120ms;
+        const auto contact = open(car2, datagram, at(9)).contact;
+        BOOST_REQUIRE(contact);
+        BOOST_TEST((contact->path == at(9)));
+    }
+}
+
 BOOST_AUTO_TEST_CASE(a_removed_member_is_not_received_and_receives_nothing) {
     car1.meet(car2);
     car2.meet(car1);

@@ -390,7 +390,6 @@ void datagram_sessions::serve(peer& p, time_point now) {
         gave_up = !p.retry.expire(now);
         if (gave_up) {
             end_attempt(p);
-            drop_waiting(p);
             if (const auto* const session = p.unconfirmed()) {
                 p.drop(*session);
             }
