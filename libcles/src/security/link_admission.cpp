@@ -95,7 +95,7 @@ link_admission::verdict link_admission::on_line(std::string_view line, std::stri
     protocol::request_line said;
     protocol::malformed_request wrong;
     if (protocol::parse_request(line, said, wrong) && said.verb == verb::push && said.noun.target == "self" &&
-        said.noun.task == "cles" && said.noun.parameters.size() == 1 && !said.wants_reply) {
+        said.noun.task == "cles" && said.noun.parameters.size() == 1 && !said.wants_reply && said.id == 0) {
         const auto what = said.noun.parameters.front();
         if (stage_ == stage::hello && what == "hello") {
             return on_hello(said.body, out);

@@ -27,9 +27,10 @@ tls_errc code_of(admission::reason why) noexcept {
 } // namespace
 
 tls_codec::tls_codec(std::shared_ptr<const tls_context> shared, tls_engine::role as,
-                     std::shared_ptr<security::admission_terms> terms, std::string expected, report_function report)
-    : shared_(std::move(shared)), terms_(std::move(terms)), report_(std::move(report)), engine_(*shared_, as),
-      admission_(terms_, std::move(expected)) {}
+                     std::shared_ptr<security::admission_terms> terms, std::string expected, report_function report,
+                     std::chrono::milliseconds time_to_open)
+    : shared_(std::move(shared)), terms_(std::move(terms)), report_(std::move(report)), time_to_open_(time_to_open),
+      engine_(*shared_, as), admission_(terms_, std::move(expected)) {}
 
 tls_codec::status tls_codec::open(boost::system::error_code& why) {
     if (shaken_) {

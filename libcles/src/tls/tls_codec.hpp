@@ -24,12 +24,13 @@ class tls_codec final : public transport::stream_codec {
     using report_function = std::function<void(std::string_view)>;
 
     tls_codec(std::shared_ptr<const tls_context> shared, tls_engine::role as,
-              std::shared_ptr<security::admission_terms> terms, std::string expected, report_function report);
+              std::shared_ptr<security::admission_terms> terms, std::string expected, report_function report,
+              std::chrono::milliseconds time_to_open);
 
     std::span<char> prepare() override { return engine_.prepare(); }
     void commit(std::size_t count) override { engine_.commit(count); }
     status open(boost::system::error_code& why) override;
-    [[nodiscard]] std::chrono::milliseconds time_to_open() const override { return std::chrono::seconds{5}; }
+    [[nodiscard]] std::chrono::milliseconds time_to_open() const override { return time_to_open_; }
     void describe(identity& peer) const override { peer.name = admission_.name(); }
     [[nodiscard]] std::string_view epoch() const noexcept override { return admission_.epoch(); }
     void watch(std::function<void(boost::system::error_code)> broken) override;
@@ -47,6 +48,7 @@ class tls_codec final : public transport::stream_codec {
     std::shared_ptr<const tls_context> shared_;
     std::shared_ptr<security::admission_terms> terms_;
     report_function report_;
+    std::chrono::milliseconds time_to_open_;
     tls_engine engine_;
     security::link_admission admission_;
     std::optional<protocol::line_buffer> lines_; // of the admission

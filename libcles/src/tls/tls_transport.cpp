@@ -18,7 +18,8 @@ class tls_transport final : public link_transport {
   public:
     explicit tls_transport(tls_options options)
         : context_(std::make_shared<const tls_context>(options.fleet->own_key())),
-          terms_(std::make_shared<security::admission_terms>()), report_(std::move(options.report)) {
+          terms_(std::make_shared<security::admission_terms>()), report_(std::move(options.report)),
+          time_to_open_(options.time_to_open) {
         terms_->fleet = std::move(options.fleet);
         terms_->epoch = std::move(options.epoch);
     }
@@ -42,14 +43,16 @@ class tls_transport final : public link_transport {
 
   private:
     [[nodiscard]] transport::codec_maker codecs(tls_engine::role as, std::string_view expected) const {
-        return [context = context_, terms = terms_, report = report_, as, expected = std::string{expected}] {
-            return std::make_unique<tls_codec>(context, as, terms, expected, report);
+        return [context = context_, terms = terms_, report = report_, time = time_to_open_, as,
+                expected = std::string{expected}] {
+            return std::make_unique<tls_codec>(context, as, terms, expected, report, time);
         };
     }
 
     std::shared_ptr<const tls_context> context_;
     std::shared_ptr<security::admission_terms> terms_;
     tls_codec::report_function report_;
+    std::chrono::milliseconds time_to_open_;
 };
 
 } // namespace

@@ -5,6 +5,7 @@
 
 #include "security/fleet.hpp"
 
+#include <chrono>
 #include <functional>
 #include <memory>
 #include <string>
@@ -17,6 +18,8 @@ struct tls_options {
     std::string epoch;                      ///< of the node
     /// Receives, for people, why a link was refused.
     std::function<void(std::string_view)> report{};
+    /// For the handshake and the admission.
+    std::chrono::milliseconds time_to_open = std::chrono::seconds{5};
 };
 
 /// `tls://host:port` for one node (docs/security.md, "Streams"). The peer of a link is the member that its key belongs

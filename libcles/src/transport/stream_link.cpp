@@ -457,7 +457,11 @@ void stream_link::shrink() {
 }
 
 void stream_link::release_input() {
-    input_.shrink();
+    if (!codec_ || !input_.unfinished().empty()) {
+        input_.shrink();
+    } else { // the codec has space to read into
+        input_ = protocol::line_buffer{bounds_.line};
+    }
     if (codec_) {
         codec_->shrink();
     }
