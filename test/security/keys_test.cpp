@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "security/fleet_fixture.hpp"
 #include "security/keys.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -12,24 +13,8 @@ namespace {
 
 using namespace cles::security;
 
-std::vector<std::uint8_t> from_hex(std::string_view hex) {
-    std::vector<std::uint8_t> bytes;
-    for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
-        bytes.push_back(static_cast<std::uint8_t>(std::stoi(std::string{hex.substr(i, 2)}, nullptr, 16)));
-    }
-    return bytes;
-}
-
-template <class Bytes>
-std::string to_hex(const Bytes& bytes) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string hex;
-    for (const std::uint8_t byte : bytes) {
-        hex.push_back(digits[byte >> 4U]);
-        hex.push_back(digits[byte & 15U]);
-    }
-    return hex;
-}
+using test::from_hex;
+using test::to_hex;
 
 template <class Key>
 Key key_of(std::string_view hex) {
@@ -129,6 +114,7 @@ BOOST_AUTO_TEST_CASE(a_sealed_box_opens_for_its_receiver_only) {
     box.back() ^= 1U;
     BOOST_TEST(receiver.open_box(box).size() == 0U);
     BOOST_TEST(receiver.open_box(bytes_view{box}.first(sealed_overhead - 1)).size() == 0U);
+    BOOST_TEST(receiver.open_box(bytes_view{box}.first(sealed_overhead)).size() == 0U);
     BOOST_TEST(receiver.open_box({}).size() == 0U);
 }
 
@@ -143,6 +129,19 @@ BOOST_AUTO_TEST_CASE(base64url_has_one_spelling) {
     }
     BOOST_TEST(!read_base64url(std::string_view{"-_8\0", 4}, two));
     BOOST_TEST(!read_base64url(std::string_view{"-\0_8", 4}, two));
+    // No other byte stands for one of these characters.
+    for (std::size_t at = 0; at < 3; ++at) {
+        std::string text{"AAA"};
+        std::size_t accepted = 0;
+        for (unsigned byte = 0; byte < 256; ++byte) {
+            text[at] = static_cast<char>(byte);
+            if (read_base64url(text, two)) {
+                BOOST_TEST(to_base64url(two) == text);
+                ++accepted;
+            }
+        }
+        BOOST_TEST(accepted == (at == 2 ? 16U : 64U));
+    }
     std::vector<std::uint8_t> none;
     BOOST_TEST(read_base64url("", none));
     BOOST_TEST(!read_base64url("A", none));

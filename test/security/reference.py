@@ -64,12 +64,13 @@ def verify(public: bytes, message: bytes, signature: bytes) -> None:
 
 # --- The roster ----------------------------------------------------------------------------------------------------------
 
-ROSTER_LINE = re.compile(rb'\{"signature":"([A-Za-z0-9_-]{86})","roster":(.*)\}', re.DOTALL)
+ROSTER_LINE = re.compile(rb'\{"signature":"([A-Za-z0-9_-]{86})","roster":(\{.*\})\}')
 NAME = re.compile(r"[A-Za-z0-9_.-]{1,64}")
 ROSTER_KEYS = {"fleet", "version", "last", "generation", "oldest", "keys", "members"}
 MEMBER_KEYS = {"number", "name", "key", "keys", "may", "offers", "forwards"}
 SEALED_KEYS = 32 + 32 + 48
 ROSTER_LIMIT = 1_000_000
+MAX_DEPTH = 32
 
 
 def sign_roster(fleet: Identity, roster: dict) -> bytes:
@@ -91,11 +92,8 @@ def read_roster(line: bytes, fleet: bytes) -> dict:
     if not match:
         raise Refused("not of the form of a roster")
     verify(fleet, b"cles roster 1\n" + match.group(2), binary(match.group(1).decode(), 64))
-    try:
-        roster = json.loads(match.group(2), object_pairs_hook=without_repeats)
-    except ValueError as error:
-        raise Refused("not JSON") from error
-    if not isinstance(roster, dict) or binary(roster.get("fleet"), 32) != fleet:
+    roster = strict_json(match.group(2))
+    if binary(roster.get("fleet"), 32) != fleet:
         raise Refused("of another fleet")
     for known, entry in [(ROSTER_KEYS, roster)] + [(MEMBER_KEYS, m) for m in members_of(roster)]:
         if any(key.startswith("must_") for key in set(entry) - known):
@@ -123,6 +121,28 @@ def read_roster(line: bytes, fleet: bytes) -> dict:
         if len(set(values)) != len(values):
             raise Refused(f"has two members with one {unique}")
     return roster
+
+
+def strict_json(text: bytes) -> dict:
+    def refuse(constant: str):
+        raise ValueError(constant)
+
+    try:
+        # -0 is a float, so that it is no whole number.
+        value = json.loads(text.decode(), object_pairs_hook=without_repeats, parse_constant=refuse,
+                           parse_int=lambda digits: -0.0 if digits == "-0" else int(digits))
+        json.dumps(value, ensure_ascii=False).encode()  # no half of a surrogate pair
+    except (ValueError, RecursionError) as error:
+        raise Refused("not JSON") from error
+    if depth(value) > MAX_DEPTH:
+        raise Refused("nested too deep")
+    return value
+
+
+def depth(value) -> int:
+    if not isinstance(value, (dict, list)):
+        return 0
+    return 1 + max(map(depth, value.values() if isinstance(value, dict) else value), default=0)
 
 
 def without_repeats(pairs: list) -> dict:

@@ -87,6 +87,35 @@ class Roster(unittest.TestCase):
         r.read_roster(r.sign_roster(FLEET, roster), FLEET.public)
         self.refuse({**roster, "colour": roster["colour"] + "r"})
 
+    def test_a_line_has_exactly_one_form(self):
+        def signed(content: str, before: str = "", after: str = "") -> bytes:
+            signature = r.text(FLEET.sign(b"cles roster 1\n" + content.encode()))
+            return (before + '{"signature":"' + signature + '","roster":' + content + "}" + after).encode()
+
+        content = json.dumps(self.content(), separators=(",", ":"))
+        r.read_roster(signed(content), FLEET.public)
+        for line in (signed(" " + content), signed(content + " "), signed("[" + content + "]"), signed(content, before=" "),
+                     signed(content, after="\n"), signed(content.replace(",", ",\n", 1))):
+            with self.assertRaises(r.Refused, msg=line):
+                r.read_roster(line, FLEET.public)
+
+    def test_json_is_strict(self):
+        content = json.dumps(self.content(), separators=(",", ":"))
+        for value, accepted in (("[" * 31 + "]" * 31, True), ("[" * 32 + "]" * 32, False), ("[" * 5000 + "]" * 5000, False),
+                                ("-0", True), ("NaN", False), ('"\\ud800"', False), ('"\\ud83d\\ude00"', True), ("07", False)):
+            changed = '{"x":' + value + "," + content[1:]
+            signature = r.text(FLEET.sign(b"cles roster 1\n" + changed.encode()))
+            line = ('{"signature":"' + signature + '","roster":' + changed + "}").encode()
+            if accepted:
+                r.read_roster(line, FLEET.public)
+            else:
+                with self.assertRaises(r.Refused, msg=value):
+                    r.read_roster(line, FLEET.public)
+        empty = json.dumps({**self.content(), "members": [], "last": 0}).replace('"last": 0', '"last": -0')
+        signature = r.text(FLEET.sign(b"cles roster 1\n" + empty.encode()))
+        with self.assertRaises(r.Refused):
+            r.read_roster(('{"signature":"' + signature + '","roster":' + empty + "}").encode(), FLEET.public)
+
     def test_another_fleet_is_refused(self):
         with self.assertRaises(r.Refused):
             r.read_roster(self.line, CAR1.public)

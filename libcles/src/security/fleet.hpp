@@ -1,38 +1,20 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "security/group_key_ring.hpp"
 #include "security/roster.hpp"
 
 #include <cstdint>
 #include <functional>
-#include <list>
-#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::security {
 
-/// The group keys that a node has: those of the roster in force, and the previous one where the roster permits it
-/// (docs/security.md, "Group keys").
-class group_key_ring {
-  public:
-    /// Adds the keys of a newer roster and forgets those of generations that it refuses.
-    void adopt(const roster& in_force, group_keys keys);
-    /// The generation with which this node sends; 0 if there is none.
-    [[nodiscard]] std::uint32_t current() const noexcept { return current_; }
-    /// Null if the generation is refused or not known.
-    [[nodiscard]] const secret_bytes* find(std::uint32_t generation) const;
-    /// Whether the generation is later than any that this node can know: a newer roster exists.
-    [[nodiscard]] bool is_future(std::uint32_t generation) const noexcept { return generation > current_ + 1; }
-
-  private:
-    std::uint32_t current_ = 0;
-    std::map<std::uint32_t, secret_bytes> keys_;
-};
-
 /// The fleet as one node knows it: its own key, the roster in force, the group keys. It decides which roster is in
-/// force and tells its observers when that changes. Sans-I/O: the owner stores rosters (`on_adopted`).
+/// force and tells its observers when that changes. Sans-I/O: the owner stores rosters that were adopted.
 ///
 /// Not thread-safe; used on the node's executor.
 class fleet {
@@ -41,7 +23,7 @@ class fleet {
         adopted, ///< now in force
         known,   ///< the one in force
         older,   ///< of a lower version
-        forked,  ///< another one of the version in force: kept out, reported once
+        forked,  ///< another one of the version in force: kept out
         refused, ///< malformed, of another fleet, or wrongly signed
     };
 
@@ -53,21 +35,28 @@ class fleet {
     [[nodiscard]] const signing_key& own_key() const noexcept { return own_; }
     [[nodiscard]] const roster& in_force() const noexcept { return *roster_; }
     [[nodiscard]] std::shared_ptr<const roster> share() const noexcept { return roster_; }
-    /// This node's entry; null once it has been removed.
+    /// This node's entry; null once it has been removed, also if its key is listed under another name.
     [[nodiscard]] const member* self() const noexcept { return self_; }
+    /// Empty if this node has been removed, or if the roster in force has group keys that it cannot open.
     [[nodiscard]] const group_key_ring& ring() const noexcept { return ring_; }
 
-    /// Takes a roster line from anybody. `why` is set for `refused`.
+    /// Takes a roster line from anybody.
+    /// \param why set to what is to be reported: for `refused`, for the first `forked` of a version, and for `adopted`
+    ///        if this node cannot open the group keys; otherwise to an empty text
     verdict offer(std::string_view line, std::string* why = nullptr);
 
-    /// Called after another roster has come into force, with the one before. An observer may end its own observation,
-    /// but not offer a roster.
+    /// Called after another roster has come into force, with the one before. An observer may end its own or another
+    /// observation and start new ones, but not offer a roster. If one throws, the others are called first.
     using observer = std::function<void(const roster& before)>;
-    /// Ends with the returned object.
+    /// Ends with the returned object, which may outlive the fleet.
     [[nodiscard]] std::shared_ptr<void> observe(observer changed);
 
   private:
-    void adopt(std::shared_ptr<const roster> next);
+    struct observation;
+
+    [[nodiscard]] verdict judge(std::string_view line, std::string& why);
+    [[nodiscard]] std::string adopt(std::shared_ptr<const roster> next);
+    void notify(const roster& before);
 
     std::string name_;
     signing_key own_;
@@ -75,7 +64,7 @@ class fleet {
     const member* self_ = nullptr;
     group_key_ring ring_;
     bool reported_fork_ = false;
-    std::shared_ptr<std::list<observer>> observers_;
+    std::vector<std::weak_ptr<observation>> observers_;
 };
 
 } // namespace cles::security

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/keys.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <sodium.h>
@@ -36,7 +37,7 @@ signature signing_key::sign(std::string_view text) const {
 
 secret_bytes signing_key::open_box(bytes_view box) const {
     static_assert(sealed_overhead == crypto_box_SEALBYTES);
-    if (box.size() < sealed_overhead) {
+    if (box.size() <= sealed_overhead) {
         return {};
     }
     secret_bytes content{box.size() - sealed_overhead};
@@ -80,6 +81,13 @@ std::string to_base64url(bytes_view bytes) {
 }
 
 bool read_base64url(std::string_view text, std::span<std::uint8_t> out) {
+    if (out.empty()) {
+        return text.empty();
+    }
+    // libsodium 1.0.18 reads all bytes above these as '_'.
+    if (std::ranges::any_of(text, [](char c) { return static_cast<unsigned char>(c) >= 0x80; })) {
+        return false;
+    }
     std::size_t size = 0;
     return sodium_base642bin(out.data(), out.size(), text.data(), text.size(), nullptr, &size, nullptr, unpadded) ==
                0 &&

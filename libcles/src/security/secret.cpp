@@ -100,7 +100,7 @@ std::uint8_t* allocate(std::size_t size) {
 
 } // namespace
 
-void secret_bytes::wipe::operator()(std::uint8_t* bytes) const noexcept {
+void wipe_secret::operator()(std::uint8_t* bytes) const noexcept {
     if (size <= secret_pool::cell_size) {
         sodium_memzero(bytes, size);
         pool().give_back(bytes);
@@ -111,7 +111,7 @@ void secret_bytes::wipe::operator()(std::uint8_t* bytes) const noexcept {
 
 secret_bytes::secret_bytes(std::size_t size) {
     if (size != 0) {
-        bytes_ = std::unique_ptr<std::uint8_t[], wipe>{allocate(size), wipe{size}};
+        bytes_ = std::unique_ptr<std::uint8_t[], wipe_secret>{allocate(size), wipe_secret{size}};
         std::fill_n(data(), size, std::uint8_t{0});
     }
 }
@@ -120,7 +120,9 @@ secret_bytes::secret_bytes(bytes_view from) : secret_bytes(from.size()) { std::c
 
 secret_bytes secret_bytes::random(std::size_t size) {
     secret_bytes made{size};
-    randombytes_buf(made.data(), size);
+    if (size != 0) {
+        randombytes_buf(made.data(), size);
+    }
     return made;
 }
 

@@ -14,6 +14,12 @@ using bytes_view = std::span<const std::uint8_t>;
 /// \throws std::runtime_error if the system has no random numbers
 void prepare_sodium();
 
+/// Wipes and frees the memory of a secret of this size.
+struct wipe_secret {
+    std::size_t size = 0;
+    void operator()(std::uint8_t* bytes) const noexcept;
+};
+
 /// Secret bytes. Their memory is locked, so that it is not written to swap space, left out of core dumps, and wiped
 /// when they are destroyed. If the system's limit of locked memory is reached, they are still left out and wiped.
 ///
@@ -35,11 +41,7 @@ class secret_bytes {
     [[nodiscard]] secret_bytes copy() const { return secret_bytes{view()}; }
 
   private:
-    struct wipe {
-        std::size_t size = 0;
-        void operator()(std::uint8_t* bytes) const noexcept;
-    };
-    std::unique_ptr<std::uint8_t[], wipe> bytes_;
+    std::unique_ptr<std::uint8_t[], wipe_secret> bytes_;
 };
 
 } // namespace cles::security
