@@ -52,7 +52,7 @@ MAY_INCLUDE = {
     "tls": {"protocol", "security", "transport", "plain", "link"},
     "transport": {"json", "protocol", "port", "plain", "link"},
     "asio": {"public", "protocol", "port", "node", "transport"},
-    "api": {"public", "json", "protocol", "port", "node", "transport", "asio"},
+    "api": {"public", "json", "protocol", "port", "node", "transport", "asio", "security", "tls"},
     "src": {"public"},
     "runtime": {"public"},
     "plugins": {"public"},
