@@ -53,7 +53,7 @@ double pass(core::request_router& routing, const core::node_state& host) {
     const auto begun = cles::time_point::clock::now();
     std::size_t here = 0;
     for (int i = 0; i < choices; ++i) {
-        here += routing.choose(request, {}, begun).here ? 1 : 0;
+        here += routing.choose(request, {}, {}, begun).here ? 1 : 0;
     }
     const std::chrono::duration<double, std::nano> took = cles::time_point::clock::now() - begun;
     if (here == 0 || here == choices) {

@@ -54,7 +54,7 @@ BOOST_DATA_TEST_CASE(what_a_peer_does_not_read_waits_and_nothing_is_lost, every_
 }
 
 // As short lines and as long ones, one of which is always in transit.
-BOOST_DATA_TEST_CASE(what_is_urgent_passes_what_waits_and_breaks_no_line, every_socket* line_lengths, kind, length) {
+BOOST_DATA_TEST_CASE(what_is_urgent_passes_what_waits_and_breaks_no_line, every_stream* line_lengths, kind, length) {
     link_pair pair{kind};
     pair.open();
     pair.far.run([&] { pair.far.link->pause(true); });
@@ -199,7 +199,7 @@ BOOST_DATA_TEST_CASE(an_unread_socket_fills_and_drains, every_socket, kind) {
     BOOST_TEST(pair.far.events->count('r') == 1U);
 }
 
-BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_socket, kind) {
+BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_stream, kind) {
     link_pair pair{kind};
     pair.open();
     const auto large = std::string(1'000'000, 'x') + "\n";
@@ -220,7 +220,7 @@ BOOST_DATA_TEST_CASE(an_idle_link_gives_back_what_a_large_line_took, every_socke
     pair.until([&] { return pair.near.lines() == 2; });
 }
 
-BOOST_DATA_TEST_CASE(nothing_is_lost_while_a_link_gives_back_memory, every_socket, kind) {
+BOOST_DATA_TEST_CASE(nothing_is_lost_while_a_link_gives_back_memory, every_stream, kind) {
     link_pair pair{kind};
     pair.open();
     for (std::size_t i = 0; i < 300; ++i) {

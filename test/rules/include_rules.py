@@ -27,6 +27,7 @@ LAYERS = {
     "libcles/src/port/": "port",
     "libcles/src/node/": "node",
     "libcles/src/security/": "security",
+    "libcles/src/tls/": "tls",
     "libcles/src/transport/": "transport",
     "libcles/src/asio/": "asio",
     "libcles/src/api/": "api",
@@ -37,7 +38,7 @@ LAYERS = {
     "perf/": "perf",
     "test/": "test",
 }
-LIBRARY = {"public", "json", "protocol", "port", "node", "security", "transport", "asio", "api", "src"}
+LIBRARY = {"public", "json", "protocol", "port", "node", "security", "tls", "transport", "asio", "api", "src"}
 
 # layer -> the layers whose files it may include besides its own. "plain" are the public headers that include nothing of
 # NOT_SANS_IO, directly or indirectly; "below_facade" are all public headers except FACADE_HEADERS.
@@ -48,9 +49,10 @@ MAY_INCLUDE = {
     "port": {"protocol", "plain", "link"},
     "node": {"json", "protocol", "port", "below_facade"},
     "security": {"json", "protocol", "port", "plain"},
+    "tls": {"protocol", "security", "transport", "plain", "link"},
     "transport": {"json", "protocol", "port", "plain", "link"},
     "asio": {"public", "protocol", "port", "node", "transport"},
-    "api": {"public", "json", "protocol", "port", "node", "transport", "asio"},
+    "api": {"public", "json", "protocol", "port", "node", "transport", "asio", "security", "tls"},
     "src": {"public"},
     "runtime": {"public"},
     "plugins": {"public"},
@@ -70,6 +72,7 @@ EXCEPTIONS: dict[str, set[str]] = {
     "test/plugins/three_homes_test.cpp": {"apps"},  # the tasks of an example, in service, test and plugin
     "test/effort/impaired_line_test.cpp": {"perf"},  # the decisions of the measurements' impaired link
     "perf/routing/choice_cost.cpp": {"node", "protocol"},  # measures a choice without a link
+    "perf/tls/tls_cost.cpp": {"security", "tls"},  # makes a fleet of its own
     "perf/jobs/job_cost.cpp": {"runtime"},  # measures a daemon in a process of its own
 }
 
@@ -111,6 +114,7 @@ RESERVED_HEADERS = [
     (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/src/plugins/plugin_library\.[ch]pp$"),
      "Boost.DLL belongs to runtime/plugins/plugin_library alone"),
     (re.compile(r"sodium(\.h$|/)"), re.compile(r"libcles/src/security/|test/security/"), "libsodium belongs to security alone"),
+    (re.compile(r"openssl/"), re.compile(r"libcles/src/tls/|test/tls/"), "OpenSSL belongs to tls alone"),
     (re.compile(r"spdlog/"), re.compile(r"(?!libcles/)"), "the library logs through its sink; spdlog is for programs"),
     (re.compile(r"(thread|future|boost/asio/thread_pool\.hpp)$"), re.compile(r"(?!apps/(cles|platoon)/)"),
      "this program has one thread, so the thread sanitizer does not run its tests (test/CMakeLists.txt)"),
@@ -347,6 +351,7 @@ GOOD = {
     "libcles/src/security/secret.hpp": "#pragma once\n",
     "libcles/src/security/secret.cpp": "#include <mutex>\nstatic std::mutex guard;\n",
     "libcles/src/json/reader.hpp": "#pragma once\n",
+    "libcles/src/tls/engine.hpp": '#include "security/secret.hpp"\n#include "transport/tcp.hpp"\n#include <openssl/ssl.h>\n',
     "libcles/src/api/service.cpp": '#include <cles/service.hpp>\n#include "api/connection.hpp"\n',
     "libcles/src/api/connection.hpp": "#pragma once\n",
     "runtime/src/config/config.cpp": "#include <yaml-cpp/yaml.h>\n#include <cles/service.hpp>\n",
@@ -379,6 +384,8 @@ PLANTED = [
     ("libcles/src/transport/a.cpp", "#include <cles/service.hpp>\n", "must not include the facade"),
     ("libcles/src/node/a.cpp", '#include "security/secret.hpp"\n', "node must not include security"),
     ("libcles/src/transport/a.cpp", "#include <sodium.h>\n", "libsodium belongs to security alone"),
+    ("libcles/src/security/a.cpp", "#include <openssl/ssl.h>\n", "OpenSSL belongs to tls alone"),
+    ("libcles/src/transport/a.cpp", '#include "tls/engine.hpp"\n', "transport must not include tls"),
     ("libcles/src/security/a.cpp", "#include <fcntl.h>\n", "security is sans-I/O"),
     ("libcles/src/security/a.cpp", '#include "node/session.hpp"\n', "security must not include node"),
     ("libcles/src/security/secret.cpp", "static std::mutex guard;\nstd::thread t;\n", "waits, locks or starts threads"),

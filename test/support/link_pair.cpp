@@ -11,6 +11,7 @@ std::ostream& operator<<(std::ostream& out, carrier kind) {
     switch (kind) {
     case carrier::tcp4: return out << "tcp";
     case carrier::tcp6: return out << "tcp over IPv6";
+    case carrier::tls: return out << "tls";
     case carrier::unix_file: return out << "unix";
     case carrier::unix_abstract: return out << "unix, abstract";
     case carrier::inproc: return out << "inproc";
@@ -27,6 +28,7 @@ std::string fresh_address(carrier kind) {
     switch (kind) {
     case carrier::tcp4: return "tcp://127.0.0.1:0";
     case carrier::tcp6: return "tcp://[::1]:0";
+    case carrier::tls: return "tls://127.0.0.1:0";
     case carrier::udp4: return "udp://127.0.0.1:0";
     case carrier::udp6: return "udp://[::1]:0";
     case carrier::unix_file: return "unix:///tmp/" + own;

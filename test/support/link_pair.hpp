@@ -21,19 +21,30 @@
 namespace cles::test {
 
 /// All kinds of links.
-enum class carrier { tcp4, tcp6, unix_file, unix_abstract, inproc, inproc_threads, udp4, udp6 };
+enum class carrier { tcp4, tcp6, tls, unix_file, unix_abstract, inproc, inproc_threads, udp4, udp6 };
 
-/// The streams, all of which fulfil the same contract.
-inline constexpr std::array every_carrier{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
-                                          carrier::unix_abstract, carrier::inproc, carrier::inproc_threads};
+#ifdef CLES_TEST_TLS
+#define CLES_TLS_CARRIER carrier::tls,
+#else
+#define CLES_TLS_CARRIER
+#endif
+
+/// The streams, all of which fulfil the same contract. Only test/contract has a transport for `tls`.
+inline constexpr std::array every_carrier{CLES_TLS_CARRIER carrier::tcp4, carrier::tcp6,   carrier::unix_file,
+                                          carrier::unix_abstract,         carrier::inproc, carrier::inproc_threads};
+/// Those that need the kernel.
+inline constexpr std::array every_stream{CLES_TLS_CARRIER carrier::tcp4, carrier::tcp6, carrier::unix_file,
+                                         carrier::unix_abstract};
+/// Those that a bare socket can speak to.
 inline constexpr std::array every_socket{carrier::tcp4, carrier::tcp6, carrier::unix_file, carrier::unix_abstract};
 
 /// Those that send each line as one datagram.
 inline constexpr std::array every_datagram{carrier::udp4, carrier::udp6};
 /// All of them, for tests of listening and dialling.
-inline constexpr std::array listening_carriers{carrier::tcp4,          carrier::tcp6,   carrier::unix_file,
-                                               carrier::unix_abstract, carrier::inproc, carrier::inproc_threads,
-                                               carrier::udp4,          carrier::udp6};
+inline constexpr std::array listening_carriers{
+    CLES_TLS_CARRIER carrier::tcp4, carrier::tcp6, carrier::unix_file, carrier::unix_abstract, carrier::inproc,
+    carrier::inproc_threads,        carrier::udp4, carrier::udp6};
+#undef CLES_TLS_CARRIER
 
 std::ostream& operator<<(std::ostream& out, carrier kind);
 

@@ -65,6 +65,7 @@ class logged_link final : public cles::link,
         owner_.reset();
     }
     [[nodiscard]] const cles::identity& peer() const noexcept override { return inner_->peer(); }
+    [[nodiscard]] std::string_view epoch() const noexcept override { return inner_->epoch(); }
 
     void on_line(std::string_view line) override {
         log_line("<", line);

@@ -6,6 +6,7 @@
 #include <boost/container_hash/hash.hpp>
 
 #include <compare>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -102,8 +103,9 @@ class group_listener {
 /// Datagrams to send, one behind the other: whole lines, each with its LF, or texts of given sizes.
 class datagram_list {
   public:
+    template <std::convertible_to<std::string_view> Text>
     // NOLINTNEXTLINE(google-explicit-constructor): lines are such a list
-    datagram_list(std::string_view lines) noexcept : bytes_(lines) {}
+    datagram_list(const Text& lines) noexcept : bytes_(lines) {}
     datagram_list(std::string_view bytes, std::span<const std::uint16_t> sizes) noexcept
         : bytes_(bytes), sizes_(sizes), sized_(true) {}
 

@@ -10,7 +10,7 @@ namespace {
 
 using introduction = datagram_peer::introduction;
 
-bytes_view bytes_of(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
+bytes_view to_bytes(std::string_view text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
 
 } // namespace
 
@@ -159,7 +159,7 @@ bool datagram_sessions::send(const datagram_source& to, std::string_view line, t
 
 void datagram_sessions::send_in(peer& p, datagram_session& session, std::string_view line, time_point now) {
     p.last_used = now;
-    sink_.send(p.source().path, session.seal(fleet_.self()->number, bytes_of(line), sealed_));
+    sink_.send(p.source().path, session.seal(fleet_.self()->number, to_bytes(line), sealed_));
 }
 
 bool datagram_sessions::send_waiting(peer& p, time_point now) {

@@ -63,7 +63,8 @@ class datagram_sink {
 /// session is in use, `send` and `receive` allocate nothing. When the roster in force changes, the sessions with
 /// members that are no longer in it end. In a child process, all sessions have ended.
 ///
-/// A session that has not been used for 15 minutes is not renewed; it is forgotten, and the next line begins a new one.
+/// After 15 minutes, a session is renewed only when it is used; otherwise it is forgotten, and the next line begins a
+/// new one.
 class datagram_sessions {
   public:
     datagram_sessions(fleet& of, datagram_sink& sink, entropy& random, datagram_limits limits = {});

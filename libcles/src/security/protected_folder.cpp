@@ -195,6 +195,24 @@ std::optional<std::string> protected_folder::read_text(const std::string& name, 
     return content;
 }
 
+std::string protected_folder::state_of(const std::vector<std::string>& names) const {
+    std::string state;
+    for (const auto& name : names) {
+        struct stat status {};
+        if (fstatat(folder_.get(), name.c_str(), &status, AT_SYMLINK_NOFOLLOW) != 0) {
+            continue;
+        }
+        state.append(name);
+        for (const auto part : {static_cast<std::int64_t>(status.st_ino), static_cast<std::int64_t>(status.st_size),
+                                std::int64_t{status.st_mtim.tv_sec}, std::int64_t{status.st_mtim.tv_nsec},
+                                std::int64_t{status.st_mode}, std::int64_t{status.st_uid}}) {
+            state.append(" ").append(std::to_string(part));
+        }
+        state.push_back('\n');
+    }
+    return state;
+}
+
 std::vector<std::string> protected_folder::names_ending(std::string_view suffix) const {
     // A descriptor of its own, because the position in the folder belongs to the opened folder.
     const auto fd = openat(folder_.get(), ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);

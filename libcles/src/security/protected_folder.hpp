@@ -53,6 +53,9 @@ class protected_folder {
     /// The names of the files that end so, sorted.
     [[nodiscard]] std::vector<std::string> names_ending(std::string_view suffix) const;
 
+    /// A text that changes when one of these files changes, appears or disappears. Does not throw.
+    [[nodiscard]] std::string state_of(const std::vector<std::string>& names) const;
+
     /// Writes a file that must not exist yet. It is complete or not there, also after a power failure.
     void create_file(const std::string& name, bytes_view content, access who) const;
     /// Replaces a file, or writes a new one; after a power failure there is the old or the new content.

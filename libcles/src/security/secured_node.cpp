@@ -10,8 +10,6 @@
 #include <algorithm>
 #include <utility>
 
-#include <sys/stat.h>
-
 namespace cles::security {
 
 secured_node::secured_node(const std::string& directory) : directory_(directory) {
@@ -202,21 +200,7 @@ std::string secured_node::file_state() const {
         }
     } catch (const security_error&) { // reported when they are read
     }
-    std::string state;
-    for (const auto& each : names) {
-        struct stat what {};
-        if (::lstat(directory_.folder().path_of(each).c_str(), &what) == 0) {
-            state.append(each);
-            for (const auto part :
-                 {static_cast<long long>(what.st_ino), static_cast<long long>(what.st_size),
-                  static_cast<long long>(what.st_mtim.tv_sec), static_cast<long long>(what.st_mtim.tv_nsec),
-                  static_cast<long long>(what.st_mode), static_cast<long long>(what.st_uid)}) {
-                state.append(" ").append(std::to_string(part));
-            }
-            state.push_back('\n');
-        }
-    }
-    return state;
+    return directory_.folder().state_of(names);
 }
 
 void secured_node::check_files() {

@@ -14,7 +14,7 @@ std::size_t first_match(const security::local_rules& rules, const std::string& r
                         const std::string& noun) {
     for (const auto& each : rules.rules()) {
         const auto words = split(each.text, ' ');
-        const auto& name = words[2] == "may" ? requester : split(noun, ':').front();
+        const std::string name = words[2] == "may" ? requester : split(noun, ':').front();
         if (naive_match(read_part(words[1], true), read_part(name, false)) &&
             naive_permits(words[3] + " " + words[4], verb, noun)) {
             return each.line;

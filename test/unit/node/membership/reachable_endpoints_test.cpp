@@ -35,6 +35,8 @@ BOOST_AUTO_TEST_SUITE(reachable_endpoints)
 BOOST_AUTO_TEST_CASE(streams_come_before_datagrams_and_tcp_before_unix) {
     check(usable({"udp://127.0.0.1:1", "unix:///run/a.sock", "tcp://127.0.0.1:2"}, loopback),
           {"tcp://127.0.0.1:2", "unix:///run/a.sock", "udp://127.0.0.1:1"});
+    check(usable({"udp://127.0.0.1:1", "unix:///run/a.sock", "tls://127.0.0.1:2"}, loopback),
+          {"tls://127.0.0.1:2", "unix:///run/a.sock", "udp://127.0.0.1:1"});
 }
 
 BOOST_AUTO_TEST_CASE(source_address_comes_before_others_of_its_scheme) {
