@@ -58,7 +58,8 @@ config_sources sources_of(const command_line_options& wanted) {
             .flags = wanted.flags,
             .variable = [](const char* name) -> const char* { return std::getenv(name); },
             .host = host_name(),
-            .cores = std::thread::hardware_concurrency()};
+            .cores = std::thread::hardware_concurrency(),
+            .name_of_key = name_of_key};
 }
 
 // Plugins are tried, each in a process of its own, but not started: a running daemon may use their devices.

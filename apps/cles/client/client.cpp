@@ -146,7 +146,20 @@ int client::run(asio::awaitable<void> work) {
     if (!hint_.empty()) {
         note(hint_);
     }
+    if (may_have_asked_secured_node(thrown)) {
+        note("if security is on there, it answers only with --keys DIR at tls://, or at its Unix socket");
+    }
     return code;
+}
+
+// A secured node closes a plain link, and drops plain datagrams.
+bool client::may_have_asked_secured_node(const std::exception_ptr& thrown) const {
+    if (addresses_.is_secured() || noun_.empty()) {
+        return false;
+    }
+    const auto url = addresses_.endpoint_of(target_of(noun_));
+    return (url.starts_with("tcp:") && has_code(thrown, cles::errc::unavailable)) ||
+           (url.starts_with("udp:") && has_code(thrown, cles::errc::deadline));
 }
 
 asio::awaitable<void> client::run_explained(asio::awaitable<void> work) {

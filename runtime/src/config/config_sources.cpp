@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <string_view>
+#include <utility>
 
 #include <unistd.h>
 
@@ -86,6 +87,11 @@ config load(const config_sources& from) {
     apply_overrides(from_environment(from.variable), made);
     apply_overrides(from.flags, made);
     apply_security_defaults(made);
+    if (made.security.is_on() && !made.origins.contains("node") && from.name_of_key) {
+        if (auto name = from.name_of_key(made.security.keys); !name.empty()) {
+            made.node = std::move(name);
+        }
+    }
     check(made);
     return made;
 }

@@ -11,7 +11,8 @@
 
 namespace cles::runtime {
 
-/// Reads CLES_NODE, CLES_POOL, CLES_LISTEN and CLES_SEEDS (lists separated by commas), CLES_MULTICAST and CLES_LOG.
+/// Reads CLES_NODE, CLES_POOL, CLES_LISTEN and CLES_SEEDS (lists separated by commas), CLES_MULTICAST, CLES_KEYS and
+/// CLES_LOG.
 /// Empty variables are ignored. \param variable returns the value of a variable, or null
 overrides from_environment(const std::function<const char*(const char*)>& variable);
 
@@ -23,6 +24,9 @@ struct config_sources {
     std::function<const char*(const char*)> variable; ///< returns an environment variable, or null
     std::string host;                                 ///< the host's name
     std::uint32_t cores = 1;
+    /// The name of the key in that directory, which is the node's unless another is configured; empty if it cannot be
+    /// read.
+    std::function<std::string(const std::string& directory)> name_of_key{};
 };
 
 /// The files of which the first that exists is read if none is named: `./clesd.yaml`,

@@ -16,14 +16,15 @@ constexpr auto about = "A node that runs plugins, discovers other nodes, and sha
 constexpr auto footer =
     "The configuration is the first of --config, $CLES_CONFIG, ./clesd.yaml, $XDG_CONFIG_HOME/cles/clesd.yaml and\n"
     "/etc/cles/clesd.yaml; without any, defaults are used. Flags override the environment (CLES_NODE,\n"
-    "CLES_POOL, CLES_LISTEN, CLES_SEEDS, CLES_MULTICAST, CLES_LOG), which overrides the file.\n\n"
+    "CLES_POOL, CLES_LISTEN, CLES_SEEDS, CLES_MULTICAST, CLES_KEYS, CLES_LOG), which overrides the file.\n\n"
     "SIGTERM and Ctrl-C stop it after its jobs have ended, within the limit 'drain'; a second one stops it at once.\n"
     "SIGHUP reloads 'seeds' and 'log'.\n\n"
     "Exit codes: 0 ok, 1 could not run, 2 usage or configuration error, 3 another node has the name.\n\n"
     "Examples:\n"
     "  clesd                           # with the defaults: a node on loopback, without tasks\n"
     "  clesd --config clesd.yaml --check\n"
-    "  clesd --node sat1 --listen tcp://127.0.0.1:25370 --print-config";
+    "  clesd --node sat1 --listen tcp://127.0.0.1:25370 --print-config\n"
+    "  clesd --keys /etc/cles/keys";
 
 } // namespace
 

@@ -7,9 +7,11 @@
 
 #include <cles/error.hpp>
 #include <cles/security.hpp>
+#include <cles/security/node_files.hpp>
 
 #include <charconv>
 #include <cstdint>
+#include <exception>
 #include <optional>
 #include <string>
 #include <vector>
@@ -52,9 +54,23 @@ std::shared_ptr<detail::security_part> security_of(const config& setup) {
         options.local_users.emplace(*id, member);
     }
     try {
-        return secured(std::move(options));
+        auto made = secured(std::move(options));
+        if (const auto name = name_of_key(setup.security.keys); name != setup.node) {
+            throw config_error(setup.location_of("node"), "'" + setup.node + "' is not the name of the key in " +
+                                                              setup.security.keys + ", which is '" + name +
+                                                              "'; without 'node', the node has that name");
+        }
+        return made;
     } catch (const error& e) {
         throw config_error(setup.location_of("security"), e.message());
+    }
+}
+
+std::string name_of_key(const std::string& directory) {
+    try {
+        return security::describe_node(directory).name;
+    } catch (const std::exception&) { // reported when the security is made
+        return {};
     }
 }
 
@@ -70,6 +86,8 @@ std::shared_ptr<detail::security_part> security_of(const config& setup) {
     }
     return nullptr;
 }
+
+std::string name_of_key(const std::string& /*directory*/) { return {}; }
 
 } // namespace cles::runtime
 

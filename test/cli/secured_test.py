@@ -1,0 +1,125 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""`cles` with the key of a member: --keys and CLES_KEYS in commands that talk to nodes, and in `cles serve`."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import unittest
+
+from support import CLES, PATIENCE, environment, finish, free_port, read_line, start, wait_until
+from trust_support import Done, Trust
+
+ECHO = '{"parameters":["7"]}\n'
+
+
+class Secured(Trust):
+    """A fleet of car1, car2 and operator, of which car1 runs."""
+
+    def setUp(self):
+        super().setUp()
+        self.group = f"lo,239.255.0.7:{free_port()}"
+        self.good("fleet", "init", "fleet", "--with", "car1,car2,operator")
+        self.car1 = self.serve("car1", "-l", f"unix://{self.path('car1.sock')}")
+
+    def run_in(self, *arguments, stdin="", env=None):
+        done = subprocess.run([CLES, *arguments], input=stdin, capture_output=True, text=True, cwd=self.scratch,
+                              env=env or environment(CLES_MULTICAST=self.group), timeout=PATIENCE, check=False)
+        return Done(done.returncode, done.stdout, done.stderr)
+
+    def serve(self, name, *more):
+        """Starts it at a free port; returns the URL."""
+        process = start("serve", "-k", f"fleet/{name}", "-l", "tls://127.0.0.1:0", "--rate", "0", *more,
+                        cwd=self.scratch, env=environment(CLES_MULTICAST=self.group))
+        self.addCleanup(self.end, process)
+        found = re.fullmatch(rf"{name} listening on (tls://127\.0\.0\.1:\d+)\n", read_line(process))
+        self.assertTrue(found)
+        return found[1]
+
+    def end(self, process):
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(finish(process)[0], 0)
+
+    def names(self, *arguments):
+        return [node["node"] for node in json.loads(self.good("ls", *arguments, "-o", "json").out)["peers"]]
+
+    # -- reaching nodes --------------------------------------------------------------------------------------------
+
+    def test_a_member_finds_nodes_by_their_names(self):
+        for _ in range(3):  # each is another process with the same key
+            self.assertEqual(self.good("pull", "car1:echo/7", "-k", "fleet/operator").out, ECHO)
+        self.assertEqual(self.names("-k", "fleet/operator"), ["car1"])
+
+    def test_the_variable(self):
+        env = environment(CLES_MULTICAST=self.group, CLES_KEYS="fleet/operator")
+        self.assertEqual(self.good("pull", "car1:echo/7", env=env).out, ECHO)
+        self.assertEqual(self.good("pull", "self:echo/7", "--at", self.car1, env=env).out, ECHO)
+
+    def test_a_member_asks_at_addresses(self):
+        for where in (("--at", self.car1), ("--peer", f"car1={self.car1}")):
+            self.assertEqual(self.good("pull", "car1:echo/7", "-k", "fleet/operator", *where).out, ECHO)
+        self.assertEqual(self.names("-k", "fleet/operator", "--at", self.car1), ["car1"])
+
+    def test_several_processes_use_one_key_at_once(self):
+        processes = [start("pull", "car1:echo/7", "-k", "fleet/operator", "-n", "3", cwd=self.scratch,
+                           env=environment(CLES_MULTICAST=self.group)) for _ in range(6)]
+        for process in processes:
+            self.assertEqual(finish(process), (0, ECHO * 3, ""))
+
+    def test_the_nodes_user_needs_no_key_at_its_unix_socket(self):
+        self.assertEqual(self.good("pull", "car1:echo/7", "--at", f"unix://{self.path('car1.sock')}").out, ECHO)
+        with socket.socket(socket.AF_UNIX) as plain:  # as nc -U
+            plain.settimeout(PATIENCE)
+            plain.connect(str(self.path("car1.sock")))
+            plain.sendall(b"PULL car1:echo/7\n")
+            self.assertEqual(plain.recv(100), ECHO.encode())
+
+    def test_a_change_of_rights_takes_effect_without_a_restart(self):
+        self.path("fleet/car1/rules").write_text("deny operator may pull *:echo/**\n", encoding="utf-8")
+        os.chmod(self.path("fleet/car1/rules"), 0o600)
+        wait_until(lambda: self.run_in("pull", "car1:echo/7", "-k", "fleet/operator").code == 5, "it is denied")
+        self.assertIn("denied", self.run_in("pull", "car1:echo/7", "-k", "fleet/operator").err)
+
+    # -- what is refused -------------------------------------------------------------------------------------------
+
+    def test_tls_needs_a_key(self):
+        self.refused("pull", "self:echo/7", "--at", self.car1, says="give --keys DIR, or set CLES_KEYS")
+
+    def test_plain_addresses_are_refused_with_a_key(self):
+        for scheme in ("tcp", "udp"):
+            self.refused("pull", "self:echo/7", "-k", "fleet/operator", "--at", f"{scheme}://127.0.0.1:1",
+                         says="write tls://127.0.0.1:1")
+
+    def test_a_plain_request_to_a_secured_node_is_explained(self):
+        self.ends_with(5, "pull", "self:echo/7", "--at", self.car1.replace("tls", "tcp"),
+                       says="answers only with --keys DIR at tls://, or at its Unix socket")
+
+    def test_without_a_key_no_secured_node_is_found(self):
+        self.ends_with(3, "pull", "car1:echo/7", says="no node with that name has announced itself")
+
+    def test_a_node_that_was_removed_is_denied(self):
+        self.good("fleet", "remove", "operator", "-k", "fleet")
+        self.good("keys", "join", "fleet/roster", "-k", "fleet/car1")
+        wait_until(lambda: self.run_in("pull", "self:echo/7", "-k", "fleet/operator", "--at", self.car1).code != 0,
+                   "it is denied")
+
+    def test_problems_of_the_directory(self):
+        self.failed("pull", "car1:echo/7", "-k", "nowhere", says="nowhere")
+        self.good("keys", "new", "sat1", "-k", "sat1")
+        self.failed("pull", "car1:echo/7", "-k", "sat1", says="roster")
+        os.chmod(self.path("fleet/operator/key"), 0o644)
+        self.failed("pull", "car1:echo/7", "-k", "fleet/operator", says="chmod")
+
+    # -- cles serve ------------------------------------------------------------------------------------------------
+
+    def test_serve_takes_the_name_of_its_key(self):
+        self.refused("serve", "-k", "fleet/car2", "--name", "car3", "-l", "tls://127.0.0.1:0", says="'car2'")
+        self.serve("car2")
+        self.assertEqual(self.names("-k", "fleet/operator"), ["car1", "car2"])
+
+
+if __name__ == "__main__":
+    unittest.main()
