@@ -154,12 +154,11 @@ int client::run(asio::awaitable<void> work) {
 
 // A secured node closes a plain link, and drops plain datagrams.
 bool client::may_have_asked_secured_node(const std::exception_ptr& thrown) const {
-    if (addresses_.is_secured() || noun_.empty()) {
+    const bool lost = has_code(thrown, cles::errc::unavailable);
+    if (addresses_.is_secured() || noun_.empty() || (!lost && !has_code(thrown, cles::errc::deadline))) {
         return false;
     }
-    const auto url = addresses_.endpoint_of(target_of(noun_));
-    return (url.starts_with("tcp:") && has_code(thrown, cles::errc::unavailable)) ||
-           (url.starts_with("udp:") && has_code(thrown, cles::errc::deadline));
+    return addresses_.endpoint_of(target_of(noun_)).starts_with(lost ? "tcp:" : "udp:");
 }
 
 asio::awaitable<void> client::run_explained(asio::awaitable<void> work) {

@@ -102,6 +102,9 @@ const mistake mistakes[] = {
     {"wake_within: 7\n", "clesd.yaml:1: wake_within: ", "is not a duration"},
     {"wake_within: 0\n", "clesd.yaml:1: wake_within: ", "write off, or 0us"},
     {"real_time: 100\n", "clesd.yaml:1: real_time: ", "is not a number from 0 to 99"},
+    {"security: {local_users: {root: car1}}\n", "clesd.yaml:1: security: ", "has no 'keys'"},
+    {"security:\n  keys: /k\n  users: {}\n", "clesd.yaml:3: security.users: ", "unknown key"},
+    {"security:\n  keys: /k\n  local_users:\n    root: any\n", "clesd.yaml:4: security.local_users.root: ", "any"},
     // other invalid files
     {"node: a\nworkers: 1\nnode: b\n", "clesd.yaml:3: node: ", "is a duplicate of the key in line 1"},
     {"- node\n", "clesd.yaml:1: ", "has to be a map"},

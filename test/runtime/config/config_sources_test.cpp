@@ -49,6 +49,19 @@ struct scratch {
 
 BOOST_FIXTURE_TEST_SUITE(config_sources, scratch)
 
+BOOST_AUTO_TEST_CASE(the_name_of_the_key_is_the_default_of_the_nodes_name) {
+    variables["CLES_CONFIG"] = write("keys.yaml", "workers: 2\n");
+    sources.name_of_key = [](const std::string& directory) { return directory == "/keys" ? "car1" : ""; };
+    BOOST_TEST(load(sources).node == "host");
+    variables["CLES_KEYS"] = "/keys";
+    BOOST_TEST(load(sources).node == "car1");
+    variables["CLES_KEYS"] = "/unreadable";
+    BOOST_TEST(load(sources).node == "host");
+    variables["CLES_KEYS"] = "/keys";
+    variables["CLES_NODE"] = "car2";
+    BOOST_TEST(load(sources).node == "car2");
+}
+
 BOOST_AUTO_TEST_CASE(flags_override_the_environment_the_file_and_the_defaults) {
     variables["CLES_CONFIG"] = write("all.yaml", "node: from_file\nqueue: 7\nlog: debug\n");
     BOOST_TEST(load(sources).node == "from_file");

@@ -4,6 +4,7 @@
 #include <boost/test/unit_test.hpp>
 
 #include <string>
+#include <vector>
 
 using namespace cles::runtime;
 
@@ -59,6 +60,53 @@ BOOST_AUTO_TEST_CASE(multicast_to_other_hosts_requires_insecure) {
     }
     c.insecure = true;
     BOOST_TEST(refusal(c) == "accepted");
+}
+
+BOOST_AUTO_TEST_CASE(with_security_other_hosts_are_reached_by_default) {
+    auto c = default_config("host", 1);
+    c.security.keys = "/etc/cles/keys";
+    apply_security_defaults(c);
+    BOOST_TEST(c.listen == std::vector<std::string>{"tls://0.0.0.0:25370"}, boost::test_tools::per_element());
+    BOOST_TEST(c.multicast.interface == "auto");
+    BOOST_TEST(!c.multicast.required);
+    BOOST_TEST(refusal(c) == "accepted");
+}
+
+BOOST_AUTO_TEST_CASE(security_leaves_what_is_configured) {
+    auto c = default_config("host", 1);
+    c.security.keys = "/etc/cles/keys";
+    c.listen = {"unix:///run/cles.sock"};
+    c.origins["listen[0]"] = "clesd.yaml:2";
+    c.origins["multicast.port"] = "clesd.yaml:3";
+    apply_security_defaults(c);
+    BOOST_TEST(c.listen == std::vector<std::string>{"unix:///run/cles.sock"}, boost::test_tools::per_element());
+    BOOST_TEST(c.multicast.interface == "lo");
+}
+
+BOOST_AUTO_TEST_CASE(with_security_plain_addresses_are_refused) {
+    for (const auto* plain : {"tcp://127.0.0.1", "tcp://10.0.0.1:7"}) {
+        auto c = default_config("host", 1);
+        c.security.keys = "/etc/cles/keys";
+        c.listen = {plain};
+        c.origins["listen"] = "clesd.yaml:3";
+        BOOST_TEST(refusal(c) ==
+                   "clesd.yaml:3: listen[0]: '" + std::string{plain} + "' is refused with 'security': use 'tls'");
+        c.listen = {"tls://0.0.0.0"};
+        c.seeds = {plain};
+        c.origins["seeds"] = "clesd.yaml:4";
+        BOOST_TEST(refusal(c).starts_with("clesd.yaml:4: seeds[0]: "));
+        c.seeds.clear();
+        c.peers["car2"] = plain;
+        c.origins["peers.car2"] = "clesd.yaml:5";
+        BOOST_TEST(refusal(c).starts_with("clesd.yaml:5: peers.car2: "));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(tls_requires_security) {
+    auto c = default_config("host", 1);
+    c.listen = {"tls://0.0.0.0"};
+    c.origins["listen"] = "clesd.yaml:3";
+    BOOST_TEST(refusal(c) == "clesd.yaml:3: listen[0]: 'tls://0.0.0.0' requires 'security'");
 }
 
 BOOST_AUTO_TEST_CASE(a_peer_may_not_have_the_nodes_name) {

@@ -1,0 +1,202 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""clesd with security: its configuration, and daemons of one fleet."""
+
+import json
+import os
+import pwd
+import re
+import signal
+import socket
+import subprocess
+import unittest
+
+from daemon import CLESD, Folder, clean_environment, clesd
+from support import CLES, PATIENCE, finish, free_port, read_line, wait_until
+
+
+def cles(*arguments, env=None):
+    done = subprocess.run([CLES, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                          env=env or clean_environment(CLES_MULTICAST="off"), timeout=PATIENCE, check=False)
+    return done.returncode, done.stdout, done.stderr
+
+
+class Fleet(Folder):
+    """The directories of a fleet's authority and of its nodes."""
+
+    def __init__(self, *names):
+        super().__init__()
+        self.authority = self.file("fleet")
+        self.run("fleet", "init", self.authority, "--with", ",".join(names))
+        self.group = f"lo,239.255.0.7:{free_port()}"
+
+    def run(self, *arguments):
+        code, out, err = cles(*arguments)
+        if code != 0:
+            raise AssertionError(f"{arguments} ended with {code}: {err}")
+        return out
+
+    def keys(self, name):
+        return os.path.join(self.authority, name)
+
+    def rule(self, name, text):
+        """Replaces the local rules of a node."""
+        path = os.path.join(self.keys(name), "rules")
+        with open(path + ".new", "w", encoding="utf-8") as out:
+            out.write(text)
+        os.rename(path + ".new", path)
+
+
+class Node:
+    """A running clesd of the fleet."""
+
+    def __init__(self, fleet, name, more=""):
+        self.log_file = fleet.file(f"{name}.log")
+        self.socket = fleet.file(f"{name}.sock")
+        users = f"security:\n  keys: {fleet.keys(name)}\n{more}"
+        config = fleet.write(f"listen: ['tls://127.0.0.1:0', 'unix://{self.socket}']\nworkers: 1\n"
+                             f"log: {{format: json}}\n{users}", f"{name}.yaml")
+        with open(self.log_file, "w", encoding="utf-8") as log:
+            self.process = subprocess.Popen([CLESD, "--config", config, "-m", fleet.group], stdin=subprocess.DEVNULL,
+                                            stdout=subprocess.PIPE, stderr=log, text=True, env=clean_environment())
+        line = read_line(self.process)
+        found = re.fullmatch(rf"{name} listening on (tls://127\.0\.0\.1:\d+)\n", line)
+        if not found:
+            self.process.kill()
+            raise AssertionError(f"it said {line!r}, and logged {self.messages()}")
+        self.url = found[1]
+        wait_until(lambda: os.path.exists(self.socket), "its Unix socket exists")
+
+    def messages(self):
+        with open(self.log_file, encoding="utf-8") as log:
+            return [json.loads(line)["message"] for line in log if line.endswith("\n")]
+
+    def ask(self, line):
+        with socket.socket(socket.AF_UNIX) as link:
+            link.settimeout(PATIENCE)
+            link.connect(self.socket)
+            link.sendall(line.encode() + b"\n")
+            with link.makefile("r", encoding="utf-8") as replies:
+                return replies.readline()
+
+    def peers(self):
+        """The live ones, by the name."""
+        reply = self.ask("PULL self:cles/peers")
+        return {node["node"] for node in json.loads(reply)["peers"] if node["state"] == "live"}
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGTERM)
+        finish(self.process)
+
+
+class Configuration(unittest.TestCase):
+    def setUp(self):
+        self.fleet = Fleet("car1", "car2")
+        self.addCleanup(self.fleet.__exit__)
+
+    def refused(self, text, line, key, *words):
+        file = self.fleet.write(text)
+        for more in ((), ("--check",)):
+            code, out, err = clesd("--config", file, *more)
+            self.assertEqual((code, out), (2, ""), err)
+            self.assertTrue(err.startswith(f"clesd: {file}:{line}: {key}: "), err)
+            for each in words:
+                self.assertIn(each, err)
+
+    def test_a_directory_that_can_be_used(self):
+        keys = self.fleet.keys("car1")
+        file = self.fleet.write(f"security: {keys}\n")
+        self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used\n", ""))
+        code, out, _ = clesd("--keys", keys, "--print-config", cwd="/")
+        self.assertEqual(code, 0)
+        for line in ('node: "car1"', 'listen: ["tls://0.0.0.0:25370"]', f'security: "{keys}"'):
+            self.assertIn(line, out)
+
+    def test_a_missing_directory(self):
+        self.refused("workers: 1\nsecurity: /nowhere/keys\n", 2, "security", "/nowhere/keys")
+
+    def test_a_node_that_is_not_in_a_roster(self):
+        self.fleet.run("keys", "new", "sat1", "-k", self.fleet.file("sat1"))
+        self.refused(f"security: {self.fleet.file('sat1')}\n", 1, "security", "roster")
+
+    def test_a_key_that_others_can_read(self):
+        key = os.path.join(self.fleet.keys("car1"), "key")
+        os.chmod(key, 0o644)
+        self.refused(f"security:\n  keys: {self.fleet.keys('car1')}\n", 1, "security", key, "chmod")
+
+    def test_another_name_than_that_of_the_key(self):
+        self.refused(f"node: car2\nsecurity: {self.fleet.keys('car1')}\n", 1, "node", "'car2'", "'car1'")
+
+    def test_an_unknown_user(self):
+        self.refused(f"security:\n  keys: {self.fleet.keys('car1')}\n  local_users:\n    no_such_user: car2\n", 4,
+                     "security.local_users.no_such_user", "there is no user 'no_such_user'")
+
+    def test_plain_tcp(self):
+        self.refused(f"security: {self.fleet.keys('car1')}\nlisten: tcp://127.0.0.1:0\n", 2, "listen[0]", "use 'tls'")
+
+    def test_tls_without_security(self):
+        self.refused("node: a\nlisten: tls://127.0.0.1:0\n", 2, "listen[0]", "requires 'security'")
+
+
+class Daemons(unittest.TestCase):
+    def test_a_fleet(self):
+        with Fleet("car1", "car2", "sat1", "operator") as fleet, \
+                Node(fleet, "car1") as car1, Node(fleet, "car2") as car2, Node(fleet, "sat1") as sat1:
+            all_nodes = {"car1": car1, "car2": car2, "sat1": sat1}
+            for name, node in all_nodes.items():
+                wait_until(lambda node=node, name=name: node.peers() == set(all_nodes) - {name},
+                           f"{name} has discovered the others")
+
+            def ask(noun):
+                return cles("pull", noun, "-k", fleet.keys("operator"), "--at", car1.url)
+
+            self.assertEqual(ask("self:cles")[0], 0)
+            self.assertIn("denied", ask("car2:cles")[2])  # car1 may not forward
+
+            with self.subTest("rules change without a restart"):
+                fleet.rule("car1", "deny operator may pull *:cles/**\n")
+                wait_until(lambda: ask("self:cles")[0] == 5, "it is denied")
+                fleet.rule("car1", "")
+                wait_until(lambda: ask("self:cles")[0] == 0, "it is allowed")
+
+            with self.subTest("a removed node"):
+                fleet.run("fleet", "remove", "sat1", "-k", fleet.authority)
+                fleet.run("keys", "join", os.path.join(fleet.authority, "roster"), "-k", fleet.keys("car1"))
+                for name in ("car1", "car2"):
+                    wait_until(lambda name=name: "sat1" not in all_nodes[name].peers(), f"{name} has dropped it")
+                words = "sat1 was removed from the fleet by version 3 of the roster"
+                wait_until(lambda: words in sat1.messages(), "it says so")
+                self.assertEqual(sat1.messages().count(words), 1)
+                self.assertIn("denied", sat1.ask("PULL car1:cles"))
+
+
+@unittest.skipIf(os.geteuid() != 0, "needs another user")
+class LocalUsers(unittest.TestCase):
+    def ask_as(self, user, node, line):
+        """What that user gets at the Unix socket."""
+        script = ("import socket, sys\n"
+                  "link = socket.socket(socket.AF_UNIX)\nlink.settimeout(20)\n"
+                  "link.connect(sys.argv[1])\nlink.sendall(sys.argv[2].encode() + b'\\n')\n"
+                  "print(link.makefile('r').readline(), end='')\n")
+        done = subprocess.run(["python3", "-c", script, node.socket, line], user=user.pw_uid, group=user.pw_gid,
+                              extra_groups=[], capture_output=True, text=True, timeout=PATIENCE, check=False, cwd="/")
+        return done.stdout
+
+    def test_users_count_as_members(self):
+        nobody, daemon = pwd.getpwnam("nobody"), pwd.getpwnam("daemon")
+        with Fleet("car1", "operator") as fleet:
+            os.chmod(fleet.path, 0o755)
+            fleet.rule("car1", "deny operator may pull *:cles/peers\n")
+            with Node(fleet, "car1", "  local_users: {nobody: operator}\n") as car1:
+                os.chmod(car1.socket, 0o777)
+                self.assertIn('"node":"car1"', car1.ask("PULL self:cles"))
+                self.assertIn('"node":"car1"', self.ask_as(nobody, car1, "PULL self:cles"))
+                self.assertIn("denied", self.ask_as(nobody, car1, "PULL self:cles/peers"))
+                self.assertNotIn('"node"', self.ask_as(daemon, car1, "PULL self:cles"))
+
+
+if __name__ == "__main__":
+    unittest.main()
