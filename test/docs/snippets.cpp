@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // The code blocks of the pages, in one file that is compiled. test/docs/code_in_docs.py looks for each of them here and
 // in the examples.
+#include <cles/security.hpp>
 #include <cles/service.hpp>
 #include <cles/setting_error.hpp>
 
@@ -65,6 +66,12 @@ void a_service() {
     cles::service car{io, {.name = "car1", .listen = {"tcp://127.0.0.1:0"}, .peers = {{"car0", "tcp://10.0.0.7"}}}};
     car.on_pull("speed", [] { return 27.5; });
     io.run();
+}
+
+void a_secured_service() {
+    asio::io_context io;
+    cles::service secured{io,
+                          {.name = "car1", .listen = {"tls://0.0.0.0:0"}, .security = cles::secured("/etc/cles/keys")}};
 }
 
 void an_open_service() {

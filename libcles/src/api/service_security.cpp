@@ -35,7 +35,7 @@ class service_security final : public detail::security_part {
                                             .epoch = protocol::epoch_text(epoch),
                                             .report = [weak = std::weak_ptr{node_}](std::string_view why) {
                                                 if (const auto node = weak.lock()) {
-                                                    node->log(log_level::warning, std::string{why});
+                                                    node->log_refused_link(why);
                                                 }
                                             }}));
         environment.add_transport("unix", transport::make_unix(local_users_));

@@ -28,7 +28,8 @@ void local_security::on_security_changed() {
 
 void local_security::apply_change() {
     const auto& node = host_.node();
-    if (!node.security->is_member(node.name)) {
+    if (const bool removed = !node.security->is_member(node.name);
+        std::exchange(removed_, removed) != removed && removed) {
         host_.write_log(log_level::error, node.name + " was removed from the fleet by version " +
                                               std::to_string(node.security->roster_version()) + " of the roster");
     }

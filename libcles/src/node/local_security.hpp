@@ -36,6 +36,7 @@ class local_security final : private security_observer, private deadline {
     void apply_change();
 
     local_node& host_;
+    bool removed_ = false; ///< as logged
 };
 
 } // namespace cles::core

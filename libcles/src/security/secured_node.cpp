@@ -8,6 +8,7 @@
 #include "security/signed_text.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <utility>
 
 namespace cles::security {
@@ -30,6 +31,21 @@ void secured_node::log(log_level level, std::string text) const {
     }
 }
 
+void secured_node::log_refused_link(std::string_view why) {
+    constexpr std::size_t max_remembered = 32;
+    if (time_ == nullptr) {
+        return;
+    }
+    const auto now = time_->now();
+    while (!refused_.empty() && now - refused_.front().at >= log_again_after) {
+        refused_.pop_front();
+    }
+    if (refused_.size() < max_remembered && std::ranges::find(refused_, why, &refused_link::why) == refused_.end()) {
+        refused_.push_back({.why = std::string{why}, .at = now});
+        log(log_level::warning, std::string{why});
+    }
+}
+
 // -- its node ------------------------------------------------------------------------------------------------------
 
 void secured_node::begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
@@ -39,6 +55,7 @@ void secured_node::begin(std::string_view name, std::uint32_t epoch, const core:
                                             "', and this node is '" + std::string{name} + "'");
     }
     observer_ = &observer;
+    time_ = &time;
     datagrams_->begin(epoch, time,
                       {.due =
                            [this](time_point at) {

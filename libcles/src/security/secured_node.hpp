@@ -7,7 +7,9 @@
 #include "security/key_directory.hpp"
 #include "security/sealed_datagrams.hpp"
 
+#include <chrono>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -25,6 +27,7 @@ class secured_node final : public core::node_security {
     static constexpr std::chrono::seconds check_interval{1};
     /// How long a member that did not deliver its roster is not asked again.
     static constexpr std::chrono::minutes ask_again_after{1};
+    static constexpr std::chrono::minutes log_again_after{1};
 
     /// \throws security_error
     explicit secured_node(const std::string& directory);
@@ -35,6 +38,9 @@ class secured_node final : public core::node_security {
     [[nodiscard]] const std::shared_ptr<sealed_datagrams>& datagrams() const noexcept { return datagrams_; }
     /// Writes to the node's log.
     void log(log_level level, std::string text) const;
+    /// Warns of a link that was not opened, and why. Others decide how often they try, so the same reason is logged
+    /// once a minute at most.
+    void log_refused_link(std::string_view why);
 
     // node_security
     void begin(std::string_view name, std::uint32_t epoch, const core::clock& time,
@@ -56,6 +62,10 @@ class secured_node final : public core::node_security {
     bool wants_roster(std::string_view from, std::uint32_t version, time_point now) override;
 
   private:
+    struct refused_link {
+        std::string why;
+        time_point at{};
+    };
     struct asked_member {
         std::uint32_t version = 0;
         time_point at{};
@@ -77,6 +87,8 @@ class secured_node final : public core::node_security {
     mutable decoded_noun noun_; // scratch space
     std::shared_ptr<sealed_datagrams> datagrams_;
     core::security_observer* observer_ = nullptr;
+    const core::clock* time_ = nullptr; // since `begin`
+    std::deque<refused_link> refused_;  // that were logged in the last minute
     std::shared_ptr<void> observation_; // of the fleet
     std::map<std::string, asked_member, std::less<>> asked_;
     std::string files_; // the state of the files at the last check
