@@ -9,12 +9,25 @@ set(cles_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/cles")
 
 # --- Headers and the library -------------------------------------------------------------------------------------------
 
-# Those in cles/security/ are for the programs that ship with CLES: cles::security is not installed.
+set(cles_headers_left_out)
+if(NOT TARGET cles_security)
+    set(cles_headers_left_out PATTERN "security" EXCLUDE PATTERN "security.hpp" EXCLUDE)
+endif()
 install(DIRECTORY libcles/include/cles DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
-    FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "security" EXCLUDE)
+    FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" ${cles_headers_left_out})
 install(TARGETS cles cles_plugin EXPORT cles-targets
     ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
     INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+
+# With targets of their own, because only programs with security need OpenSSL and libsodium.
+if(TARGET cles_security)
+    set_target_properties(cles_security PROPERTIES EXPORT_NAME security)
+    set_target_properties(cles_tls PROPERTIES EXPORT_NAME tls)
+    install(TARGETS cles_security cles_tls EXPORT cles-security-targets
+        ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
+        INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+    install(EXPORT cles-security-targets NAMESPACE cles:: DESTINATION "${cles_package_dir}")
+endif()
 
 # --- find_package(cles) ------------------------------------------------------------------------------------------------
 
@@ -65,6 +78,10 @@ file(RELATIVE_PATH cles_pc_prefix "${CMAKE_INSTALL_FULL_LIBDIR}/pkgconfig" "${CM
 string(REGEX REPLACE "/$" "" cles_pc_prefix "${cles_pc_prefix}")
 configure_file(cmake/cles.pc.in "${PROJECT_BINARY_DIR}/package/cles.pc" @ONLY)
 install(FILES "${PROJECT_BINARY_DIR}/package/cles.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+if(TARGET cles_security)
+    configure_file(cmake/cles-tls.pc.in "${PROJECT_BINARY_DIR}/package/cles-tls.pc" @ONLY)
+    install(FILES "${PROJECT_BINARY_DIR}/package/cles-tls.pc" DESTINATION "${CMAKE_INSTALL_LIBDIR}/pkgconfig")
+endif()
 
 # --- The programs ------------------------------------------------------------------------------------------------------
 

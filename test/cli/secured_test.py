@@ -5,6 +5,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -112,6 +113,41 @@ class Secured(Trust):
         self.failed("pull", "car1:echo/7", "-k", "sat1", says="roster")
         os.chmod(self.path("fleet/operator/key"), 0o644)
         self.failed("pull", "car1:echo/7", "-k", "fleet/operator", says="chmod")
+
+    # -- cles doctor -----------------------------------------------------------------------------------------------
+
+    def findings(self, check, keys):
+        """What the check found: (verdict, text, advice)."""
+        done = self.run_in("doctor", "-k", keys, "-o", "json")
+        return [(each["verdict"], each["text"], each.get("advice", ""))
+                for each in json.loads(done.out)["findings"] if each["check"] == check]
+
+    def finds(self, check, keys, verdict, text, advice=""):
+        found = self.findings(check, keys)
+        self.assertTrue(any(each[0] == verdict and text in each[1] and advice in each[2] for each in found), found)
+
+    def test_doctor_of_a_directory_that_can_be_used(self):
+        self.finds("keys", "fleet/operator", "ok", "operator is a member of the fleet")
+        self.finds("nodes", "fleet/operator", "ok", "1 node found")
+        self.finds("nodes", "fleet/operator", "ok", "version 2 of the roster is in force")
+
+    def test_doctor_of_a_directory_with_mistakes(self):
+        self.finds("keys", "nowhere", "failure", "nowhere")
+        self.good("keys", "new", "sat1", "-k", "sat1")
+        self.finds("keys", "sat1", "failure", "sat1 is not a member of a fleet: there is no roster", "cles fleet add")
+        self.path("fleet/operator/rules").write_text("allow everything\n", encoding="utf-8")
+        self.finds("keys", "fleet/operator", "failure", "every request is denied", "cles access")
+        os.chmod(self.path("fleet/operator/key"), 0o644)
+        self.finds("keys", "fleet/operator", "failure", "chmod", "cles keys show")
+
+    def test_doctor_of_a_fork(self):
+        fork = self.path("fork")
+        shutil.copytree(self.path("fleet"), fork)
+        self.good("fleet", "rotate", "-k", "fleet")
+        self.good("fleet", "remove", "car2", "-k", "fork")
+        shutil.copy(self.path("fork/roster"), self.path("fleet/operator/other.join"))
+        self.good("keys", "join", "fleet/roster", "-k", "fleet/operator")
+        self.finds("keys", "fleet/operator", "warning", "other.join", "cles fleet rotate")
 
     # -- cles serve ------------------------------------------------------------------------------------------------
 

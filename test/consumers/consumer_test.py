@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Uses the library as another project does, in one of three ways, and runs what comes out.
+"""Uses the library as another project does, in one of several ways, and runs what comes out.
 
     consumer_test.py WAY --cmake CMAKE --compiler CXX --source ROOT --build BUILD --scratch FOLDER --version VERSION
 
-WAY: install, find_package, pkg_config or add_subdirectory. FOLDER is emptied first.
+WAY: install, find_package, find_security, pkg_config or add_subdirectory. FOLDER is emptied first.
 """
 
 import argparse
@@ -86,13 +86,17 @@ def check_case_studies(consumer: Consumer, prefix: Path) -> None:
     expect(installed == wanted, f"the component contains {installed}, not {wanted}")
 
 
+def has_security(prefix: Path) -> bool:
+    return any(prefix.rglob("libcles_tls.a"))
+
+
 def install(consumer: Consumer) -> None:
     prefix = consumer.install()
     check_case_studies(consumer, prefix)
     source = consumer.options.source
     for public in (source / "libcles" / "include").rglob("*.hpp"):
         name = public.relative_to(source / "libcles")
-        if "security" in name.parts:  # its library is not installed
+        if not has_security(prefix) and ("security" in name.parts or name.name == "security.hpp"):
             expect(not (prefix / name).exists(), f"{name} is installed")
             continue
         expect((prefix / name).read_bytes() == public.read_bytes(), f"{name} is not installed as it is")
@@ -131,6 +135,20 @@ def find_package(consumer: Consumer) -> None:
     expect(printed == 'one category, 2 signals, {"value":27.5}\n', f"the mixed program printed {printed!r}")
 
 
+def find_security(consumer: Consumer) -> None:
+    prefix = consumer.install()
+    build = consumer.configure("find_security", f"-DCMAKE_PREFIX_PATH={prefix}")
+    consumer.run(consumer.options.cmake, "--build", build)
+
+    places = {"PKG_CONFIG_PATH": str(next(prefix.rglob("cles-tls.pc")).parent)}
+    flags = consumer.run("pkg-config", "--cflags", "--libs", "cles-tls", environment=places).split()
+    program = consumer.scratch / "my_program"
+    consumer.run(consumer.options.compiler, "-std=c++20", HERE / "secured.cpp", "-o", program, *flags)
+    for number, each in enumerate((build / "my_program", program)):
+        printed = consumer.run(each, consumer.scratch / f"fleet{number}")
+        expect(printed == "27.500000\n", f"it printed {printed!r}")
+
+
 def pkg_config(consumer: Consumer) -> None:
     prefix = consumer.install()
     places = {"PKG_CONFIG_PATH": str(next(prefix.rglob("cles.pc")).parent)}
@@ -166,7 +184,7 @@ def add_subdirectory(consumer: Consumer) -> None:
     expect(not (consumer.scratch / "prefix").exists(), "the library is part of another project's installation")
 
 
-WAYS = {way.__name__: way for way in (install, find_package, pkg_config, add_subdirectory)}
+WAYS = {way.__name__: way for way in (install, find_package, find_security, pkg_config, add_subdirectory)}
 
 
 def main() -> int:

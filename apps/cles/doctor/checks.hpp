@@ -48,6 +48,9 @@ class findings {
 /// Whether `clesd` accepts the configuration that it would use, which it checks itself.
 void check_configuration(findings& found);
 
+/// The key directory of the command, unless its name is empty. \return whether it can be used
+bool check_keys(const std::string& directory, findings& found);
+
 /// The interfaces of this host, and those that multicast uses.
 void check_interfaces(const cles::multicast_options& group, findings& found);
 
@@ -57,7 +60,7 @@ std::vector<std::string> check_multicast(const cles::multicast_options& group, f
 /// Whether the default ports of nodes are free, or used by nodes; with --at, which node is there.
 boost::asio::awaitable<void> check_ports(client& requester, const address_book& addresses, findings& found);
 
-/// Whether the nodes that announce themselves answer, have unique names, and have the time of this host.
+/// Whether the nodes that announce themselves answer, have unique names, the same roster, and the time of this host.
 boost::asio::awaitable<void> check_nodes(client& requester, const address_book& addresses, findings& found);
 
 /// The clock of this host.

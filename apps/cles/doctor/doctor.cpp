@@ -105,15 +105,18 @@ int run_checks(doctor_arguments& args, int verbosity) {
     args.addresses.check();
     findings found;
     check_configuration(found);
+    const bool can_ask = check_keys(args.addresses.keys(), found);
     const auto group = args.addresses.group();
     check_interfaces(group, found);
     if (const auto usable = check_multicast(group, found); usable != cles::interfaces_of(group) || usable.empty()) {
         args.addresses.restrict_group_to(usable); // so that the remaining checks work
     }
-    client requester{args.addresses, verbosity};
-    const auto code = requester.run(check_network(requester, args.addresses, found));
-    if (code != exit_code::success) {
-        return code; // interrupted
+    if (can_ask) {
+        client requester{args.addresses, verbosity};
+        const auto code = requester.run(check_network(requester, args.addresses, found));
+        if (code != exit_code::success) {
+            return code; // interrupted
+        }
     }
     check_clock(found);
     check_limits(found);
@@ -132,13 +135,14 @@ void add_doctor(CLI::App& app, context& shared) {
     auto* command = app.add_subcommand("doctor", "Find out why nodes do not work together");
     args->addresses.add_options(*command);
     add_output_option(*command, args->format);
-    command->footer(
-        "Checks the configuration of clesd, interfaces, multicast, ports, nodes, the clock and limits, and\n"
-        "reports what is wrong and how to correct it. The exit code is 1 if a check fails.\n\n"
-        "Examples:\n"
-        "  cles doctor\n"
-        "  cles doctor -m eth0\n"
-        "  cles doctor --at tcp://10.0.0.7 -o json | jq -r '.findings[] | select(.verdict != \"ok\")'");
+    command->footer("Checks the configuration of clesd, the key directory, interfaces, multicast, ports, nodes, the "
+                    "clock and limits, and\n"
+                    "reports what is wrong and how to correct it. The exit code is 1 if a check fails.\n\n"
+                    "Examples:\n"
+                    "  cles doctor\n"
+                    "  cles doctor -m eth0\n"
+                    "  cles doctor --keys /etc/cles/keys\n"
+                    "  cles doctor --at tcp://10.0.0.7 -o json | jq -r '.findings[] | select(.verdict != \"ok\")'");
     command->callback([args, &shared] { shared.exit_code = run_checks(*args, shared.verbosity); });
 }
 

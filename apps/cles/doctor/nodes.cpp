@@ -13,6 +13,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <set>
 #include <string>
 #include <utility>
@@ -66,6 +67,36 @@ void check_protocol(const listed_node& node, const std::string& description, fin
     } catch (const cles::error&) {
         found.failure("nodes", "the reply of " + node.node + " does not describe a node",
                       "check that " + node.url() + " is a CLES node");
+    }
+}
+
+struct stated_roster {
+    std::uint32_t roster = 0; // none without security
+};
+BOOST_DESCRIBE_STRUCT(stated_roster, (), (roster))
+
+// Nodes give a newer roster to each other, so versions differ for seconds only, unless a node is out of reach.
+void check_rosters(const std::vector<listed_node>& nodes, const std::vector<node_answer>& answers, findings& found) {
+    std::string versions;
+    std::set<std::uint32_t> different;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        try {
+            const auto version = answers[i].error.empty() ? cles::from_json<stated_roster>(answers[i].json).roster : 0U;
+            if (version != 0) {
+                versions.append(versions.empty() ? "" : ", ").append(nodes[i].node).append(" has ");
+                versions.append(std::to_string(version));
+                different.insert(version);
+            }
+        } catch (const cles::error&) {
+            continue; // check_protocol reports it
+        }
+    }
+    if (different.size() > 1) {
+        found.warning("nodes", "the versions of the roster differ: " + versions,
+                      "if they still do after some seconds, carry the newest to the others: cles pull NODE:cles/roster "
+                      ">roster, and there cles keys join roster");
+    } else if (!different.empty()) {
+        found.ok("nodes", "version " + std::to_string(*different.begin()) + " of the roster is in force");
     }
 }
 
@@ -147,6 +178,9 @@ asio::awaitable<void> check_nodes(client& requester, const address_book& address
             nodes[i].read_tasks(answers[i].json);
             check_protocol(nodes[i], answers[i].json, found);
         }
+    }
+    if (addresses.is_secured()) {
+        check_rosters(nodes, answers, found);
     }
     co_await check_names(requester, nodes, found);
     co_await compare_clocks(requester, nodes, found);

@@ -78,8 +78,8 @@ boost::system::error_code try_to_bind(asio::io_context& io) {
 
 asio::awaitable<void> check_default_port(client& requester, std::string_view protocol, findings& found) {
     const auto url = std::string{protocol} + "://127.0.0.1:" + std::to_string(cles::default_port);
-    const auto code = protocol == "tcp" ? try_to_bind<asio::ip::tcp>(requester.context())
-                                        : try_to_bind<asio::ip::udp>(requester.context());
+    const auto code = protocol == "udp" ? try_to_bind<asio::ip::udp>(requester.context())
+                                        : try_to_bind<asio::ip::tcp>(requester.context());
     if (!code) {
         found.ok("ports", url + " is free");
         co_return;
@@ -96,7 +96,12 @@ asio::awaitable<void> check_default_port(client& requester, std::string_view pro
         report_node(url, answer, found);
         co_return;
     }
-    const auto process = process_listening_at(protocol, cles::default_port);
+    const auto process = process_listening_at(protocol == "udp" ? "udp" : "tcp", cles::default_port);
+    if (process.starts_with("cles")) {
+        found.warning("ports", url + ": " + process + " listens here, and refuses: " + answer.error,
+                      "if it is a node with security, give the key of a member of its fleet: --keys DIR");
+        co_return;
+    }
     found.failure("ports",
                   url + ": " + (process.empty() ? "another program" : process) +
                       " listens here, which is not a node: " + answer.error,
@@ -120,6 +125,10 @@ asio::awaitable<void> check_given_address(client& requester, const address_book&
 asio::awaitable<void> check_ports(client& requester, const address_book& addresses, findings& found) {
     if (addresses.has_url()) {
         co_await check_given_address(requester, addresses, found);
+        co_return;
+    }
+    if (addresses.is_secured()) {
+        co_await check_default_port(requester, "tls", found);
         co_return;
     }
     co_await check_default_port(requester, "tcp", found);

@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "doctor/checks.hpp"
+
+#ifdef CLES_SECURITY
+
+#include <cles/security/node_files.hpp>
+
+#include <exception>
+#include <string>
+
+#include <sys/resource.h>
+
+namespace tool {
+namespace {
+
+namespace security = cles::security;
+
+void check_membership(const security::node_description& node, const std::string& directory, findings& found) {
+    if (!node.rights) {
+        found.failure("keys", node.name + " is not a member of a fleet: " + node.reason,
+                      "at the fleet's authority: cles fleet add " + node.name + ".pub; then here: cles keys join " +
+                          node.name + ".join --keys " + directory);
+        return;
+    }
+    found.ok("keys", node.name + " is a member of the fleet " + node.fleet + ", by version " +
+                         std::to_string(node.version) + " of the roster");
+    for (const auto& warning : node.warnings) { // of rosters that differ in one version
+        found.warning("keys", warning, "make the next version at the fleet's authority: cles fleet rotate");
+    }
+}
+
+void check_rules(const security::node_description& node, const std::string& directory, findings& found) {
+    if (!node.rules_error.empty()) {
+        found.failure("keys", "every request is denied: " + node.rules_error,
+                      "correct it; cles access MEMBER VERB NOUN --keys " + directory + " says what the rules permit");
+    } else if (node.rules != 0) {
+        found.ok("keys", std::to_string(node.rules) + (node.rules == 1 ? " local rule" : " local rules"));
+    }
+}
+
+void check_locked_memory(findings& found) {
+    constexpr rlim_t needed = rlim_t{1024} * 1024; // each secret has pages of its own
+    rlimit locked{};
+    if (::getrlimit(RLIMIT_MEMLOCK, &locked) == 0 && locked.rlim_cur < needed) {
+        found.warning("keys",
+                      "a program may lock only " + std::to_string(locked.rlim_cur / 1024) +
+                          " KiB of memory, so keys may be written to swap",
+                      "ulimit -l " + std::to_string(needed / 1024) + ", or LimitMEMLOCK= in the unit file");
+    }
+}
+
+} // namespace
+
+bool check_keys(const std::string& directory, findings& found) {
+    if (directory.empty()) {
+        return true;
+    }
+    check_locked_memory(found);
+    try {
+        const auto node = security::describe_node(directory);
+        check_membership(node, directory, found);
+        check_rules(node, directory, found);
+        return node.rights.has_value();
+    } catch (const std::exception& e) {
+        found.failure("keys", e.what(), "correct it, and run cles keys show --keys " + directory);
+        return false;
+    }
+}
+
+} // namespace tool
+
+#else
+
+namespace tool {
+
+bool check_keys(const std::string& directory, findings& found) {
+    if (!directory.empty()) {
+        found.failure("keys", "this cles was built without security", "use another one, or leave out --keys");
+    }
+    return directory.empty();
+}
+
+} // namespace tool
+
+#endif
