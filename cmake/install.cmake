@@ -9,7 +9,9 @@ set(cles_package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/cles")
 
 # --- Headers and the library -------------------------------------------------------------------------------------------
 
-install(DIRECTORY libcles/include/cles DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
+# Those in cles/security/ are for the programs that ship with CLES: cles::security is not installed.
+install(DIRECTORY libcles/include/cles DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
+    FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp" PATTERN "security" EXCLUDE)
 install(TARGETS cles cles_plugin EXPORT cles-targets
     ARCHIVE DESTINATION "${CMAKE_INSTALL_LIBDIR}"
     INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")

@@ -31,6 +31,9 @@ void add_top(CLI::App& app, context& shared);
 void add_doctor(CLI::App& app, context& shared);
 void add_completion(CLI::App& app, context& shared);
 void add_serve(CLI::App& app, context& shared);
+void add_keys(CLI::App& app, context& shared);
+void add_fleet(CLI::App& app, context& shared);
+void add_access(CLI::App& app, context& shared);
 void add_help(CLI::App& app, context& shared);
 /// `words` are the arguments of this program, ended by a null pointer. Those after "bench" are passed to `cles-bench`.
 void add_bench(CLI::App& app, char** words);
@@ -38,7 +41,10 @@ void add_bench(CLI::App& app, char** words);
 /// A description of the program and its commands.
 std::string overview_of(const CLI::App& app);
 
-/// Reports on stderr that there is no such command, and suggests a similar one.
+/// The name of a command with those of the commands that contain it: "cles fleet add".
+std::string full_name_of(const CLI::App& command);
+
+/// Reports on stderr that this program, or command, has no such command, and suggests a similar one.
 void report_unknown_command(const CLI::App& app, const std::string& typed);
 
 /// Suggests a similar option on stderr, if this word looks like one.

@@ -21,7 +21,7 @@ constexpr auto about = "Sends requests to the nodes of a CLES network, and inspe
 
 constexpr auto footer =
     "Data goes to stdout, everything else to stderr. CLES_AT is the default of --at, CLES_MULTICAST that of "
-    "--multicast; NO_COLOR disables colours.\n\n"
+    "--multicast, CLES_KEYS that of --keys; NO_COLOR disables colours.\n\n"
     "Exit codes: 0 ok, 1 local failure, 2 usage, 3 no such target or task, 4 deadline,\n"
     "5 remote error, 6 busy, 130 interrupted.\n\n"
     "Examples:\n"
@@ -31,6 +31,15 @@ constexpr auto footer =
     "  cles bind car1:localization\n"
     "  cles delegate car1:sleep/3000";
 
+// The command that was given, or the program itself.
+const CLI::App& command_of(const CLI::App& app) {
+    const CLI::App* out = &app;
+    for (auto given = out->get_subcommands(); !given.empty(); given = out->get_subcommands()) {
+        out = given.front();
+    }
+    return *out;
+}
+
 int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
     try {
         app.parse(argc, argv);
@@ -38,23 +47,23 @@ int run(CLI::App& app, tool::context& shared, int argc, char** argv) {
     } catch (const CLI::Success& request) { // --help, --version
         return app.exit(request);
     } catch (const CLI::ParseError& error) {
-        const auto commands = app.get_subcommands();
+        const auto& command = command_of(app);
         const auto unknown = app.remaining(true);
-        if (commands.empty() && unknown.empty()) {
+        const bool has_commands = command.get_require_subcommand_min() > 0;
+        if (has_commands && !unknown.empty()) {
+            tool::report_unknown_command(command, unknown.front());
+        } else {
             tool::print_error(error.what());
+        }
+        if (&command == &app && unknown.empty()) {
             std::cerr << '\n' << tool::overview_of(app);
             return tool::exit_code::usage;
         }
-        if (commands.empty()) {
-            tool::report_unknown_command(app, unknown.front());
-        } else {
-            tool::print_error(error.what());
-            for (const auto& word : unknown) {
-                tool::suggest_option(app, *commands.front(), word);
-            }
+        for (const auto& word : unknown) {
+            tool::suggest_option(app, command, word);
         }
-        tool::note(commands.empty() ? "cles help lists the commands"
-                                    : "cles help " + commands.front()->get_name() + " shows its options");
+        const auto help = "cles help" + tool::full_name_of(command).substr(app.get_name().size());
+        tool::note(help + (has_commands ? " lists the commands" : " shows its options"));
         return tool::exit_code::usage;
     }
 }
@@ -85,6 +94,11 @@ int main(int argc, char** argv) {
         tool::add_doctor(app, shared);
         tool::add_completion(app, shared);
         tool::add_serve(app, shared);
+#ifdef CLES_SECURITY
+        tool::add_keys(app, shared);
+        tool::add_fleet(app, shared);
+        tool::add_access(app, shared);
+#endif
         tool::add_help(app, shared);
         tool::add_bench(app, argv + 1);
         if (argc > 1 && std::string_view{argv[1]} == "__complete") {

@@ -11,7 +11,7 @@ import time
 import unittest
 
 import shells
-from support import CLES, Node, ScriptedNode, cles, environment, free_port, id_of, wait_until
+from support import CLES, HAS_SECURITY, Node, ScriptedNode, cles, environment, free_port, id_of, wait_until
 
 # The program by its name, so that the scripts find it as if it were installed.
 FOLDER = os.path.dirname(os.path.abspath(shutil.which(CLES) or CLES))
@@ -90,6 +90,35 @@ class WithoutNodes(unittest.TestCase):
                              {f"@{folder}/body.json", f"@{folder}/inner/"})
             self.assertEqual(list(offered("push", "car1:x", "-d", f"@{folder}/b")), [f"@{folder}/body.json"])
         self.assertEqual(offered("push", "car1:x", "-d", "@/nowhere/"), {})
+
+    @unittest.skipUnless(HAS_SECURITY, "cles was built without libsodium")
+    def test_commands_in_commands(self):
+        self.assertEqual(list(offered("keys", "")), ["new", "show", "join"])
+        self.assertEqual(list(offered("fleet", "r")), ["rights", "remove", "rotate"])
+        self.assertEqual(offered("-v", "fleet", "show")["show"], "Show the members of the fleet, and what they are permitted")
+        self.assertEqual(offered("keys", "fly", ""), {})
+        self.assertIn("--keys", offered("keys", "new", "--"))
+        self.assertNotIn("--may", offered("fleet", "--"))
+        self.assertIn("--may", offered("fleet", "add", "--m"))
+        self.assertEqual(list(offered("fleet", "show", "--output=r")), ["--output=raw"])
+
+    @unittest.skipUnless(HAS_SECURITY, "cles was built without libsodium")
+    def test_members_and_files(self):
+        with tempfile.TemporaryDirectory() as folder:
+            fleet = os.path.join(folder, "fleet")
+            self.assertEqual(cles("fleet", "init", fleet, "--with", "car1,sat1")[0], 0)
+            env = {**ENVIRONMENT, "CLES_KEYS": fleet}
+            self.assertEqual(offered("fleet", "rights", "", env=env), {"car1": "member 1", "sat1": "member 2"})
+            self.assertEqual(list(offered("fleet", "remove", "car1", "s", env=env)), ["sat1"])
+            self.assertEqual(list(offered("access", "c", env=env)), ["car1"])
+            self.assertEqual(list(offered("access", "-k", fleet, "sat1", "pu")), ["pull", "push"])
+            self.assertEqual(list(offered("access", f"--keys={fleet}", "sat1", "pull", "c")), ["car1:"])
+            self.assertEqual(list(offered("access", "sat1", "pull", "car1:x", "--via", "s", env=env)), ["sat1"])
+            self.assertEqual(offered("fleet", "rights", "", env={**ENVIRONMENT, "CLES_KEYS": "/nowhere"}), {})
+            self.assertEqual(set(offered("fleet", "add", f"{fleet}/c")),
+                             {f"{fleet}/car1/", f"{fleet}/car1.join"})
+            self.assertEqual(list(offered("fleet", "add", "x", f"{fleet}/car1/c")), [f"{fleet}/car1/car1.pub"])
+            self.assertEqual(list(offered("keys", "show", "--keys", f"{fleet}/c")), [f"{fleet}/car1/"])
 
     def test_nobody_is_there(self):
         env = environment(CLES_MULTICAST=f"lo,239.255.25.38:{free_port()}")
@@ -246,6 +275,8 @@ class Shells(unittest.TestCase):
             completes("cles pull --at " + self.node.url + " self:loc",
                       "cles pull --at " + self.node.url + " self:localization ")
             completes("cles pull --outp", "cles pull --output ")
+            if HAS_SECURITY:
+                completes("cles fleet rot", "cles fleet rotate ")
             completes("cles pull --output=j", "cles pull --output=json ")
             completes("cles pull --peer truck=" + self.node.url + " tr",
                       "cles pull --peer truck=" + self.node.url + " truck:")

@@ -16,13 +16,15 @@ import time
 import unittest
 
 CLES = os.environ.get("CLES_COMMAND", "cles")
+# Built with libsodium, which keys, fleet and access need.
+HAS_SECURITY = os.environ.get("CLES_SECURITY", "1") != ""
 # Sanitizers and busy machines are slow; everything here is quick unless it hangs.
 PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
 
 
 def environment(**more):
     """The environment for a command, without the variables of the tester's own."""
-    env = {k: v for k, v in os.environ.items() if k not in ("CLES_AT", "NO_COLOR")}
+    env = {k: v for k, v in os.environ.items() if k not in ("CLES_AT", "CLES_KEYS", "NO_COLOR")}
     env["TERM"] = "xterm"
     env["CLES_MULTICAST"] = "off"  # unless a test needs it
     env.update(more)

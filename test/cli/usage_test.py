@@ -5,10 +5,12 @@
 import tempfile
 import unittest
 
-from support import cles, environment
+from support import HAS_SECURITY, cles, environment
 
 COMMANDS = ("pull", "push", "delegate", "bind", "update", "ping", "hz", "info", "ls", "top", "doctor", "completion",
             "serve")
+if HAS_SECURITY:
+    COMMANDS += ("keys", "fleet", "access")
 
 
 class Usage(unittest.TestCase):

@@ -90,7 +90,7 @@ BOOST_AUTO_TEST_CASE(the_fleets_key_is_created_and_read) {
 }
 
 BOOST_AUTO_TEST_CASE(missing_files_are_named) {
-    BOOST_TEST(contains(refusal([&] { return files.read_key(); }), path("key") + " does not exist: 'cles key new'"));
+    BOOST_TEST(contains(refusal([&] { return files.read_key(); }), path("key") + " does not exist: 'cles keys new'"));
     BOOST_TEST(contains(refusal([&] { return files.read_fleet_key(); }), path("fleet.key") + " does not exist"));
     BOOST_TEST(refusal([&] { return files.read_public_identity("x.pub"); }) == path("x.pub") + " does not exist");
     BOOST_TEST(contains(node_refusal(), path("key") + " does not exist"));

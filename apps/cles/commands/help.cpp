@@ -34,14 +34,20 @@ std::string overview_of(const CLI::App& app) {
     return app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
 }
 
+std::string full_name_of(const CLI::App& command) {
+    const auto* const parent = command.get_parent();
+    return parent == nullptr ? command.get_name() : full_name_of(*parent) + " " + command.get_name();
+}
+
 void report_unknown_command(const CLI::App& app, const std::string& typed) {
     std::vector<std::string> names;
     for (const auto* command : commands_in(app)) {
         names.push_back(command->get_name());
     }
-    print_error("there is no command '" + typed + "'");
+    const auto before = app.get_parent() == nullptr ? std::string{} : app.get_name() + " ";
+    print_error("there is no command '" + before + typed + "'");
     if (const auto match = closest_match(typed, names); !match.empty()) {
-        note("did you mean 'cles " + match + "'?");
+        note("did you mean '" + full_name_of(app) + " " + match + "'?");
     }
 }
 
@@ -59,24 +65,30 @@ void suggest_option(const CLI::App& app, const CLI::App& command, const std::str
 }
 
 void add_help(CLI::App& app, context& shared) {
-    auto name = std::make_shared<std::string>();
+    auto words = std::make_shared<std::vector<std::string>>();
     auto* command = app.add_subcommand("help", "Show what a command does, and its options");
-    command->add_option("command", *name, "The command; without it, all commands are listed")->type_name("");
+    command->add_option("command", *words, "The command; without it, all commands are listed")->type_name("");
     command->footer("Examples:\n"
                     "  cles help\n"
                     "  cles help pull");
-    command->callback([name, &app, &shared] {
-        const auto all = commands_in(app);
-        const auto found =
-            std::find_if(all.begin(), all.end(), [&](const CLI::App* each) { return each->get_name() == *name; });
-        if (name->empty()) {
+    command->callback([words, &app, &shared] {
+        if (words->empty()) {
             write_output(overview_of(app));
-        } else if (found != all.end()) {
-            write_output((*found)->help(app.get_name()));
-        } else {
-            report_unknown_command(app, *name);
-            shared.exit_code = exit_code::usage;
+            return;
         }
+        const CLI::App* found = &app;
+        for (const auto& word : *words) {
+            const auto all = commands_in(*found);
+            const auto next =
+                std::find_if(all.begin(), all.end(), [&](const CLI::App* each) { return each->get_name() == word; });
+            if (next == all.end()) {
+                report_unknown_command(*found, word);
+                shared.exit_code = exit_code::usage;
+                return;
+            }
+            found = *next;
+        }
+        write_output(found->help(full_name_of(*found->get_parent())));
     });
 }
 

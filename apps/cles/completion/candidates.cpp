@@ -8,6 +8,7 @@
 #include <CLI/Option.hpp>
 
 #include <array>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -37,8 +38,9 @@ void append_options(std::vector<candidate>& out, CLI::App& command) {
 
 // CLI11 does not list the values of an option, but says of each word whether it is valid.
 std::vector<candidate> keywords_of(CLI::Option& option) {
-    constexpr std::array keywords{"table", "json", "raw",       "text",      "tcp",      "udp",  "unix", "inproc",
-                                  "bash",  "zsh",  "multicast", "coroutine", "callback", "fish", "name", "load"};
+    constexpr std::array keywords{"table",     "json",     "raw",  "text", "tcp",      "udp",  "unix",
+                                  "inproc",    "bash",     "zsh",  "fish", "name",     "load", "multicast",
+                                  "coroutine", "callback", "pull", "push", "delegate", "bind", "update"};
     std::vector<candidate> out;
     try {
         const auto& accepts = *option.get_validator();
@@ -61,20 +63,29 @@ std::vector<candidate> interface_names() {
     return out;
 }
 
-std::vector<candidate> files_at(const std::string& typed) {
-    if (!typed.starts_with("@")) {
-        return {{"@", "a file"}, {"-", "stdin"}};
-    }
-    const auto folder = typed.substr(1, typed.rfind('/') == std::string::npos ? 0 : typed.rfind('/'));
+enum class entries : std::uint8_t { all, folders };
+
+// The files at a path that has been typed, each after `before`.
+std::vector<candidate> files_at(const std::string& path, const std::string& before, entries wanted) {
+    const auto folder = path.substr(0, path.find_last_of('/') + 1);
     std::vector<candidate> out;
     std::error_code code;
     std::filesystem::directory_iterator entry{folder.empty() ? "." : folder, code};
     for (; !code && entry != std::filesystem::directory_iterator{}; entry.increment(code)) {
         std::error_code unknown;
         const bool is_folder = entry->is_directory(unknown);
-        out.push_back({"@" + folder + entry->path().filename().string() + (is_folder ? "/" : "")});
+        if (is_folder || wanted == entries::all) {
+            out.push_back({before + folder + entry->path().filename().string() + (is_folder ? "/" : "")});
+        }
     }
     return out;
+}
+
+std::vector<candidate> bodies_at(const std::string& typed) {
+    if (!typed.starts_with("@")) {
+        return {{"@", "a file"}, {"-", "stdin"}};
+    }
+    return files_at(typed.substr(1), "@", entries::all);
 }
 
 } // namespace
@@ -106,7 +117,10 @@ std::vector<candidate> values_at(const cursor& cursor) {
         return interface_names();
     }
     if (kind == "JSON") {
-        return files_at(cursor.typed);
+        return bodies_at(cursor.typed);
+    }
+    if (kind == "FILE" || kind == "DIR") {
+        return files_at(cursor.typed, "", kind == "FILE" ? entries::all : entries::folders);
     }
     return keywords_of(*cursor.option);
 }

@@ -16,7 +16,7 @@ struct candidate {
 
 // The candidates that are known without asking any node, regardless of what has been typed so far.
 
-/// The commands of the program.
+/// The commands of the program, or those of a command that has some.
 std::vector<candidate> commands_of(CLI::App& app);
 
 /// The options of the cursor's command, and those of the program.

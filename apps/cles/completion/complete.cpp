@@ -8,6 +8,9 @@
 #include "options/addresses.hpp"
 #include "output/errors.hpp"
 #include "output/terminal.hpp"
+#ifdef CLES_SECURITY
+#include "trust/member_candidates.hpp"
+#endif
 
 #include <boost/asio/awaitable.hpp>
 
@@ -52,6 +55,11 @@ class live_search {
     candidates run() {
         const auto name = cursor_.option->get_name();
         const std::string kind = cursor_.option->get_type_name();
+#ifdef CLES_SECURITY
+        if (kind.starts_with("MEMBER")) {
+            return member_candidates(cursor_.words, kind == "MEMBER" ? "" : ":");
+        }
+#endif
         if (name == "noun") {
             return nouns();
         }
@@ -130,7 +138,7 @@ class live_search {
 
 candidates candidates_at(CLI::App& app, const cursor& cursor) {
     switch (cursor.what) {
-    case cursor::at::command: return commands_of(app);
+    case cursor::at::command: return commands_of(*cursor.command);
     case cursor::at::option: return options_at(app, cursor);
     case cursor::at::value: break;
     case cursor::at::nothing: return {};

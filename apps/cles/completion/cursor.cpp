@@ -26,10 +26,16 @@ CLI::Option* find_option(CLI::App& app, CLI::App& command, std::string_view word
 
 bool takes_value(const CLI::Option* option) { return option != nullptr && option->get_items_expected_max() > 0; }
 
+// The last one may take several words.
 CLI::Option* find_positional(CLI::App& command, std::size_t which) {
     const auto all = command.get_options([](const CLI::Option* option) { return option->get_positional(); });
-    return which < all.size() ? all[which] : nullptr;
+    if (which < all.size()) {
+        return all[which];
+    }
+    return !all.empty() && all.back()->get_items_expected_max() > 1 ? all.back() : nullptr;
 }
+
+bool has_commands(const CLI::App& command) { return command.get_require_subcommand_min() > 0; }
 
 bool is_option(const std::string& word) { return word.size() > 1 && word.front() == '-'; }
 
@@ -55,9 +61,9 @@ cursor find_cursor(CLI::App& app, std::vector<std::string> words) {
             if (takes_value(option) && word.find('=') == std::string::npos && ++i == out.words.size()) {
                 out.option = option;
             }
-        } else if (out.command != &app) {
+        } else if (!has_commands(*out.command)) {
             ++positionals;
-        } else if (out.command = find_command(app, word); out.command == nullptr) {
+        } else if (out.command = find_command(*out.command, word); out.command == nullptr) {
             return out;
         }
     }
@@ -73,7 +79,7 @@ cursor find_cursor(CLI::App& app, std::vector<std::string> words) {
         out.typed.erase(0, equals + 1);
     } else if (!no_more_options && out.typed.starts_with("-")) {
         out.what = cursor::at::option;
-    } else if (out.command == &app) {
+    } else if (has_commands(*out.command)) {
         out.what = cursor::at::command;
     } else {
         out.option = find_positional(*out.command, positionals);

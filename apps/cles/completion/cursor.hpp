@@ -16,7 +16,7 @@ struct cursor {
     enum class at { command, option, value, nothing };
 
     at what = at::nothing;
-    CLI::App* command = nullptr;      ///< the subcommand, or the program itself
+    CLI::App* command = nullptr;      ///< the innermost one, or the program itself
     CLI::Option* option = nullptr;    ///< whose `value` is typed; positional arguments are options too
     std::string before{};             ///< what precedes it in the same word, as in "--output="
     std::string typed{};              ///< the part that has been typed

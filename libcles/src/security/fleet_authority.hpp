@@ -1,26 +1,20 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/security/member_rights.hpp>
+
 #include "security/group_keys.hpp"
 #include "security/identity.hpp"
 #include "security/roster.hpp"
 
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace cles::security {
-
-/// What a member is permitted; the same as in its entry of the roster.
-struct member_rights {
-    std::optional<std::vector<std::string>> may{};
-    std::optional<std::vector<std::string>> offers{};
-    std::vector<std::string> forwards{};
-};
 
 /// Makes the rosters of a fleet, each of the next version (docs/security.md, "The roster"). It needs the fleet's key
 /// and the newest roster only. Sans-I/O: the owner stores `newest`.

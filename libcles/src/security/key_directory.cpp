@@ -69,7 +69,7 @@ void key_directory::write_public_identity(const public_identity& identity) const
 node_identity key_directory::read_key() const {
     const auto content = folder_.read_secret(key_file, max_key_file);
     if (!content) {
-        throw security_error{folder_.path_of(key_file) + " does not exist: 'cles key new' creates it"};
+        throw security_error{folder_.path_of(key_file) + " does not exist: 'cles keys new' creates it"};
     }
     return naming(folder_.path_of(key_file), [&] { return read_node_identity(content->view()); });
 }
@@ -81,7 +81,7 @@ void key_directory::create_fleet_key(const signing_key& key) const {
 signing_key key_directory::read_fleet_key() const {
     const auto content = folder_.read_secret(fleet_key_file, max_key_file);
     if (!content) {
-        throw security_error{folder_.path_of(fleet_key_file) + " does not exist: 'cles fleet new' creates it"};
+        throw security_error{folder_.path_of(fleet_key_file) + " does not exist: 'cles fleet init' creates it"};
     }
     return naming(folder_.path_of(fleet_key_file), [&] { return security::read_fleet_key(content->view()); });
 }
