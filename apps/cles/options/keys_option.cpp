@@ -28,7 +28,7 @@ std::string keys_option::directory() const {
     if (!given_.empty()) {
         return given_;
     }
-    if (const auto set = variable("CLES_KEYS"); !set.empty()) {
+    if (auto set = variable("CLES_KEYS"); !set.empty()) {
         return set;
     }
     if (const auto configuration = variable("XDG_CONFIG_HOME"); !configuration.empty()) {
