@@ -35,7 +35,7 @@ class Init(Trust):
 
     def test_invalid_names_create_nothing(self):
         for text, says in (("car1,", "--with 'car1,'"), (",", "is not a name"), ("car1,,car2", "'' is not a name"),
-                           ("car 1", "is not a name"), ("car1,car2,car1", "car1 is there twice"), ("car1,self", "cannot be the name"), ("../x", "is not a name")):
+                           ("car 1", "is not a name"), ("car1,car2,car1", "a name is there twice"), ("car1,self", "cannot be the name"), ("../x", "is not a name")):
             self.refused("fleet", "init", "fleet", "--with", text, says=says)
         self.assertFalse(self.path("fleet").exists())
         self.path("fleet").mkdir()
@@ -84,11 +84,11 @@ class Add(Trust):
                               (["--may", "pull *:x", "--may", "Pull *:x"], "--may 'Pull *:x': 'Pull' is not a verb"),
                               (["--offers", "pull *:x/**/y"], "--offers 'pull *:x/**/y': the parameter '**'"),
                               (["--may", "pull self:x"], "no node has the name 'self'"),
-                              (["--may", "all", "--may", "pull *:x"], "--may all excludes any other --may"),
+                              (["--may", "all", "--may", "pull *:x"], "--may 'all': excludes any other --may"),
                               (["--may", ""], "--may ''"),
                               (["--forwards", "car 1"], "--forwards 'car 1': 'car 1' is not the pattern of a name"),
                               (["--forwards", "**"], "'**' is not the pattern of a name"),
-                              (["--forwards", "car1", "--forwards", "none"], "--forwards none excludes any other")):
+                              (["--forwards", "car1", "--forwards", "none"], "--forwards 'none': excludes any other")):
             self.refused("fleet", "add", "car1/car1.pub", "-k", "fleet", *options, says=says)
         self.assertEqual(self.fleet_of("fleet")["version"], 1)
 

@@ -54,17 +54,18 @@ void note_new_roster(const std::string& directory) {
 
 // The names in "car1,car2".
 std::vector<std::string> names_in(const std::string& list) {
+    const auto refuse = [&](const std::string& why) { throw usage_error("--with '" + list + "': " + why); };
     std::vector<std::string> out;
     std::istringstream from{list};
     for (std::string name; std::getline(from, name, ',');) {
         check_node_name(name);
         if (std::find(out.begin(), out.end(), name) != out.end()) {
-            throw usage_error("--with '" + list + "': " + name + " is there twice");
+            refuse("a name is there twice");
         }
         out.push_back(name);
     }
     if (!list.empty() && (out.empty() || list.ends_with(','))) {
-        throw usage_error("--with '" + list + "': write names, as in car1,car2");
+        refuse("write names, as in car1,car2");
     }
     return out;
 }
@@ -72,6 +73,7 @@ std::vector<std::string> names_in(const std::string& list) {
 // Creates a node for each name in a folder of its own.
 void create_nodes(const std::string& directory, const std::vector<std::string>& names) {
     std::vector<std::string> lines;
+    lines.reserve(names.size());
     for (const auto& name : names) {
         lines.push_back(security::create_node_key(in_folder(directory, name), name).line);
     }

@@ -32,11 +32,9 @@ void check_list(const std::string& option, const texts& given, std::string (*fla
         return;
     }
     for (const auto& each : given) {
-        if (given.size() > 1 && is_word_for_list({each})) {
-            throw usage_error(option + " " + each + " excludes any other " + option);
-        }
-        if (const auto flaw = flaw_of(each); !flaw.empty()) {
-            throw usage_error(option + " '" + each + "': " + flaw);
+        const auto flaw = is_word_for_list({each}) ? "excludes any other " + option : flaw_of(each);
+        if (!flaw.empty()) {
+            throw usage_error(std::string{option}.append(" '").append(each).append("': ").append(flaw));
         }
     }
 }

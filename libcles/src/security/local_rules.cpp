@@ -119,7 +119,7 @@ const local_rules::rule* local_rules::find(std::string_view requester, verb aske
                                            const decoded_noun& noun) const noexcept {
     const auto matches = [&](const rule& each) {
         const auto name = each.about == subject::may ? requester : noun.target();
-        return !name.empty() && matches_name(each.name, name) && each.what.permits(asked, noun);
+        return !name.empty() && each.what.permits(asked, noun) && matches_name(each.name, name);
     };
     const auto found = std::find_if(rules_.begin(), rules_.end(), matches);
     return found == rules_.end() ? nullptr : &*found;
