@@ -155,6 +155,7 @@ void add_bench_arguments(CLI::App& command, bench_arguments& given) {
         ->type_name("N");
     command.add_option("--against", given.against, "The node to measure; it must be running and offer localization")
         ->type_name("URL");
+    given.keys.add_optional_to(command, "With --against tls://...: the key directory of a member of the node's fleet");
     auto* requests =
         command.add_option("--requests", given.requests,
                            "Requests or updates in each pass (50000; 1000000 with --updates, or if several are in "
@@ -211,6 +212,13 @@ measurement selected_measurement(const CLI::App& command, const bench_arguments&
     }
     if (!given.against.empty() && is_given(command, "--transport")) {
         refuse("--transport", "cannot be combined with --against, whose URL contains the transport");
+    }
+    const bool is_secured = given.against.starts_with("tls://");
+    if (is_given(command, "--keys") && !is_secured) {
+        refuse("--keys", "needs --against with the URL of a node with security, as in tls://10.0.0.2");
+    }
+    if (is_secured && given.keys.given_directory().empty()) {
+        refuse("--against", given.against + " needs the key of a member: give --keys DIR, or set CLES_KEYS");
     }
     return what;
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "options/keys_option.hpp"
+
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -26,6 +28,7 @@ struct bench_arguments {
     std::uint64_t requests = 0;
     std::string duration{};
     std::string against{};
+    keys_option keys{};
     std::size_t in_flight = 1;
     int busy_poll_us = 0;
     std::optional<int> wake_within_us{};

@@ -14,6 +14,7 @@ bench_options to_options(const bench_arguments& given, measurement what) {
                           .rounds = given.rounds,
                           .requests = given.requests,
                           .against = given.against,
+                          .keys = given.against.starts_with("tls://") ? given.keys.given_directory() : "",
                           .in_flight = given.in_flight,
                           .one_core = given.one_core,
                           .keep = given.keep,

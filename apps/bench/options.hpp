@@ -24,6 +24,7 @@ struct bench_options {
     std::uint64_t requests = 0;                          ///< in a pass; 0: the default of the measurement
     std::optional<std::chrono::milliseconds> duration{}; ///< of a pass, instead
     std::string against{};                               ///< a node that is already running
+    std::string keys{};                                  ///< the key directory, if that node has security
 
     std::size_t in_flight = 1;
     cles::run_options how{};                                ///< of both ends

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/service.hpp>
 
+#include "client/member_key.hpp"
 #include "figures.hpp"
 #include "measurements.hpp"
 #include "perf/baseline/exchange.hpp"
@@ -20,6 +21,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include <unistd.h>
 
@@ -117,10 +119,18 @@ struct named_node {
 };
 BOOST_DESCRIBE_STRUCT(named_node, (), (node))
 
-std::string name_of_node_at(const std::string& url) {
+cles::service_options requester(const bench_options& options) {
+    cles::service_options out{.name = "bench"};
+    if (!options.keys.empty()) {
+        use_member_key(out, options.keys);
+    }
+    return out;
+}
+
+std::string name_of_node(const bench_options& options) {
     boost::asio::io_context io{1};
-    cles::service client{io, {.name = "bench"}};
-    return cles::from_json<named_node>(client.request("PULL self:cles", cles::call_options{}.at(url))).node;
+    cles::service client{io, requester(options)};
+    return cles::from_json<named_node>(client.request("PULL self:cles", cles::call_options{}.at(options.against))).node;
 }
 
 /// The hand-written exchange, both ends.
@@ -184,9 +194,11 @@ std::string measure_pulls(const bench_options& options) {
         neighbour = std::make_unique<cles::service>(io, cles::service_options{.name = "car1", .listen = {url}});
         perf::register_localization(*neighbour);
     }
-    const std::string node = remote ? name_of_node_at(url) : "car1";
+    const std::string node = remote ? name_of_node(options) : "car1";
     const std::string noun = node + ":localization";
-    cles::service client{io, {.name = "bench", .peers = {{node, url}}}};
+    auto asking = requester(options);
+    asking.peers.emplace(node, url);
+    cles::service client{io, std::move(asking)};
     perf::pull_load load{io, client, noun, options.style, !remote, options.how};
 
     const auto requests = requests_of(options);

@@ -84,6 +84,14 @@ class Secured(Trust):
         wait_until(lambda: self.run_in("pull", "car1:echo/7", "-k", "fleet/operator").code == 5, "it is denied")
         self.assertIn("denied", self.run_in("pull", "car1:echo/7", "-k", "fleet/operator").err)
 
+    @unittest.skipIf(not os.path.exists(CLES + "-bench"), "cles-bench is not built")
+    def test_a_measurement(self):
+        report = json.loads(self.good("bench", "--against", self.car1, "-k", "fleet/operator", "--requests", "50",
+                                      "--rounds", "1", "-o", "json").out)
+        self.assertEqual(report["against"], self.car1)
+        self.refused("bench", "--against", self.car1, says="give --keys DIR, or set CLES_KEYS")
+        self.refused("bench", "--keys", "fleet/operator", says="needs --against")
+
     # -- what is refused -------------------------------------------------------------------------------------------
 
     def test_tls_needs_a_key(self):
