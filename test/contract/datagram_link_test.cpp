@@ -325,4 +325,70 @@ BOOST_AUTO_TEST_CASE(flushed_output_is_consumed_even_if_the_socket_is_not_writab
     ::close(ends[1]);
 }
 
+/// Marks what it has sealed with a number, and gives up lines that begin with '-'.
+class numbering_codec final : public cles::transport::datagram_codec {
+  public:
+    void start(carrier& owner) override { owner_ = &owner; }
+    void stop() override { owner_ = nullptr; }
+    void receive(const endpoint& from, std::string_view datagram) override {
+        owner_->on_opened({.at = from, .member = 1}, 7, datagram.substr(datagram.find(':') + 1));
+    }
+    void send(const cles::transport::datagram_origin& to, std::string_view line) override {
+        if (!line.starts_with('-')) {
+            owner_->transmit(to.at, std::to_string(++sealed_) + ":" + std::string{line});
+        }
+    }
+    void check_peer(const cles::transport::datagram_origin&, cles::time_point) override {}
+    void release(const cles::transport::datagram_origin&) override {}
+    [[nodiscard]] std::string name_of(std::uint32_t member) const override { return std::to_string(member); }
+
+  private:
+    carrier* owner_ = nullptr;
+    int sealed_ = 0;
+};
+
+// Nothing is sealed and then sent twice, or lost.
+BOOST_AUTO_TEST_CASE(what_is_sealed_waits_for_a_writable_socket_too) {
+    asio::io_context io;
+    std::array<int, 2> ends{};
+    BOOST_REQUIRE(::socketpair(AF_UNIX, SOCK_DGRAM, 0, ends.data()) == 0);
+    const auto port = std::make_shared<cles::transport::udp_port>(udp::socket{io, udp::v4(), ends[0]},
+                                                                  std::make_unique<numbering_codec>());
+    const auto link = port->connect_link({asio::ip::address_v4::loopback(), 1},
+                                         {.transport = "udp", .address = {}, .name = "1", .uid = {}}, 1);
+    const auto events = std::make_shared<link_recorder>();
+    link->start(events);
+    lines sent;
+    for (int i = 0; i < 1000; ++i) {
+        sent.push_back(std::to_string(i));
+        link->output().append(sent.back()).append("\n");
+        if (i % 7 == 0) {
+            link->output().append("-waits elsewhere\n");
+        }
+        if (i % 50 == 49) {
+            link->flush();
+            BOOST_TEST(link->output().empty());
+        }
+    }
+    BOOST_TEST(link->unsent() > 0U);
+    lines arrived;
+    int number = 0;
+    run_until(io, [&] {
+        std::array<char, 2000> text{};
+        const auto count = ::recv(ends[1], text.data(), text.size(), MSG_DONTWAIT);
+        if (count > 0) {
+            const std::string datagram{text.data(), static_cast<std::size_t>(count)};
+            const auto colon = datagram.find(':');
+            BOOST_TEST(std::stoi(datagram) > number); // a counter is never used again
+            number = std::stoi(datagram);
+            arrived.push_back(datagram.substr(colon + 1));
+        }
+        return arrived.size() == sent.size();
+    });
+    BOOST_TEST((arrived == sent));
+    run_until(io, [&] { return link->unsent() == 0; });
+    link->close();
+    ::close(ends[1]);
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -885,6 +885,52 @@ BOOST_AUTO_TEST_CASE(no_further_session_begins_until_data_has_arrived_in_the_las
     BOOST_TEST(network.count(datagram_kind::hello) == 1U);
 }
 
+// They may be copies of what the other process has received.
+BOOST_AUTO_TEST_CASE(lines_that_wait_while_the_peer_restarts_are_dropped) {
+    car1->held = car2->source();
+    establish();
+    network.drop = [](const auto&) { return true; };
+    network.run(21min); // the session is forgotten, and the epoch is not
+    BOOST_TEST(car1->sessions.sources() == 1U);
+    restart(car2, 0x22222223);
+    network.drop = nullptr;
+    car1->send(*car2, "PUSH car2:target id=7");
+    network.run(100ms);
+    BOOST_TEST(car1->established_log.back().restarted);
+    BOOST_TEST(car1->sessions.waiting() == 0U);
+    BOOST_TEST(car2->lines().empty());
+    car1->send(*car2, "next");
+    network.run(100ms);
+    BOOST_TEST(car2->lines() == strings{"next"}, boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(what_the_sink_no_longer_holds_is_forgotten) {
+    car1->held = car2->source();
+    establish();
+    network.run(21min);
+    BOOST_TEST(car1->sessions.sources() == 1U);
+    BOOST_TEST(!car1->sessions.next_deadline());
+    car1->sessions.release(car2->source());
+    BOOST_TEST(car1->sessions.sources() == 0U);
+    car1->contact(*car2);
+    network.run(100ms);
+    car1->sessions.release(car2->source()); // there is a session
+    BOOST_TEST(car1->sessions.sources() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(whether_there_is_an_earlier_session_is_reported_with_the_end_of_a_handshake) {
+    network.drop = [](const auto&) { return true; };
+    car1->contact(*car2);
+    network.run(2s);
+    BOOST_TEST(car1->lost_log == std::vector<bool>{true}, boost::test_tools::per_element());
+    network.drop = nullptr;
+    establish();
+    network.drop = [](const auto&) { return true; };
+    car1->contact(*car2);
+    network.run(2s);
+    BOOST_TEST(car1->lost_log == (std::vector<bool>{true, false}), boost::test_tools::per_element());
+}
+
 BOOST_AUTO_TEST_CASE(a_restarted_initiator_is_reported_to_the_responder) {
     establish();
     restart(car1, 0x11111112);

@@ -99,6 +99,8 @@ class sealed_node final : public datagram_sink {
     std::vector<established_session> established_log;
     std::vector<opened_line> opened_log;
     std::vector<datagram_source> gave_up_log;
+    std::vector<bool> lost_log;                        ///< whether there was no earlier session
+    std::optional<datagram_source> held;               ///< see `datagram_sink::holds`
     std::function<void(const opened_line&)> on_opened; ///< may be empty
 
   private:
@@ -106,7 +108,11 @@ class sealed_node final : public datagram_sink {
     [[nodiscard]] node_statement statement() override;
     void established(const datagram_source& with, const node_statement& stated, bool restarted) override;
     void opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) override;
-    void gave_up(const datagram_source& with) override { gave_up_log.push_back(with); }
+    void gave_up(const datagram_source& with, bool lost) override {
+        gave_up_log.push_back(with);
+        lost_log.push_back(lost);
+    }
+    [[nodiscard]] bool holds(const datagram_source& which) const override { return held == which; }
 };
 
 /// Delivers datagrams after a delay, loses and repeats some, and runs the nodes' timers.

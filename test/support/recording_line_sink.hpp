@@ -32,6 +32,7 @@ class recording_line_sink : public core::line_sink {
     void finish() override { ++finishes; }
     void close() override { ++closes; }
     void retire() override { ++retires; }
+    void check_peer(time_point since) override { checks.push_back(since); }
 
     /// What a link does before it sends: lets waiting requests be served.
     virtual void turn() {}
@@ -66,6 +67,7 @@ class recording_line_sink : public core::line_sink {
     int finishes = 0;
     int closes = 0;
     int retires = 0;
+    std::vector<time_point> checks; ///< of the peer
     bool paused = false;
     bool behind = false;
     std::size_t datagram_bytes = 0;                ///< 0: a stream

@@ -36,6 +36,11 @@ class link_events {
     virtual void on_lost(boost::system::error_code why) = 0;
     /// The transport has accepted all output, after a `flush` that could not write all at once.
     virtual void on_writable() = 0;
+    /// Over datagrams: the peer has restarted, and has another epoch. It may have received what was sent before, or
+    /// not.
+    virtual void on_restart() {}
+    /// Over datagrams: the peer does not prove its name. \param lost what is sent to it is lost meanwhile
+    virtual void on_unanswered(bool /*lost*/) {}
     /// The former name of `on_writable`, for callers.
     [[deprecated("on_writable")]] void on_room() { on_writable(); }
 };
@@ -85,6 +90,9 @@ class link {
     /// The epoch that the peer has stated when it proved its name: eight hexadecimal digits. Empty if the transport
     /// authenticates no names. Complete when the first line arrives.
     [[nodiscard]] virtual std::string_view epoch() const noexcept { return {}; }
+    /// A request is sent again over datagrams. If nothing was received since its last copy, and the link
+    /// authenticates its peer, it finds out whether that has restarted.
+    virtual void check_peer(time_point /*since*/) {}
 };
 
 using link_ptr = std::shared_ptr<link>;

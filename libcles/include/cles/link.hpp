@@ -22,6 +22,9 @@ class link_transport {
     link_transport& operator=(const link_transport&) = delete;
     virtual ~link_transport() = default;
 
+    /// Whether its links are encrypted, and lead to nodes that have proved their names. Services with security use no
+    /// others between hosts.
+    [[nodiscard]] virtual bool authenticates() const { return false; }
     /// Whether a listener on this URL is reachable from other hosts.
     [[nodiscard]] virtual bool is_exposed(const url& where) const = 0;
     /// \throws boost::system::system_error if the address is not available

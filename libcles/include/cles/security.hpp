@@ -30,9 +30,10 @@ struct security_options {
 /// cles::secured("/etc/cles/keys")}};
 /// ```
 ///
-/// The service's name must be the one of the key. It listens and connects by `tls` and Unix sockets, and refuses plain
-/// TCP and UDP. What it receives from its multicast group must be sealed by a member. Members may do what the roster
-/// and the local rules permit; changes of both take effect without a restart.
+/// The service's name must be the one of the key. It listens and connects by `tls`, by `udp` with sealed datagrams, and
+/// by Unix sockets, and refuses plain TCP. A `udp` address is for a node that is named, as in `service_options::peers`;
+/// an address alone needs `tls`. What it receives from its multicast group must be sealed by a member. Members may do
+/// what the roster and the local rules permit; changes of both take effect without a restart.
 ///
 /// \throws cles::error with `denied` if the files cannot be used; the message names the file and what mends it
 std::shared_ptr<detail::security_part> secured(security_options options);

@@ -5,6 +5,7 @@
 #include "api/security_part.hpp"
 #include "asio/asio_environment.hpp"
 #include "security/secured_node.hpp"
+#include "tls/sealed_udp.hpp"
 #include "tls/tls_transport.hpp"
 #include "transport/transports.hpp"
 
@@ -38,6 +39,7 @@ class service_security final : public detail::security_part {
                                                     node->log_refused_link(why);
                                                 }
                                             }}));
+        environment.add_transport("udp", tls::make_sealed_udp(node_->members(), node_->datagrams()));
         environment.add_transport("unix", transport::make_unix(local_users_));
         return node_;
     }

@@ -122,6 +122,11 @@ link_transport* asio_environment::find(std::string_view scheme) const {
 
 bool asio_environment::has_transport(std::string_view scheme) const { return find(scheme) != nullptr; }
 
+bool asio_environment::is_trusted(const url& where) const {
+    const auto* by = find(where.scheme);
+    return where.scheme == "inproc" || where.scheme == "unix" || (by != nullptr && by->authenticates());
+}
+
 bool asio_environment::is_exposed(const url& where) const {
     const auto* by = find(where.scheme);
     return by != nullptr && by->is_exposed(where);

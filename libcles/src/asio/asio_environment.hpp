@@ -59,6 +59,7 @@ class asio_environment final : public core::environment {
     void stop_timer() override;
 
     [[nodiscard]] bool has_transport(std::string_view scheme) const override;
+    [[nodiscard]] bool is_trusted(const url& where) const override;
     [[nodiscard]] bool is_exposed(const url& where) const override;
     std::unique_ptr<acceptor> listen(const url& where, const limits& bounds) override;
     std::function<void()> dial(const url& where, std::string_view name, const limits& bounds,

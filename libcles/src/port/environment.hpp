@@ -61,6 +61,8 @@ class environment : public clock {
 
     /// Whether there is a transport for URLs of this scheme.
     [[nodiscard]] virtual bool has_transport(std::string_view scheme) const = 0;
+    /// Whether a secured node may use that scheme: its links are authenticated, or do not leave this host.
+    [[nodiscard]] virtual bool is_trusted(const url&) const { return false; }
     /// Whether an endpoint there can be reached from other hosts.
     [[nodiscard]] virtual bool is_exposed(const url& where) const = 0;
     /// \throws boost::system::system_error if the address is not available

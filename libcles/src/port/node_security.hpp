@@ -74,6 +74,9 @@ class node_security {
     /// A port that seals what it sends with that one, and delivers what it can open, with its sender.
     [[nodiscard]] virtual std::shared_ptr<group_port> seal(std::shared_ptr<group_port> port) = 0;
 
+    /// Datagrams that were dropped because they were not sealed.
+    [[nodiscard]] virtual std::uint64_t unsealed_datagrams() const { return 0; }
+
     /// The version of the roster in force.
     [[nodiscard]] virtual std::uint32_t roster_version() const = 0;
     /// Its line, without LF.

@@ -73,6 +73,9 @@ void datagram_sessions::receive_welcome(const datagram_path& from, const datagra
     const auto introduced = p.introduce(std::make_unique<datagram_session>(agreed, std::move(keys)));
     p.received = now;
     p.retry.start(now);
+    if (introduced == introduction::restarted) {
+        drop_waiting(p);
+    }
     if (!send_waiting(p, now)) {
         send_in(p, *p.newest(), {}, now); // so that the peer may use the session
     }
@@ -105,6 +108,9 @@ void datagram_sessions::receive_data(const datagram_path& from, const datagram_h
                 return;
             }
             end_attempt(*p); // it would result in the same
+            if (introduced == introduction::restarted) {
+                drop_waiting(*p);
+            }
         }
         if (p->unconfirmed() == nullptr && p->trying == nullptr) {
             p->retry.stop();
@@ -302,6 +308,12 @@ bool datagram_sessions::make_space(std::uint32_t member) {
     return true;
 }
 
+void datagram_sessions::release(const datagram_source& which) {
+    if (auto* const p = find(which); p != nullptr && p->is_idle()) {
+        erase(*p);
+    }
+}
+
 void datagram_sessions::erase(peer& p) {
     end_attempt(p);
     drop_waiting(p);
@@ -360,7 +372,9 @@ void datagram_sessions::arm(peer& p) {
     if (due != p.due) {
         timers_.erase({p.due, p.number()});
         p.due = due;
-        timers_.emplace(std::pair{due, p.number()}, &p);
+        if (due != time_point::max()) {
+            timers_.emplace(std::pair{due, p.number()}, &p);
+        }
     }
 }
 
@@ -400,13 +414,17 @@ void datagram_sessions::serve(peer& p, time_point now) {
         }
     }
     const auto source = p.source();
-    if (p.is_idle()) {
+    const bool lost = p.newest() == nullptr;
+    if (gave_up && lost) {
+        drop_waiting(p);
+    }
+    if (p.is_idle() && !sink_.holds(source)) {
         erase(p);
     } else {
         arm(p);
     }
     if (gave_up) {
-        sink_.gave_up(source);
+        sink_.gave_up(source, lost);
     }
 }
 

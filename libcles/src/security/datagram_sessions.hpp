@@ -51,7 +51,11 @@ class datagram_sink {
     /// A line has arrived, once. Its session has been reported, with the same epoch.
     virtual void opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) = 0;
     /// A handshake was not answered, and lines that waited for it are dropped: try `tls`, which also exchanges rosters.
-    virtual void gave_up(const datagram_source& with) = 0;
+    /// \param lost there is no earlier session either
+    virtual void gave_up(const datagram_source& with, bool lost) = 0;
+    /// Whether to remember the epoch of a source without a session, so that a restart is reported: requests may have
+    /// been sent to it, and may be sent again. What is asked for is to be released.
+    [[nodiscard]] virtual bool holds(const datagram_source&) const { return false; }
 
   protected:
     ~datagram_sink() = default;
@@ -74,14 +78,18 @@ class datagram_sessions {
 
     /// Takes a datagram that is HELLO, WELCOME or DATA; ignores others.
     void receive(const datagram_path& from, bytes_view datagram, time_point now);
-    /// Sends a line in the newest session with the peer. If there is none, the line waits for one, which begins.
-    /// \return false: the line is dropped, because it is too long, too much is waiting, or there is no such member
+    /// Sends a line in the newest session with the peer. If there is none, the line waits for one, which begins. If the
+    /// peer turns out to have restarted, lines that wait are dropped: they may be copies of what it has received
+    /// before. \return false: the line is dropped, because it is too long, too much is waiting, or there is no such
+    /// member
     bool send(const datagram_source& to, std::string_view line, time_point now);
     /// Begins a new session, also if there is one, unless one is beginning. \return false: there is no such member
     bool contact(const datagram_source& with, time_point now);
     /// For a request that is sent again: if nothing has arrived from the peer since, begins a new session, because the
-    /// peer may have restarted. \param since when the request was first sent
+    /// peer may have restarted. \param since when the request was sent last
     void check_peer(const datagram_source& with, time_point since, time_point now);
+    /// The sink no longer holds a source.
+    void release(const datagram_source& which);
     /// Ends all sessions with a member.
     void forget(std::uint32_t member);
 

@@ -14,7 +14,10 @@ void sealed_datagrams::begin(std::uint32_t epoch, const core::clock& time, obser
     observer_ = std::move(by);
 }
 
-void sealed_datagrams::end() { observer_ = {}; }
+void sealed_datagrams::end() {
+    observer_ = {};
+    time_ = nullptr;
+}
 
 std::uint32_t sealed_datagrams::add(datagram_socket& socket) {
     sockets_.emplace(++last_number_, &socket);
@@ -35,6 +38,9 @@ void sealed_datagrams::report_due() {
 }
 
 void sealed_datagrams::receive(const datagram_path& from, bytes_view datagram) {
+    if (time_ == nullptr) {
+        return;
+    }
     try {
         sessions_.receive(from, datagram, now());
     } catch (...) { // of what a line has set off
@@ -45,23 +51,34 @@ void sealed_datagrams::receive(const datagram_path& from, bytes_view datagram) {
 }
 
 bool sealed_datagrams::send(const datagram_source& to, std::string_view line) {
+    if (time_ == nullptr) {
+        return false;
+    }
     const bool taken = sessions_.send(to, line, now());
     report_due();
     return taken;
 }
 
 bool sealed_datagrams::contact(const datagram_source& with) {
+    if (time_ == nullptr) {
+        return false;
+    }
     const bool known = sessions_.contact(with, now());
     report_due();
     return known;
 }
 
 void sealed_datagrams::check_peer(const datagram_source& with, time_point since) {
-    sessions_.check_peer(with, since, now());
-    report_due();
+    if (time_ != nullptr) {
+        sessions_.check_peer(with, since, now());
+        report_due();
+    }
 }
 
 group_receiver::result sealed_datagrams::open_group(const datagram_path& from, bytes_view datagram) {
+    if (time_ == nullptr) {
+        return {};
+    }
     auto found = receiver_.open(from, datagram, now());
     if (found.contact) {
         contact(*found.contact);
@@ -89,13 +106,13 @@ node_statement sealed_datagrams::statement() {
             .counter = sender_.next_counter()};
 }
 
-void sealed_datagrams::established(const datagram_source& with, const node_statement& stated, bool restarted) {
+void sealed_datagrams::established(const datagram_source& with, const node_statement& stated, bool) {
     receiver_.learn(with.member, stated);
     if (observer_.stated) {
         observer_.stated(with.member, stated.roster);
     }
     if (auto* const at = find(with.path.local)) {
-        at->on_established(with, restarted);
+        at->on_established(with, stated.epoch);
     }
 }
 
@@ -105,10 +122,15 @@ void sealed_datagrams::opened(const datagram_source& from, std::uint32_t epoch, 
     }
 }
 
-void sealed_datagrams::gave_up(const datagram_source& with) {
+void sealed_datagrams::gave_up(const datagram_source& with, bool lost) {
     if (auto* const at = find(with.path.local)) {
-        at->on_gave_up(with);
+        at->on_gave_up(with, lost);
     }
+}
+
+bool sealed_datagrams::holds(const datagram_source& which) const {
+    const auto* const at = find(which.path.local);
+    return at != nullptr && at->holds(which);
 }
 
 } // namespace cles::security

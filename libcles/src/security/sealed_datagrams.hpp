@@ -24,8 +24,9 @@ class datagram_socket {
 
     virtual void send_sealed(const datagram_path& to, bytes_view datagram) = 0;
     virtual void on_opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) = 0;
-    virtual void on_established(const datagram_source& with, bool restarted) = 0;
-    virtual void on_gave_up(const datagram_source& with) = 0;
+    virtual void on_established(const datagram_source& with, std::uint32_t epoch) = 0;
+    virtual void on_gave_up(const datagram_source& with, bool lost) = 0;
+    [[nodiscard]] virtual bool holds(const datagram_source&) const { return false; }
 
   protected:
     ~datagram_socket() = default;
@@ -42,7 +43,7 @@ class sealed_datagrams final : private datagram_sink {
     };
     /// Called once, before all others.
     void begin(std::uint32_t epoch, const core::clock& time, observer by);
-    /// Nothing is reported any more.
+    /// Nothing is sent, received or reported any more.
     void end();
 
     /// A number for `datagram_path::local`. The socket must live until it is removed.
@@ -55,6 +56,11 @@ class sealed_datagrams final : private datagram_sink {
     bool send(const datagram_source& to, std::string_view line);
     bool contact(const datagram_source& with);
     void check_peer(const datagram_source& with, time_point since);
+    void release(const datagram_source& which) { sessions_.release(which); }
+
+    /// A datagram that was not sealed has been dropped.
+    void count_unsealed() noexcept { ++unsealed_; }
+    [[nodiscard]] std::uint64_t unsealed() const noexcept { return unsealed_; }
 
     /// See `group_receiver`. If there is somebody to contact, that is done.
     group_receiver::result open_group(const datagram_path& from, bytes_view datagram);
@@ -73,7 +79,8 @@ class sealed_datagrams final : private datagram_sink {
     [[nodiscard]] node_statement statement() override;
     void established(const datagram_source& with, const node_statement& stated, bool restarted) override;
     void opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) override;
-    void gave_up(const datagram_source& with) override;
+    void gave_up(const datagram_source& with, bool lost) override;
+    [[nodiscard]] bool holds(const datagram_source& which) const override;
 
     [[nodiscard]] datagram_socket* find(std::uint32_t number) const;
     [[nodiscard]] time_point now() const { return time_->now(); }
@@ -88,6 +95,7 @@ class sealed_datagrams final : private datagram_sink {
     observer observer_;
     std::map<std::uint32_t, datagram_socket*> sockets_;
     std::uint32_t last_number_ = 0;
+    std::uint64_t unsealed_ = 0;
 };
 
 } // namespace cles::security

@@ -124,7 +124,11 @@ void sealed_group_port::on_writable() {
 // -- receiving -----------------------------------------------------------------------------------------------------
 
 void sealed_group_port::on_datagram(const core::group_datagram& datagram) {
-    if (owner_ == nullptr || !is_sealed(as_bytes(datagram.text))) {
+    if (owner_ == nullptr) {
+        return;
+    }
+    if (!is_sealed(as_bytes(datagram.text))) {
+        all_->count_unsealed();
         return;
     }
     if (datagram.to_group) {
@@ -180,7 +184,7 @@ void sealed_group_port::note_unknown(std::uint32_t member, std::string_view line
 
 // It is asked to announce itself: what it has announced under this salt so far was dropped. So was what this node has
 // asked the group since its start, if the peer did not know its salt either.
-void sealed_group_port::on_established(const datagram_source& with, bool) {
+void sealed_group_port::on_established(const datagram_source& with, std::uint32_t) {
     const auto* const peer = all_->members().in_force().find(with.member);
     const bool was_unknown = unknown_.erase(with.member) != 0;
     if ((was_unknown || !received_.contains(with.member)) && peer != nullptr) {
@@ -188,7 +192,7 @@ void sealed_group_port::on_established(const datagram_source& with, bool) {
     }
 }
 
-void sealed_group_port::on_gave_up(const datagram_source& with) {
+void sealed_group_port::on_gave_up(const datagram_source& with, bool) {
     if (const auto gone = unknown_.extract(with.member); !gone.empty() && report_) {
         report_(with.member, gone.mapped());
     }

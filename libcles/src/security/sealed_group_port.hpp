@@ -43,8 +43,8 @@ class sealed_group_port final : public core::group_port, private core::group_lis
     // datagram_socket
     void send_sealed(const datagram_path& to, bytes_view datagram) override;
     void on_opened(const datagram_source&, std::uint32_t, std::string_view) override {} // nothing else is sent here
-    void on_established(const datagram_source& with, bool restarted) override;
-    void on_gave_up(const datagram_source& with) override;
+    void on_established(const datagram_source& with, std::uint32_t epoch) override;
+    void on_gave_up(const datagram_source& with, bool lost) override;
 
     [[nodiscard]] datagram_path path_of(const core::group_source& from) const noexcept {
         return datagram_path::v4(from.address, from.port, number_);

@@ -22,6 +22,8 @@ std::string message_of(tls_errc code) {
     case tls_errc::bad_admission: return "the other end sent another line before its welcome";
     case tls_errc::busy: return "too many links are being admitted";
     case tls_errc::removed: return "a member was removed from the roster";
+    case tls_errc::needs_name: return "datagrams are sealed for a node whose name is known: give the name, or use tls";
+    case tls_errc::unknown_name: return "no member of the fleet has the name of that node";
     }
     return "TLS failed";
 }
@@ -44,6 +46,8 @@ class category final : public boost::system::error_category {
         case tls_errc::other_name:
         case tls_errc::refused_by_peer:
         case tls_errc::removed:
+        case tls_errc::needs_name:
+        case tls_errc::unknown_name:
             return boost::system::errc::make_error_condition(boost::system::errc::permission_denied);
         case tls_errc::busy:
             return boost::system::errc::make_error_condition(boost::system::errc::device_or_resource_busy);

@@ -7,7 +7,7 @@
 
 namespace cles::tls {
 
-/// Why a link with TLS was not opened, or ended.
+/// Why a link with TLS, or by sealed datagrams, was not opened, or ended.
 enum class tls_errc {
     failed = 1,      ///< unspecified; most failures have OpenSSL's code instead
     other_protocol,  ///< the other end does not speak `cles/1`
@@ -18,6 +18,8 @@ enum class tls_errc {
     bad_admission,   ///< it sent something else before its welcome
     busy,            ///< too many links are being admitted
     removed,         ///< a member was removed from the roster
+    needs_name,      ///< datagrams are sealed for a member, and none was named
+    unknown_name,    ///< no member has that name
 };
 
 /// The category of these codes and of OpenSSL's; its name is "cles.tls". What the roster forbids equals

@@ -24,6 +24,7 @@ class tls_transport final : public link_transport {
         terms_->epoch = std::move(options.epoch);
     }
 
+    [[nodiscard]] bool authenticates() const override { return true; }
     [[nodiscard]] bool is_exposed(const url& where) const override { return transport::is_beyond_loopback(where); }
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,

@@ -7,8 +7,8 @@
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/v6_only.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/container_hash/hash.hpp>
 
+#include <array>
 #include <utility>
 
 namespace cles::transport {
@@ -22,18 +22,13 @@ bool is_empty(std::string_view datagram) { return datagram.empty() || datagram =
 
 } // namespace
 
-std::size_t udp_port::endpoint_hash::operator()(const udp::endpoint& e) const noexcept {
-    std::size_t seed = e.port();
-    if (e.address().is_v4()) {
-        boost::hash_combine(seed, e.address().to_v4().to_uint());
-    } else {
-        const auto bytes = e.address().to_v6().to_bytes();
-        boost::hash_combine(seed, std::string_view{reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+udp_port::udp_port(udp::socket socket, std::unique_ptr<datagram_codec> codec)
+    : socket_(std::move(socket)), codec_(std::move(codec)) {
+    receive_batch::prepare(socket_);
+    if (codec_) {
+        codec_->start(*this);
     }
-    return seed;
 }
-
-udp_port::udp_port(udp::socket socket) : socket_(std::move(socket)) { receive_batch::prepare(socket_); }
 
 url udp_port::local() const {
     error_code ignored;
@@ -45,10 +40,10 @@ void udp_port::start(std::function<void(link_ptr)> on_link) {
     receive();
 }
 
-link_ptr udp_port::connect_link(const udp::endpoint& peer, identity who) {
+link_ptr udp_port::connect_link(const udp::endpoint& peer, identity who, std::uint32_t member) {
     connected_ = true;
-    auto made = std::make_shared<udp_link>(shared_from_this(), peer, std::move(who));
-    links_.emplace(peer, made.get());
+    auto made = std::make_shared<udp_link>(shared_from_this(), datagram_origin{peer, member}, std::move(who));
+    links_.emplace(made->origin(), made.get());
     return made;
 }
 
@@ -59,18 +54,24 @@ void udp_port::close() {
 
 void udp_port::close_if_done() {
     if (links_.empty() && !on_link_) {
+        if (codec_) {
+            codec_->stop();
+        }
         error_code ignored;
         socket_.close(ignored);
     }
 }
 
 void udp_port::forget(const udp_link& link) {
-    const auto found = links_.find(link.endpoint());
+    const auto found = links_.find(link.origin());
     if (found != links_.end() && found->second == &link) {
         if (recent_ == &link) {
             recent_ = nullptr;
         }
         links_.erase(found);
+        if (codec_) {
+            codec_->release(link.origin());
+        }
         close_if_done();
     }
 }
@@ -112,37 +113,158 @@ void udp_port::hand_over() {
 }
 
 void udp_port::hand_over(const receive_batch::datagram& one) {
+    if (codec_) {
+        codec_->receive(one.from, one.text);
+        return;
+    }
     if (is_empty(one.text)) {
         return;
     }
-    if (const auto link = link_of(one.from)) {
-        link->deliver(one.text);
+    if (auto* const link = find(one.from, 0)) {
+        link->shared_from_this()->deliver(one.text);
+    } else if (const auto made = accept(one.from, 0, 0)) {
+        made->deliver(one.text);
     }
 }
 
-std::shared_ptr<udp_link> udp_port::link_of(const udp::endpoint& sender) {
-    if (recent_ != nullptr && recent_->endpoint() == sender) {
-        return recent_->shared_from_this();
+udp_link* udp_port::find(const udp::endpoint& sender, std::uint32_t member) {
+    if (recent_ != nullptr && recent_->origin().at == sender && recent_->origin().member == member) {
+        return recent_;
     }
-    if (const auto found = links_.find(sender); found != links_.end()) {
-        recent_ = found->second;
-        return recent_->shared_from_this();
+    const auto found = links_.find(datagram_origin{sender, member});
+    if (found == links_.end()) {
+        return nullptr;
     }
+    return recent_ = found->second;
+}
+
+std::shared_ptr<udp_link> udp_port::accept(const udp::endpoint& sender, std::uint32_t member, std::uint32_t epoch) {
     if (!on_link_) {
         return nullptr;
     }
-    auto made = std::make_shared<udp_link>(shared_from_this(), sender, identity_at("udp", sender));
-    links_.emplace(sender, made.get());
+    auto who = identity_at("udp", sender);
+    if (codec_) {
+        who.name = codec_->name_of(member);
+    }
+    auto made = std::make_shared<udp_link>(shared_from_this(), datagram_origin{sender, member}, std::move(who));
+    if (codec_) {
+        made->note_epoch(epoch);
+    }
+    links_.emplace(made->origin(), made.get());
     recent_ = made.get();
     const auto tell = on_link_; // copied: it may be cleared meanwhile
     tell(made);
     return made;
 }
 
+// -- with a codec --------------------------------------------------------------------------------------------------
+
+void udp_port::on_opened(const datagram_origin& from, std::uint32_t epoch, std::string_view line) {
+    const auto keep = shared_from_this();
+    if (auto* const link = find(from.at, from.member)) {
+        const auto held = link->shared_from_this();
+        held->note_epoch(epoch);
+        held->deliver(line);
+    } else if (const auto made = accept(from.at, from.member, epoch)) {
+        made->deliver(line);
+    }
+}
+
+// What this socket has accepted ends: the next line makes a link to the new process. A link that was dialled goes on,
+// since its requests are to reach whoever is there.
+void udp_port::on_established(const datagram_origin& with, std::uint32_t epoch) {
+    const auto keep = shared_from_this();
+    if (auto* const link = find(with.at, with.member)) {
+        const auto held = link->shared_from_this();
+        if (held->note_epoch(epoch)) {
+            if (connected_) {
+                held->on_restart();
+            } else {
+                held->lose(asio::error::connection_reset);
+            }
+        }
+    }
+}
+
+void udp_port::on_unanswered(const datagram_origin& with, bool lost) {
+    const auto keep = shared_from_this();
+    if (auto* const link = find(with.at, with.member)) {
+        link->shared_from_this()->on_unanswered(lost);
+    }
+}
+
+// Later: the line that brought the roster may have come by one of these links.
+void udp_port::on_removed(std::uint32_t member) {
+    for (const auto& [origin, link] : links_) {
+        if (origin.member == member) {
+            asio::post(socket_.get_executor(), [weak = link->weak_from_this()] {
+                if (const auto ended = weak.lock()) {
+                    ended->lose(asio::error::no_permission);
+                }
+            });
+        }
+    }
+}
+
+void udp_port::transmit(const udp::endpoint& to, std::string_view datagram) {
+    const auto size = static_cast<std::uint16_t>(datagram.size());
+    if (sealing_) {
+        sealed_.append(datagram);
+        sizes_.push_back(size);
+    } else {
+        burst_.send_all({datagram, {&size, 1}}, address_of(to));
+    }
+}
+
+void udp_port::check_peer(const udp_link& link, time_point since) {
+    if (codec_) {
+        codec_->check_peer(link.origin(), since);
+    }
+}
+
+// If the socket has no space for all of them, the rest is sealed again later: that is simpler than to keep both forms.
+core::datagrams_done udp_port::send_sealed(const udp_link& to, std::string_view lines) {
+    constexpr std::size_t at_once = 32;
+    struct position {
+        std::size_t bytes;     // of the lines
+        std::size_t datagrams; // that they became: none for one that waits for a session
+    };
+    std::array<position, at_once> after; // NOLINT(cppcoreguidelines-pro-type-member-init): only entries in use are set
+    core::datagrams_done done;
+    for (core::datagram_list rest{lines}; !rest.empty();) {
+        std::size_t count = 0;
+        sealed_.clear();
+        sizes_.clear();
+        sealing_ = true;
+        for (std::size_t bytes = 0; count < at_once && !rest.empty(); ++count) {
+            auto line = rest.first();
+            rest.drop_first();
+            bytes += line.size();
+            line.remove_suffix(1);
+            codec_->send(to.origin(), line);
+            after[count] = {.bytes = bytes, .datagrams = sizes_.size()};
+        }
+        sealing_ = false;
+        const auto sent = burst_.send_all({sealed_, sizes_}, address_of(to.origin().at)).count;
+        std::size_t passed = 0;
+        while (passed < count && after[passed].datagrams <= sent) {
+            ++passed;
+        }
+        if (passed != 0) {
+            done.count += passed;
+            done.bytes += after[passed - 1].bytes;
+        }
+        if (passed < count) {
+            break;
+        }
+    }
+    return done;
+}
+
 // -- sending -------------------------------------------------------------------------------------------------------
 
 core::datagrams_done udp_port::send(const udp_link& to, std::string_view lines) {
-    return burst_.send_all(lines, connected_ ? nullptr : &to.endpoint());
+    return codec_ ? send_sealed(to, lines) : burst_.send_all(lines, address_of(to.origin().at));
 }
 
 void udp_port::wait_until_writable(std::weak_ptr<udp_link> link) {
@@ -153,7 +275,7 @@ void udp_port::wait_until_writable(std::weak_ptr<udp_link> link) {
     });
 }
 
-udp_link::udp_link(std::shared_ptr<udp_port> socket, asio::ip::udp::endpoint peer, identity who)
+udp_link::udp_link(std::shared_ptr<udp_port> socket, datagram_origin peer, identity who)
     : port_(std::move(socket)), peer_(std::move(peer)), who_(std::move(who)) {}
 
 udp_link::~udp_link() { udp_link::close(); }
@@ -280,6 +402,42 @@ void udp_link::shrink() {
     }
 }
 
+void udp_link::lose(error_code why) {
+    const auto owner = owner_;
+    if (port_ != nullptr) {
+        close();
+        if (owner) {
+            owner->on_lost(why);
+        }
+    }
+}
+
+bool udp_link::note_epoch(std::uint32_t epoch) {
+    if (epoch_number_ == epoch) {
+        return false;
+    }
+    epoch_ = protocol::epoch_text(epoch);
+    return std::exchange(epoch_number_, epoch).has_value();
+}
+
+void udp_link::on_restart() {
+    if (const auto owner = owner_) {
+        owner->on_restart();
+    }
+}
+
+void udp_link::on_unanswered(bool lost) {
+    if (const auto owner = owner_) {
+        owner->on_unanswered(lost);
+    }
+}
+
+void udp_link::check_peer(time_point since) {
+    if (port_ != nullptr) {
+        port_->check_peer(*this, since);
+    }
+}
+
 void udp_link::close() {
     if (const auto port = std::exchange(port_, nullptr)) {
         owner_.reset();
@@ -291,61 +449,79 @@ void udp_link::close() {
 
 namespace {
 
+link_ptr connect(const asio::any_io_executor& executor, const url& where, const udp::endpoint& endpoint,
+                 const sealed_peer_maker& peer, error_code& code) {
+    sealed_peer who;
+    if (peer) {
+        who = peer(code);
+    }
+    udp::socket socket{executor};
+    if (!code) {
+        socket.open(endpoint.protocol(), code);
+    }
+    if (!code) {
+        set_traffic_class(socket.native_handle(), where, code);
+    }
+    if (!code) {
+        socket.connect(endpoint, code);
+    }
+    if (code) {
+        return nullptr;
+    }
+    auto described = identity_at("udp", endpoint);
+    described.name = std::move(who.name);
+    return std::make_shared<udp_port>(std::move(socket), std::move(who.codec))
+        ->connect_link(endpoint, std::move(described), who.member);
+}
+
 class udp_transport final : public link_transport {
   public:
     [[nodiscard]] bool is_exposed(const url& where) const override { return is_beyond_loopback(where); }
 
     std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where, const limits&) override {
-        const udp::endpoint endpoint{resolve(where), where.port};
-        udp::socket socket{executor};
-        socket.open(endpoint.protocol());
-        if (endpoint.address().is_v6()) {
-            socket.set_option(asio::ip::v6_only{true});
-        }
-        socket.bind(endpoint);
-        error_code code;
-        set_traffic_class(socket.native_handle(), where, code);
-        if (code) {
-            throw boost::system::system_error{code};
-        }
-        return handle_of(std::make_shared<udp_port>(std::move(socket)));
+        return listen_udp(executor, where);
     }
 
-    // Sends nothing: whether the peer exists shows when requests are answered.
     std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
                                dial_callback done) override {
-        const auto lookup = std::make_shared<host_lookup>(executor);
-        lookup->start(
-            where, bounds.connect,
-            [executor, where, done = std::move(done)](error_code code, const std::vector<asio::ip::address>& found) {
-                link_ptr made;
-                if (!code) {
-                    made = connect(executor, where, {found.front(), where.port}, code);
-                }
-                done(code, made);
-            });
-        return [lookup] { lookup->give_up(); };
-    }
-
-  private:
-    static link_ptr connect(const asio::any_io_executor& executor, const url& where, const udp::endpoint& endpoint,
-                            error_code& code) {
-        udp::socket socket{executor};
-        socket.open(endpoint.protocol(), code);
-        if (!code) {
-            set_traffic_class(socket.native_handle(), where, code);
-        }
-        if (!code) {
-            socket.connect(endpoint, code);
-        }
-        if (code) {
-            return nullptr;
-        }
-        return std::make_shared<udp_port>(std::move(socket))->connect_link(endpoint, identity_at("udp", endpoint));
+        return dial_udp(executor, where, bounds, std::move(done));
     }
 };
 
 } // namespace
+
+std::unique_ptr<acceptor> listen_udp(const asio::any_io_executor& executor, const url& where,
+                                     std::unique_ptr<datagram_codec> codec) {
+    const udp::endpoint endpoint{resolve(where), where.port};
+    udp::socket socket{executor};
+    socket.open(endpoint.protocol());
+    if (endpoint.address().is_v6()) {
+        socket.set_option(asio::ip::v6_only{true});
+    }
+    socket.bind(endpoint);
+    error_code code;
+    set_traffic_class(socket.native_handle(), where, code);
+    if (code) {
+        throw boost::system::system_error{code};
+    }
+    return handle_of(std::make_shared<udp_port>(std::move(socket), std::move(codec)));
+}
+
+// Sends nothing: whether the peer exists shows when requests are answered.
+std::function<void()> dial_udp(const asio::any_io_executor& executor, const url& where, const limits& bounds,
+                               dial_callback done, sealed_peer_maker peer) {
+    const auto lookup = std::make_shared<host_lookup>(executor);
+    lookup->start(where, bounds.connect,
+                  [executor, where, done = std::move(done),
+                   peer = std::move(peer)](error_code code, const std::vector<asio::ip::address>& found) {
+                      link_ptr made;
+                      if (!code) {
+                          made = connect(executor, where, {found.front(), where.port}, peer, code);
+                      }
+                      done(code, made);
+                  });
+    return [lookup] { lookup->give_up(); };
+}
 
 std::unique_ptr<link_transport> make_udp() { return std::make_unique<udp_transport>(); }
 

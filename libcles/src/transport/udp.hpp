@@ -4,6 +4,7 @@
 #include <cles/link.hpp>
 
 #include "protocol/request_line.hpp"
+#include "transport/datagram_codec.hpp"
 #include "transport/datagram_io.hpp"
 
 #include <boost/asio/ip/udp.hpp>
@@ -13,6 +14,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,7 +26,7 @@ class udp_port;
 /// A link over datagrams: one peer of a socket, which it may share with other links. Each line is a datagram.
 class udp_link final : public link, public std::enable_shared_from_this<udp_link> {
   public:
-    udp_link(std::shared_ptr<udp_port> socket, boost::asio::ip::udp::endpoint peer, identity who);
+    udp_link(std::shared_ptr<udp_port> socket, datagram_origin peer, identity who);
     udp_link(const udp_link&) = delete;
     udp_link& operator=(const udp_link&) = delete;
     ~udp_link() override;
@@ -45,9 +47,18 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     [[nodiscard]] std::size_t buffered() const noexcept override { return output_.capacity() + sending_.capacity(); }
     void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return who_; }
+    [[nodiscard]] std::string_view epoch() const noexcept override { return epoch_; }
+    void check_peer(time_point since) override;
 
     // For the port.
-    [[nodiscard]] const boost::asio::ip::udp::endpoint& endpoint() const noexcept { return peer_; }
+    [[nodiscard]] const datagram_origin& origin() const noexcept { return peer_; }
+    /// Notes the epoch that the peer has stated. Returns whether it had stated another one.
+    bool note_epoch(std::uint32_t epoch);
+    /// The peer has restarted, and this is the only link of the socket.
+    void on_restart();
+    void on_unanswered(bool lost);
+    /// Ends, and informs the owner.
+    void lose(boost::system::error_code why);
     /// Delivers what arrived in a datagram.
     void deliver(std::string_view datagram);
     /// The socket is writable again.
@@ -58,8 +69,10 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     void send_rest();
 
     std::shared_ptr<udp_port> port_; // null: closed
-    boost::asio::ip::udp::endpoint peer_;
+    datagram_origin peer_;
     identity who_;
+    std::optional<std::uint32_t> epoch_number_;
+    std::string epoch_;
     std::shared_ptr<link_events> owner_;
     std::vector<std::string> early_; // received before `start`
     std::string output_;
@@ -75,16 +88,18 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
 ///
 /// It lives until it is closed and its last link is closed: the links own it, and their owners own them. Each wake-up
 /// delivers up to a number of datagrams; then other tasks run. In steady state it allocates nothing.
-class udp_port final : public acceptor, public std::enable_shared_from_this<udp_port> {
+///
+/// With a codec, it sends and receives only what that has sealed, and a source is also one member.
+class udp_port final : public acceptor, public std::enable_shared_from_this<udp_port>, private datagram_codec::carrier {
   public:
     using udp = boost::asio::ip::udp;
 
-    explicit udp_port(udp::socket socket);
+    explicit udp_port(udp::socket socket, std::unique_ptr<datagram_codec> codec = nullptr);
 
     /// Listens: from now on, each new source becomes a link.
     void start(std::function<void(link_ptr)> on_link) override;
     /// The only link of a connected socket.
-    link_ptr connect_link(const udp::endpoint& peer, identity who);
+    link_ptr connect_link(const udp::endpoint& peer, identity who, std::uint32_t member = 0);
     /// Accepts no new sources.
     void close() override;
     [[nodiscard]] url local() const override;
@@ -96,26 +111,46 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     core::datagrams_done send(const udp_link& to, std::string_view lines);
     void wait_until_writable(std::weak_ptr<udp_link> link);
     void forget(const udp_link& link);
+    void check_peer(const udp_link& link, time_point since);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
 
   private:
-    struct endpoint_hash {
-        std::size_t operator()(const udp::endpoint& e) const noexcept;
-    };
-
     void hand_over();
     void hand_over(const receive_batch::datagram& one);
-    std::shared_ptr<udp_link> link_of(const udp::endpoint& sender);
+    [[nodiscard]] udp_link* find(const udp::endpoint& sender, std::uint32_t member);
+    std::shared_ptr<udp_link> accept(const udp::endpoint& sender, std::uint32_t member, std::uint32_t epoch);
+    core::datagrams_done send_sealed(const udp_link& to, std::string_view lines);
+    [[nodiscard]] const udp::endpoint* address_of(const udp::endpoint& to) const noexcept {
+        return connected_ ? nullptr : &to;
+    }
     void close_if_done();
+
+    // datagram_codec::carrier
+    void transmit(const udp::endpoint& to, std::string_view datagram) override;
+    void on_opened(const datagram_origin& from, std::uint32_t epoch, std::string_view line) override;
+    void on_established(const datagram_origin& with, std::uint32_t epoch) override;
+    void on_unanswered(const datagram_origin& with, bool lost) override;
+    void on_removed(std::uint32_t member) override;
+    [[nodiscard]] bool holds(const datagram_origin& which) const override { return links_.contains(which); }
 
     udp::socket socket_;
     send_batch burst_{socket_};
     bool connected_ = false;
     bool receiving_ = false;
     std::function<void(link_ptr)> on_link_;
-    boost::unordered_flat_map<udp::endpoint, udp_link*, endpoint_hash> links_; // links remove themselves
+    boost::unordered_flat_map<datagram_origin, udp_link*, datagram_origin::hash> links_; // links remove themselves
     udp_link* recent_ = nullptr; // usually the source of the previous datagram
     receive_batch arrived_;
+    std::unique_ptr<datagram_codec> codec_; // null: lines are sent as they are
+    std::string sealed_;                    // what is being sent
+    std::vector<std::uint16_t> sizes_;      // of the datagrams in it
+    bool sealing_ = false;
 };
+
+/// As `link_transport::listen` and `dial`.
+std::unique_ptr<acceptor> listen_udp(const boost::asio::any_io_executor& executor, const url& where,
+                                     std::unique_ptr<datagram_codec> codec = nullptr);
+std::function<void()> dial_udp(const boost::asio::any_io_executor& executor, const url& where, const limits& bounds,
+                               dial_callback done, sealed_peer_maker peer = {});
 
 } // namespace cles::transport

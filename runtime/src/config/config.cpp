@@ -27,7 +27,7 @@ void check_url(const config& setup, const std::string& key, const std::string& t
     if (where.scheme == "tls" && !setup.security.is_on()) {
         throw config_error(setup.location_of(key), "'" + text + "' requires 'security'");
     }
-    if ((where.scheme == "tcp" || where.scheme == "udp") && setup.security.is_on()) {
+    if (where.scheme == "tcp" && setup.security.is_on()) {
         throw config_error(setup.location_of(key), "'" + text + "' is refused with 'security': use 'tls'");
     }
 }
@@ -35,7 +35,7 @@ void check_url(const config& setup, const std::string& key, const std::string& t
 void check_exposure(const config& setup, const std::string& key, const std::string& text) {
     const auto where = parse_url(text);
     const auto* carrier = find_transport(where.scheme);
-    if (!setup.insecure && carrier != nullptr && carrier->is_exposed(where)) {
+    if (!setup.insecure && !setup.security.is_on() && carrier != nullptr && carrier->is_exposed(where)) {
         throw config_error(setup.location_of(key),
                            "'" + text + "' can be reached from other hosts, which requires 'insecure: true'");
     }
@@ -77,7 +77,7 @@ void apply_security_defaults(config& setup) {
         });
     };
     if (!is_set("listen")) {
-        setup.listen = {"tls://0.0.0.0:25370"};
+        setup.listen = {"tls://0.0.0.0:25370", "udp://0.0.0.0:25370"};
     }
     if (!is_set("multicast")) {
         setup.multicast.interface = "auto";
@@ -91,7 +91,12 @@ void check(const config& setup) {
         check_exposure(setup, key, setup.listen[i]);
     }
     for (std::size_t i = 0; i < setup.seeds.size(); ++i) {
-        check_url(setup, "seeds[" + std::to_string(i) + "]", setup.seeds[i]);
+        const auto key = "seeds[" + std::to_string(i) + "]";
+        check_url(setup, key, setup.seeds[i]);
+        if (setup.security.is_on() && parse_url(setup.seeds[i]).scheme == "udp") { // they are sealed for a known node
+            throw config_error(setup.location_of(key),
+                               "'" + setup.seeds[i] + "' names no node, as 'udp' requires with 'security': use 'tls'");
+        }
     }
     for (const auto& [name, url] : setup.peers) {
         check_url(setup, "peers." + name, url);

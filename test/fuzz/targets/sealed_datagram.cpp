@@ -116,7 +116,7 @@ class node final : public datagram_sink {
     }
     void established(const datagram_source& with, const node_statement& stated, bool restarted) override;
     void opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) override;
-    void gave_up(const datagram_source&) override {}
+    void gave_up(const datagram_source&, bool) override {}
 
   public:
     fleet known;

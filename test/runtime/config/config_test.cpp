@@ -49,6 +49,22 @@ BOOST_AUTO_TEST_CASE(listening_for_other_hosts_requires_insecure) {
     BOOST_TEST(refusal(c) == "accepted");
 }
 
+BOOST_AUTO_TEST_CASE(with_security_it_listens_for_other_hosts) {
+    auto c = default_config("host", 1);
+    c.security.keys = "/etc/cles/keys";
+    apply_security_defaults(c);
+    BOOST_TEST(c.listen == (std::vector<std::string>{"tls://0.0.0.0:25370", "udp://0.0.0.0:25370"}),
+               boost::test_tools::per_element());
+    BOOST_TEST(refusal(c) == "accepted");
+    c.peers = {{"car1", "udp://10.0.0.1"}};
+    BOOST_TEST(refusal(c) == "accepted");
+    c.seeds = {"udp://10.0.0.1"};
+    BOOST_TEST(refusal(c).find("names no node") != std::string::npos);
+    c.seeds.clear();
+    c.peers = {{"car1", "tcp://10.0.0.1"}};
+    BOOST_TEST(refusal(c).find("use 'tls'") != std::string::npos);
+}
+
 BOOST_AUTO_TEST_CASE(multicast_to_other_hosts_requires_insecure) {
     auto c = default_config("host", 1);
     c.multicast.interface = "eth0";

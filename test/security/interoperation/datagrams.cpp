@@ -122,7 +122,7 @@ class node final : public datagram_sink {
     void opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) override {
         std::cout << "opened " << from.member << " " << hex_of(epoch) << " " << line << "\n";
     }
-    void gave_up(const datagram_source& with) override { std::cout << "gave_up " << with.member << "\n"; }
+    void gave_up(const datagram_source& with, bool) override { std::cout << "gave_up " << with.member << "\n"; }
 
     std::uint32_t epoch_;
     cles::time_point now_{std::chrono::hours{1}};

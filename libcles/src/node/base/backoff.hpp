@@ -84,15 +84,18 @@ class retransmission {
 
     /// `bytes` has just been sent for the first time; nothing is sent from `end` on.
     retransmission(std::string bytes, time_point now, time_point end, std::uint32_t seed)
-        : bytes_(std::move(bytes)), end_(end), jitter_(seed) {
+        : bytes_(std::move(bytes)), sent_(now), end_(end), jitter_(seed) {
         plan(now);
     }
 
     /// When to check again: at the time of the next copy, or at the end.
     [[nodiscard]] time_point next() const noexcept { return std::min(next_, end_); }
+    /// When it was sent last.
+    [[nodiscard]] time_point sent() const noexcept { return sent_; }
     [[nodiscard]] bool over(time_point now) const noexcept { return now >= end_; }
     /// Returns the bytes of one more copy, and schedules the next.
     std::string_view again(time_point now) noexcept {
+        sent_ = now;
         plan(now);
         return bytes_;
     }
@@ -104,6 +107,7 @@ class retransmission {
     }
 
     std::string bytes_;
+    time_point sent_;
     time_point end_;
     time_point next_{};
     doubling_pause pause_{first_pause};

@@ -94,6 +94,7 @@ struct counters {
     std::uint64_t entries_dropped = 0;        ///< entries of tables that could not be parsed
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to unverified addresses, beyond their share
+    std::uint64_t datagrams_unsealed = 0; ///< dropped with security; filled in when they are shown
     std::uint64_t group_received = 0;     ///< datagrams of the multicast group, other than its own
     std::uint64_t group_dropped = 0;      ///< of these: neither BIND nor update, or malformed, or beyond a limit
     std::uint64_t group_repeated = 0;     ///< copies, from nodes that send on several interfaces
@@ -116,8 +117,8 @@ BOOST_DESCRIBE_STRUCT(counters, (),
                        nouns_retired, updates_delivered, updates_shed, updates_too_large, updates_received,
                        updates_dropped, announcements_sent, announcements_received, announcements_dropped,
                        announcements_foreign, peers_known, peers_refused, tables_asked, tables_failed, tables_told,
-                       entries_dropped, leases_expired, datagrams_withheld, group_received, group_dropped,
-                       group_repeated, group_sent, group_unsent, group_leases, links_open, links_accepted,
-                       links_refused, links_evicted, links_lost, bytes_received, bytes_sent))
+                       entries_dropped, leases_expired, datagrams_withheld, datagrams_unsealed, group_received,
+                       group_dropped, group_repeated, group_sent, group_unsent, group_leases, links_open,
+                       links_accepted, links_refused, links_evicted, links_lost, bytes_received, bytes_sent))
 
 } // namespace cles::core

@@ -331,9 +331,11 @@ void discovery::ask_for_roster(std::string_view node, std::uint32_t version, tim
     const auto& host = host_.shared_node();
     if (host->security && host->security->wants_roster(node, version, now)) {
         const auto noun = std::string{node} + ":cles/roster";
-        host_.peer_channels().send(node, {}, {.verb = verb::pull, .noun = noun},
-                                   now + std::chrono::milliseconds{protocol::default_deadline_ms},
-                                   make_roster_reply(host, std::string{node}), {});
+        auto& channels = host_.peer_channels();
+        const auto at = channels.is_by_datagram(node) ? channels.tls_address_of(node) : std::string{};
+        channels.send(node, at, {.verb = verb::pull, .noun = noun},
+                      now + std::chrono::milliseconds{protocol::default_deadline_ms},
+                      make_roster_reply(host, std::string{node}), {});
     }
 }
 
@@ -349,6 +351,12 @@ void discovery::visit(std::string_view node, const std::string& url) {
     host_.peer_channels().send(node, url, {.verb = verb::pull, .noun = noun},
                                host_.now() + std::chrono::milliseconds{protocol::default_deadline_ms},
                                detail::pending_ptr{new peer_reply{host_.weak_from_this(), release}}, {});
+}
+
+void discovery::visit_by_tls(std::string_view node) {
+    if (const auto where = host_.peer_channels().tls_address_of(node); !where.empty()) {
+        visit(node, where);
+    }
 }
 
 void discovery::expedite_announcement() {

@@ -164,6 +164,8 @@ class discovery final : private announcement_listener, private membership::watch
     void ask_for_roster(std::string_view node, std::uint32_t version, time_point now);
     /// Opens a link to a node that may be found there, and closes it when it is idle.
     void visit(std::string_view node, const std::string& url);
+    /// The same at an address for TLS, if one is known.
+    void visit_by_tls(std::string_view node);
     /// Announces this node soon, since something has changed.
     void expedite_announcement();
     /// Receives the changes of `membership`; a test may intercept them.

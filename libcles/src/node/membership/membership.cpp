@@ -470,6 +470,11 @@ std::optional<std::string_view> membership::address_of(std::string_view node) co
     return at == peers_.end() ? std::nullopt : std::optional{at->second.owner.where()};
 }
 
+const std::vector<std::string>* membership::endpoints_of(std::string_view node) const noexcept {
+    const auto at = peers_.find(node);
+    return at == peers_.end() ? nullptr : &at->second.owner.endpoints;
+}
+
 const incarnation* membership::announced(std::string_view node) const noexcept {
     const auto found = peers_.find(node);
     return found != peers_.end() && found->second.owner.from != group_source{} ? &found->second.owner : nullptr;

@@ -115,6 +115,8 @@ class membership final : private deadline {
     /// The URL at which the node is reached; nothing if it is unknown, empty if none of its addresses is usable from
     /// here. Valid until the next change.
     [[nodiscard]] std::optional<std::string_view> address_of(std::string_view node) const noexcept;
+    /// All such URLs, the preferred one first; null if it is unknown.
+    [[nodiscard]] const std::vector<std::string>* endpoints_of(std::string_view node) const noexcept;
     /// The number of other nodes.
     [[nodiscard]] std::size_t size() const noexcept { return peers_.size(); }
     /// The limit of `size`.

@@ -22,11 +22,6 @@ constexpr std::string_view urgent_suffix{"\0urgent", 7};
 // Key suffix after a URL: the links that lead to the node of this name, and to no other that answers there.
 std::string name_suffix(std::string_view name) { return name.empty() ? std::string{} : '\0' + std::string{name}; }
 
-// The name that the transport has to check. An address that was given without one may be anybody's.
-std::string_view name_to_check(std::string_view target, std::string_view at, std::string_view address) {
-    return at.empty() && address.starts_with("tls://") ? target : std::string_view{};
-}
-
 } // namespace
 
 // -- one channel ---------------------------------------------------------------------------------------------------
@@ -216,14 +211,48 @@ void peer_channels::set_peer(std::string_view name, std::string_view where) {
 
 url peer_channels::checked_url(std::string_view where) const {
     auto address = parse_url(where);
-    if (address.scheme == "tcp" && host_.node().security) {
-        throw error(errc::denied,
-                    "plain TCP is refused with security: use 'tls' instead of '" + std::string{where} + "'");
-    }
     if (!host_.environment().has_transport(address.scheme)) {
         throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
     }
+    if (host_.node().security && !host_.environment().is_trusted(address)) {
+        throw error(errc::denied, "'" + address.scheme + "' is refused with security: use 'tls' instead of '" +
+                                      std::string{where} + "'");
+    }
     return address;
+}
+
+// The name that the transport has to check. An address that was given without one may be anybody's.
+std::string_view peer_channels::name_to_check(std::string_view target, std::string_view at,
+                                              std::string_view address) const {
+    const bool authenticates =
+        address.starts_with("tls://") || (host_.node().security && address.starts_with("udp://"));
+    return at.empty() && authenticates ? target : std::string_view{};
+}
+
+bool peer_channels::is_by_datagram(std::string_view node) const {
+    try {
+        return address_of(node).starts_with("udp://");
+    } catch (const error&) { // it is not known
+        return false;
+    }
+}
+
+std::string peer_channels::tls_address_of(std::string_view node) const {
+    const auto configured = directory_.find(node);
+    if (configured != directory_.end() && configured->second.starts_with("tls://")) {
+        return configured->second;
+    }
+    if (const auto* const known = host_.node().peers.endpoints_of(node)) {
+        for (const auto& endpoint : *known) {
+            if (endpoint.starts_with("tls://")) {
+                return endpoint;
+            }
+        }
+    }
+    if (configured != directory_.end() && configured->second.starts_with("udp://")) {
+        return "tls" + configured->second.substr(3);
+    }
+    return {};
 }
 
 peer_channel* peer_channels::to(std::string_view target, std::string_view at, bool urgent,
@@ -302,6 +331,11 @@ peer_channel* peer_channels::find(std::string_view target, std::string_view at, 
             return found->second.get();
         }
         const auto where = waits ? std::nullopt : std::optional{checked_url(address)};
+        if (where && where->scheme == "udp" && name.empty() && host_.node().security) {
+            throw error(errc::denied, "'" + address +
+                                          "' is an address without a name, and datagrams are sealed for a "
+                                          "node that is named: configure it as a peer, or use 'tls'");
+        }
         auto made = std::make_shared<peer_channel>(
             host_.shared_from_this(), where ? to_string(*where) : std::string{target}, where, std::string{name});
         if (waits) {

@@ -126,6 +126,12 @@ class peer_channels {
     bool cancel(std::uint64_t id);
     /// The feed no longer waits for a link.
     void forget(const feed_machine& feed);
+    /// Whether requests to the node go by datagram, which are too short for a roster.
+    [[nodiscard]] bool is_by_datagram(std::string_view node) const;
+    /// A URL by which the node may be reached over TLS: configured, announced, or the host and port at which it is
+    /// configured for datagrams. Empty if there is none.
+    [[nodiscard]] std::string tls_address_of(std::string_view node) const;
+
     /// `c` was lost or can no longer be used.
     void drop(const connection& c);
     /// No requests follow at that URL for a while: closes its idle links.
@@ -136,6 +142,8 @@ class peer_channels {
   private:
     [[nodiscard]] std::string address_of(std::string_view target) const;
     url checked_url(std::string_view where) const;
+    [[nodiscard]] std::string_view name_to_check(std::string_view target, std::string_view at,
+                                                 std::string_view address) const;
     peer_channel* find(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
                        std::string& why);
 

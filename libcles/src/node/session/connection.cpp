@@ -122,6 +122,31 @@ void connection::on_writable() {
     host_->check_shutdown();
 }
 
+void connection::on_restart() {
+    const auto keep = shared_from_this();
+    marks_.reset();
+    const auto at = host_->now();
+    for (auto* const feed : std::vector{feeds_}) {
+        if (feed->is_bound()) { // a BIND that was not answered is sent again
+            unbind(*feed);
+            feed->on_lost("the publisher has restarted", at);
+        }
+    }
+    session_.asking().on_restart(at);
+}
+
+// Over TLS, both ends get the newer roster, which may be why the peer does not answer.
+void connection::on_unanswered(bool lost) {
+    const auto keep = shared_from_this();
+    if (from_ == origin::dialled) {
+        host_->discovery().visit_by_tls(peer().name);
+    }
+    if (lost) {
+        abandon(peer().name + " does not answer at " + peer().address +
+                ": it is not there, or this node is not in its roster");
+    }
+}
+
 // -- from the session ----------------------------------------------------------------------------------------------
 
 void connection::wake() {

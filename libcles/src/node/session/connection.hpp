@@ -64,6 +64,8 @@ class connection final : public link_events,
     void on_end() override;
     void on_lost(boost::system::error_code why) override;
     void on_writable() override;
+    void on_restart() override;
+    void on_unanswered(bool lost) override;
 
     // flushable
     void flush() override;
@@ -83,6 +85,7 @@ class connection final : public link_events,
     void finish() override;
     void close() override;
     void retire() override { usable_ = false; }
+    void check_peer(time_point since) override { link_->check_peer(since); }
 
     // subscriber
     [[nodiscard]] bool takes_updates() const override;

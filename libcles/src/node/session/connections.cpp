@@ -284,9 +284,9 @@ std::string listeners::listen(std::string_view where, bool insecure) {
     if (!environment.has_transport(address.scheme)) {
         throw error(errc::unknown_scheme, "'" + address.scheme + "' in '" + std::string{where} + "'");
     }
-    if (host_.node().security && address.scheme == "tcp") {
-        throw error(errc::insecure_listen,
-                    "plain TCP is refused with security: use 'tls' instead of '" + std::string{where} + "'");
+    if (host_.node().security && !environment.is_trusted(address)) {
+        throw error(errc::insecure_listen, "'" + address.scheme + "' is refused with security: use 'tls' instead of '" +
+                                               std::string{where} + "'");
     }
     if (!insecure && !host_.node().security && environment.is_exposed(address)) {
         throw error(errc::insecure_listen, "'" + std::string{where} +

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/limits.hpp>
+
 #include "node/base/memory_budget.hpp"
 
 #include <cstddef>
@@ -37,6 +39,8 @@ class line_sink {
     virtual void close() = 0;
     /// The peer answers no more requests: none may be sent here.
     virtual void retire() {}
+    /// A request is sent again: see `link::check_peer`.
+    virtual void check_peer(time_point /*since*/) {}
 
   protected:
     ~line_sink() = default;

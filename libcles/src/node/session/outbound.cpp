@@ -21,6 +21,7 @@ void outbound::send(protocol::outgoing_request request, time_point deadline, tim
     request.deadline_ms = deadline_ms == protocol::default_deadline(request.verb) ? 0 : deadline_ms;
     request.wants_progress = static_cast<bool>(progress);
     e->id = request.id;
+    e->verb = request.verb;
     request.id += first_id_;
     auto& out = out_.output();
     const auto line = out.size();
@@ -65,12 +66,34 @@ void outbound::on_due(entry& e, time_point now) {
     } else if (e.refused) {
         fail(e.id, errc::busy, "no memory is left for requests that are not sent yet (limits.memory)");
     } else if (e.copies && !e.copies->over(now)) {
-        out_.output().append(e.copies->again(now));
-        ++node_.counts.requests_resent;
-        node_.deadlines.arm(e, e.copies->next());
-        out_.wake();
+        out_.check_peer(e.copies->sent());
+        resend(e, now);
     } else {
         fail(e.id, errc::deadline, "no answer was received in time");
+    }
+}
+
+void outbound::resend(entry& e, time_point now) {
+    out_.output().append(e.copies->again(now));
+    ++node_.counts.requests_resent;
+    node_.deadlines.arm(e, e.copies->next());
+    out_.wake();
+}
+
+void outbound::on_restart(time_point now) {
+    std::vector<std::uint64_t> lost;
+    for (const auto& [id, e] : waiting_) {
+        if (e->refused) {
+            continue;
+        }
+        if (e->copies && (e->verb == verb::pull || e->verb == verb::bind)) {
+            resend(*e, now);
+        } else {
+            lost.push_back(id);
+        }
+    }
+    for (const auto id : lost) {
+        fail(id, errc::unavailable, "the node has restarted, and may have run the request before");
     }
 }
 

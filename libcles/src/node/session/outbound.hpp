@@ -58,6 +58,8 @@ class outbound {
     void on_reply(const protocol::reply_line& reply);
     /// A reply over the line limit.
     void on_overlong(const protocol::reply_line& reply);
+    /// The peer has restarted. Requests that it may have run fail, except PULL and BIND, which are sent again.
+    void on_restart(time_point now);
     /// Fails all pending requests with the peer's refusal of the link as a whole: it has started none of them.
     void refuse(const std::string& answer);
     /// Fails all pending requests.
@@ -74,6 +76,7 @@ class outbound {
 
         outbound& owner;
         std::uint64_t id = 0;
+        cles::verb verb{};
         detail::pending_ptr operation;
         progress_function progress;
         double reported = 0;
@@ -86,6 +89,7 @@ class outbound {
     [[nodiscard]] std::size_t longest() const noexcept;
     [[nodiscard]] bool has_memory_for(const protocol::outgoing_request& request);
     void on_due(entry& e, time_point now);
+    void resend(entry& e, time_point now);
     void rearm(std::unique_ptr<entry> e, time_point due);
     std::unique_ptr<entry> take(std::uint64_t id);
     void recycle(std::unique_ptr<entry> e);

@@ -124,6 +124,7 @@ void write_metrics(json_writer& w, const node_state& n) {
     const auto number = [&](std::string_view name, std::uint64_t value) { write_member(w, name, value); };
     auto counts = n.counts;
     counts.peers_known = n.peers.size();
+    counts.datagrams_unsealed = n.security ? n.security->unsealed_datagrams() : 0;
     w.begin_object();
     write_member(w, "uptime_ms", milliseconds_since(n.started, n.time.now()));
     w.key("requests");

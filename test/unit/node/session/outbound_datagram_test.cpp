@@ -9,6 +9,7 @@
 
 #include <boost/test/unit_test.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <memory>
@@ -141,6 +142,41 @@ BOOST_AUTO_TEST_CASE(a_request_that_is_dropped_is_not_sent_again) {
     BOOST_TEST(result->discarded);
     BOOST_TEST(during(10s).empty());
     link.session().asking().drop(1);
+}
+
+BOOST_AUTO_TEST_CASE(the_peer_is_checked_with_each_copy) {
+    const auto begun = node.host->time.now();
+    send(1, verb::push);
+    during(800ms);
+    BOOST_REQUIRE(link.checks.size() == 2U);
+    BOOST_TEST((link.checks[0] == begun));
+    BOOST_TEST((link.checks[1] >= begun + 200ms)); // when the last copy was sent
+    BOOST_TEST((link.checks[1] <= begun + 260ms));
+}
+
+BOOST_AUTO_TEST_CASE(if_the_peer_has_restarted_what_may_have_run_fails_and_the_rest_is_sent_again) {
+    const auto pull = send(1, verb::pull);
+    const auto push = send(2, verb::push);
+    const auto bind = send(3, verb::bind);
+    const auto delegate = send(4, verb::delegate);
+    link.take();
+    link.session().asking().on_restart(node.host->time.now());
+    auto again = link.take_lines();
+    std::sort(again.begin(), again.end());
+    BOOST_TEST(again == (std::vector<std::string>{"BIND car2:speed id=5000000003", "PULL car2:speed id=5000000001"}),
+               boost::test_tools::per_element());
+    BOOST_TEST(node.counts().requests_resent == 2U);
+    for (const auto& each : {push, delegate}) {
+        node.pass(0ms);
+        BOOST_TEST(each->ended);
+        BOOST_TEST(each->code == errc::unavailable);
+    }
+    BOOST_TEST(!pull->ended);
+    link.ask("id=5000000001 {}");
+    link.ask("id=5000000003 {}");
+    BOOST_TEST(pull->ended);
+    BOOST_TEST(bind->ended);
+    BOOST_TEST(node.host->deadlines.size() == 0U);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: BSL-1.0
+// In steady state, a PULL by sealed datagrams allocates nothing at the service. Prints also what sealing adds to its
+// latency. Service and client run in processes of their own.
+#include <cles/security.hpp>
+#include <cles/service.hpp>
+
+#include "security/fleet_authority.hpp"
+#include "security/key_directory.hpp"
+#include "security/noise_kk.hpp"
+
+#include <boost/asio/io_context.hpp>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <stdlib.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+// The names that glibc uses for the functions that are replaced here. `operator new` calls `malloc` too.
+extern "C" {
+void* __libc_malloc(std::size_t);
+void* __libc_calloc(std::size_t, std::size_t);
+void* __libc_realloc(void*, std::size_t);
+void* __libc_memalign(std::size_t, std::size_t);
+}
+
+namespace {
+std::uint64_t allocations = 0;
+}
+
+extern "C" {
+void* malloc(std::size_t size) {
+    ++allocations;
+    return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) {
+    ++allocations;
+    return __libc_calloc(count, size);
+}
+void* realloc(void* memory, std::size_t size) {
+    ++allocations;
+    return __libc_realloc(memory, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) {
+    ++allocations;
+    return __libc_memalign(alignment, size);
+}
+}
+
+namespace {
+
+using steady = std::chrono::steady_clock;
+
+constexpr std::uint64_t warm_up = 3'000;
+constexpr std::uint64_t counted = 10'000;
+
+double in_us(steady::duration d) { return std::chrono::duration<double, std::micro>(d).count(); }
+
+double median(std::vector<double>& all) {
+    std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
+    return all[all.size() / 2];
+}
+
+/// A fleet of car1 and car2 in a folder.
+class fleet_folder {
+  public:
+    fleet_folder() {
+        std::string name = "/tmp/cles-sealed-pull-XXXXXX";
+        if (::mkdtemp(name.data()) == nullptr) {
+            throw std::runtime_error("cannot create a folder");
+        }
+        folder_ = name;
+        auto authority = cles::security::fleet_authority::found(cles::security::signing_key::generate());
+        for (const auto* car : {"car1", "car2"}) {
+            const auto directory = cles::security::key_directory::create(of(car));
+            authority.add(directory.create_key(car).public_part(), {});
+        }
+        for (const auto* car : {"car1", "car2"}) {
+            cles::security::key_directory{of(car)}.store_roster(authority.newest());
+        }
+    }
+    fleet_folder(const fleet_folder&) = delete;
+    fleet_folder& operator=(const fleet_folder&) = delete;
+    ~fleet_folder() { std::filesystem::remove_all(folder_); }
+    [[nodiscard]] std::string of(const std::string& car) const { return folder_ + "/" + car; }
+
+  private:
+    std::string folder_;
+};
+
+cles::service_options options_of(const char* name, const fleet_folder* sealed) {
+    cles::service_options made{.name = name, .listen = {"udp://127.0.0.1:0"}};
+    if (sealed != nullptr) {
+        made.security = cles::secured(sealed->of(name));
+    }
+    return made;
+}
+
+/// Pulls one by one; prints nothing. \return the median latency in microseconds
+double pull(const std::string& url, const fleet_folder* sealed) {
+    boost::asio::io_context io{1};
+    auto options = options_of("car2", sealed);
+    options.peers.emplace("car1", url);
+    cles::service car2{io, std::move(options)};
+    std::vector<double> took;
+    took.reserve(counted);
+    for (std::uint64_t i = 0; i < warm_up + counted + 64; ++i) {
+        bool done = false;
+        const auto begun = steady::now();
+        car2.async_request("PULL car1:speed", [&](boost::system::error_code code, const cles::json_text&) {
+            if (code) {
+                throw std::runtime_error(code.message());
+            }
+            done = true;
+        });
+        while (!done) {
+            io.run_one();
+        }
+        if (i >= warm_up && took.size() < counted) {
+            took.push_back(in_us(steady::now() - begun));
+        }
+    }
+    bool told = false;
+    car2.async_request("PUSH car1:done", [&](boost::system::error_code, const cles::json_text&) { told = true; });
+    while (!told) {
+        io.run_one();
+    }
+    return median(took);
+}
+
+struct result {
+    double latency = 0;
+    std::uint64_t allocated = 0;
+};
+
+result measure(const fleet_folder* sealed) {
+    std::array<int, 2> to_child{};
+    std::array<int, 2> to_parent{};
+    if (::pipe(to_child.data()) != 0 || ::pipe(to_parent.data()) != 0) {
+        throw std::runtime_error("cannot create a pipe");
+    }
+    const auto child = ::fork();
+    if (child == 0) {
+        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+        try {
+            std::array<char, 200> url{};
+            const auto size = ::read(to_child[0], url.data(), url.size());
+            const auto latency = pull({url.data(), static_cast<std::size_t>(size)}, sealed);
+            ::_exit(::write(to_parent[1], &latency, sizeof latency) == sizeof latency ? 0 : 1);
+        } catch (const std::exception& failure) {
+            std::fprintf(stderr, "client: %s\n", failure.what());
+            ::_exit(1);
+        }
+    }
+    boost::asio::io_context io{1};
+    cles::service car1{io, options_of("car1", sealed)};
+    std::uint64_t pulls = 0;
+    result found;
+    car1.on_pull("speed", [&] {
+        ++pulls;
+        if (pulls == warm_up) {
+            found.allocated = allocations;
+        } else if (pulls == warm_up + counted) {
+            found.allocated = allocations - found.allocated;
+        }
+        return 7;
+    });
+    bool done = false;
+    car1.on_push("done", [&] { done = true; });
+    const auto url = car1.endpoints().front();
+    if (::write(to_child[1], url.data(), url.size()) < 0) {
+        throw std::runtime_error("cannot write to a pipe");
+    }
+    const auto end = steady::now() + std::chrono::seconds{30};
+    while (!done && steady::now() < end) {
+        io.run_one_for(std::chrono::milliseconds{100});
+    }
+    io.run_for(std::chrono::milliseconds{20}); // the last reply
+    if (!done || ::read(to_parent[0], &found.latency, sizeof found.latency) != sizeof found.latency) {
+        ::kill(child, SIGKILL);
+        ::waitpid(child, nullptr, 0);
+        throw std::runtime_error("the client did not complete");
+    }
+    ::waitpid(child, nullptr, 0);
+    for (const auto each : {to_child[0], to_child[1], to_parent[0], to_parent[1]}) {
+        ::close(each);
+    }
+    return found;
+}
+
+/// The mean time to seal a line like those that are exchanged, and to open one.
+double seal_time() {
+    std::array<std::uint8_t, 32> key{1, 2, 3};
+    std::array<std::uint8_t, 20> head{};
+    std::array<std::uint8_t, 40> line{};
+    std::array<std::uint8_t, 56> sealed{};
+    constexpr std::uint64_t times = 200'000;
+    const auto begun = steady::now();
+    for (std::uint64_t i = 0; i < times; ++i) {
+        cles::security::noise_seal(key.data(), i, head, line, sealed.data());
+        if (!cles::security::noise_open(key.data(), i, head, sealed, line.data())) {
+            throw std::runtime_error("cannot open what was sealed");
+        }
+    }
+    return in_us(steady::now() - begun) / (2.0 * times);
+}
+
+} // namespace
+
+int main() {
+    try {
+        const fleet_folder folder;
+        std::vector<double> plain;
+        std::vector<double> sealed;
+        bool good = true;
+        for (int round = 0; round < 3; ++round) {
+            plain.push_back(measure(nullptr).latency);
+            const auto found = measure(&folder);
+            sealed.push_back(found.latency);
+            good = good && found.allocated == 0;
+            std::printf("%llu allocations in %llu PULLs\n", static_cast<unsigned long long>(found.allocated),
+                        static_cast<unsigned long long>(counted));
+        }
+        const auto once = seal_time();
+        std::printf("PULL, median: plain %.2f us, sealed %.2f us; to seal or to open a line: %.2f us\n", median(plain),
+                    median(sealed), once);
+        return good ? 0 : 1;
+    } catch (const std::exception& failure) {
+        std::fprintf(stderr, "%s\n", failure.what());
+        return 1;
+    }
+}
