@@ -45,7 +45,10 @@ struct place {
 };
 
 int rank_of(const url& where, std::string_view received_from) {
-    const int scheme = where.scheme == "tls" || where.scheme == "tcp" ? 0 : where.scheme == "unix" ? 1 : where.scheme == "udp" ? 2 : 3;
+    const int scheme = where.scheme == "tls" || where.scheme == "tcp" ? 0
+                       : where.scheme == "unix"                       ? 1
+                       : where.scheme == "udp"                        ? 2
+                                                                      : 3;
     return scheme * 2 + (where.host == received_from ? 0 : 1);
 }
 
