@@ -88,8 +88,20 @@ BOOST_AUTO_TEST_CASE(only_points_of_prime_order_in_their_only_encoding_are_keys)
              std::string{"eeffffffffffffffffffffffffffffffffffffffffffffffffffffffffffff7f"}, // neutral, as p + 1
              std::string{"f0ffffffffffffffffffffffffffffffffffffffffffffffffffffffffffff7f"}, // y = 3, as p + 3
              std::string{"02"}.append(zeros),                                                 // not a point
+             // A valid key, with a point of order 8 or 2 added.
+             std::string{"6a04fa7acf0934cb8ab34fbcb40c7f58b109fbee389d186d8e22f705e87de8be"},
+             std::string{"b295d84331495bd29d5c572fd590f28c9acdea88e21dbc59c53fb75e74a625d6"},
          }) {
         BOOST_TEST(!agreement_form(key_of<public_key>(hex)), hex);
+    }
+    // All encodings of y from the field's prime on.
+    for (unsigned y = 0; y < 19; ++y) {
+        public_key key{};
+        key.fill(0xff);
+        key[0] = static_cast<std::uint8_t>(0xed + y);
+        BOOST_TEST(!agreement_form(key));
+        key[31] = 0x7f;
+        BOOST_TEST(!agreement_form(key));
     }
 }
 

@@ -56,9 +56,9 @@ bool verify(const public_key& by, std::string_view text, const signature& made) 
 std::optional<agreement_key> agreement_form(const public_key& key) {
     prepare_sodium();
     agreement_key form{};
-    // The conversion accepts other encodings of a point.
-    if (crypto_core_ed25519_is_valid_point(key.data()) != 1 ||
-        crypto_sign_ed25519_pk_to_curve25519(form.data(), key.data()) != 0) {
+    // The conversion refuses points that are not of prime order. It would accept a second encoding, which only points
+    // with y below 19 have; none of them is of prime order.
+    if (crypto_sign_ed25519_pk_to_curve25519(form.data(), key.data()) != 0) {
         return {};
     }
     return form;
