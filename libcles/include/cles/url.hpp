@@ -13,9 +13,10 @@ inline constexpr std::uint16_t default_port = 25370;
 /// The address of a link, in parts.
 ///
 /// ```
-/// url      = ( "tcp://" / "tls://" / "udp://" ) host [ ":" port ] [ "?dscp=" number ] / "unix://" path / "inproc://"
-/// name host     = IPv4 address / "[" IPv6 address [ "%25" zone ] "]" / host name path     = "/" ... (a socket file) /
-/// "@" ... (an abstract socket)
+/// url      = ( "tcp://" / "tls://" / "udp://" ) host [ ":" port ] [ "?dscp=" number ]
+///          / "unix://" path / "inproc://" name
+/// host     = IPv4 address / "[" IPv6 address [ "%25" zone ] "]" / host name
+/// path     = "/" ... (a socket file) / "@" ... (an abstract socket)
 /// ```
 ///
 /// The default port is 25370; port 0 makes the system choose a free one when listening. A DSCP (RFC 2474) is set in

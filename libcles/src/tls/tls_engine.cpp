@@ -118,7 +118,7 @@ std::span<char> tls_engine::prepare() {
 tls_engine::status tls_engine::status_of(int result, boost::system::error_code& why) {
     switch (::SSL_get_error(ssl_.get(), result)) {
     case SSL_ERROR_WANT_READ: return status::need_input;
-    case SSL_ERROR_ZERO_RETURN: return status::ended;
+    case SSL_ERROR_ZERO_RETURN: ended_ = true; return status::ended;
     default: break;
     }
     failed_ = true;
@@ -160,6 +160,12 @@ void tls_engine::count_handshake_message() noexcept {
 }
 
 tls_engine::status tls_engine::read(std::span<char> space, std::size_t& count, boost::system::error_code& why) {
+    if (ended_) {
+        return status::ended;
+    }
+    if (begin_ == end_ && ::SSL_pending(ssl_.get()) == 0) { // most calls; OpenSSL would take longer to say so
+        return status::need_input;
+    }
     ::ERR_clear_error();
     has_buffers_ = true;
     const int result = ::SSL_read_ex(ssl_.get(), space.data(), space.size(), &count);
@@ -179,7 +185,6 @@ void tls_engine::write(std::string_view text, boost::system::error_code& why) {
     if (text.empty()) {
         return;
     }
-    ::ERR_clear_error();
     has_buffers_ = true;
     if (written_ >= records_per_key) {
         ::SSL_key_update(ssl_.get(), SSL_KEY_UPDATE_NOT_REQUESTED);
@@ -189,7 +194,8 @@ void tls_engine::write(std::string_view text, boost::system::error_code& why) {
     std::size_t count = 0;
     if (failed_ || ::SSL_write_ex(ssl_.get(), text.data(), text.size(), &count) != 1) {
         failed_ = true;
-        why = take_openssl_error();
+        why = tls_errc::failed;
+        ::ERR_clear_error();
     }
 }
 

@@ -77,6 +77,7 @@ class tls_engine {
     std::uint64_t written_ = 0;            // records, with the current key
     std::uint64_t handshake_messages_ = 0; // since the handshake
     bool established_ = false;
+    bool ended_ = false; // the peer's text
     bool failed_ = false;
     bool has_buffers_ = false; // OpenSSL's
 };

@@ -149,11 +149,12 @@ void stream_link::on_read(error_code code, std::size_t count) {
         }
         return;
     }
-    if (code == asio::error::eof) {
+    if (code) { // usually not, and comparing takes longer
+        if (code != asio::error::eof) {
+            lose(code);
+            return;
+        }
         (codec_ ? stream_ended_ : ended_) = true;
-    } else if (code) {
-        lose(code);
-        return;
     }
     if (!codec_) {
         input_.commit(count);
@@ -207,7 +208,7 @@ void stream_link::hand_over() {
         throw;
     }
     handing_ = false;
-    if (failure_) {
+    if (codec_ && failure_) {
         fail(failure_);
     } else if (state_ == state::finishing || state_ == state::discarding) {
         discard();
@@ -286,38 +287,75 @@ void stream_link::flush() {
     if (state_ == state::closed || state_ == state::discarding || waiting_) {
         return;
     }
-    if (!urgent_.empty() && !opening_) {
+    if (codec_) {
+        flush_encoded();
+        return;
+    }
+    put_urgent_first();
+    if (output_.empty()) {
+        return;
+    }
+    error_code code;
+    const auto count = socket_.send(asio::buffer(output_), 0, code);
+    if (code && code != asio::error::would_block) {
+        lose_later(code);
+        return;
+    }
+    sent_ += count;
+    if (count == output_.size()) {
+        clear_output();
+        return;
+    }
+    waiting_ = true;
+    sending_.swap(output_);
+    sending_at_ = count;
+    write_rest();
+}
+
+void stream_link::put_urgent_first() {
+    if (!urgent_.empty()) {
         output_.insert(0, urgent_);
         if (urgent_.capacity() > roomy) {
             release(urgent_);
         }
         urgent_.clear();
     }
-    if (output_.empty() && !codec_) {
-        return;
+}
+
+void stream_link::clear_output() {
+    if (output_.capacity() > roomy) {
+        release(output_);
+    }
+    output_.clear();
+}
+
+// Reported later: the owner may be in the middle of something, and may read the explanation before that.
+void stream_link::lose_later(error_code why) {
+    asio::post(socket_.get_executor(), [self = shared_from_this(), why] { self->lose(why); });
+    output_.clear();
+}
+
+// Until the codec is open, the output stays, and only what the codec says itself is sent.
+void stream_link::flush_encoded() {
+    if (!opening_) {
+        put_urgent_first();
     }
     error_code code;
-    const auto count = codec_ ? send_encoded(code) : socket_.send(asio::buffer(output_), 0, code);
+    const auto count = send_encoded(code);
     if (code && code != asio::error::would_block) {
-        // Reported later: the owner may be in the middle of something, and may read the explanation before that.
-        asio::post(socket_.get_executor(), [self = shared_from_this(), code] { self->lose(code); });
-        output_.clear();
+        lose_later(code);
         return;
     }
     sent_ += count;
-    const bool all = codec_ ? codec_->encoded().empty() && encoded_.empty() : count == output_.size();
-    if (!all) {
-        waiting_ = true;
+    waiting_ = !encoded_.empty();
+    if (waiting_) {
         if (!opening_) {
             sending_.swap(output_);
             sending_at_ = count;
         }
         write_rest();
     } else if (!opening_) {
-        if (output_.capacity() > roomy) {
-            release(output_);
-        }
-        output_.clear();
+        clear_output();
     }
 }
 
@@ -365,7 +403,7 @@ void stream_link::write_rest() {
         error_code code;
         codec_->encode(text, code);
         if (code) {
-            asio::post(socket_.get_executor(), [self = shared_from_this(), code] { self->lose(code); });
+            lose_later(code);
             return;
         }
         encoding_ = text.size();

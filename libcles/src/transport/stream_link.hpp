@@ -48,8 +48,8 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void finish() override;
     void close() override;
     [[nodiscard]] std::size_t buffered() const noexcept override {
-        return input_.capacity() + output_.capacity() + urgent_.capacity() + sending_.capacity() + encoded_.capacity() +
-               (codec_ ? codec_->buffered() : 0);
+        return input_.capacity() + output_.capacity() + urgent_.capacity() + sending_.capacity() +
+               (codec_ ? encoded_.capacity() + codec_->buffered() : 0);
     }
     void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return peer_; }
@@ -68,6 +68,10 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void continue_later();
     [[nodiscard]] bool decode();
     void release_input();
+    void put_urgent_first();
+    void clear_output();
+    void lose_later(boost::system::error_code why);
+    void flush_encoded();
     [[nodiscard]] std::size_t send_encoded(boost::system::error_code& code);
     void write_rest();
     void async_send(std::string_view bytes);

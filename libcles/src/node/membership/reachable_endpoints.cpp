@@ -45,7 +45,7 @@ struct place {
 };
 
 int rank_of(const url& where, std::string_view received_from) {
-    const int scheme = where.scheme == "tcp" || where.scheme == "tls" ? 0
+    const int scheme = where.scheme == "tls" || where.scheme == "tcp" ? 0
                        : where.scheme == "unix"                       ? 1
                        : where.scheme == "udp"                        ? 2
                                                                       : 3;
