@@ -169,7 +169,7 @@ struct collector {
     void next() {
         feed.async_next([this](boost::system::error_code failed, const auto& event) {
             if (!failed) {
-                if (event.kind == cles::feed_event::update) {
+                if (event.kind == cles::feed_event::update || event.kind == cles::feed_event::current) {
                     values.push_back(event.value);
                 }
                 next();
@@ -435,6 +435,31 @@ BOOST_FIXTURE_TEST_CASE(they_are_received_through_a_forwarder, discovered) {
     BOOST_TEST(unsigned_updates(io, sat1) == 0U);
     BOOST_TEST(unsigned_updates(io, car2) == 0U);
     seen.feed.close();
+}
+
+BOOST_FIXTURE_TEST_CASE(a_forwarded_value_without_signature_counts_as_missing, discovered) {
+    cles::service car1{io, options("car1")};
+    car1.on_bind("control", must_be_signed);
+    car1.update("control", 1);
+    car1.update("pose", 1);
+    cles::service sat1{io, options("sat1", true)};
+    cles::service car2{io, options("car2")};
+    know(sat1, "car1");
+    know(car2, "car1");
+    cles::bind_options by_sat1;
+    by_sat1.at(sat1.endpoints().front());
+    collector direct{sat1, "car1:control"};
+    collector forwarded{car2, "car1:control", by_sat1};
+    collector other{car2, "car1:pose", by_sat1};
+    cles::test::run_until(io, [&] { return direct.values.size() == 1 && other.values.size() == 1; });
+    cles::test::run_until(io, [&] { return forwarded.feed.is_open(); });
+    BOOST_TEST(forwarded.values.empty());
+    car1.update("control", 2);
+    cles::test::run_until(io, [&] { return !forwarded.values.empty(); });
+    BOOST_TEST(forwarded.values.front() == 2);
+    for (auto* each : {&direct, &forwarded, &other}) {
+        each->feed.close();
+    }
 }
 
 BOOST_FIXTURE_TEST_CASE(they_are_received_by_multicast, discovered) {

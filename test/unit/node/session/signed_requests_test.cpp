@@ -275,13 +275,13 @@ BOOST_AUTO_TEST_CASE(a_signature_is_passed_on) {
 
 BOOST_AUTO_TEST_CASE(there_are_at_most_16_adverbs_with_it) {
     std::string foreign;
-    for (int i = 0; i < 11; ++i) {
-        foreign += " x" + std::to_string(i) + "=1";
+    for (char c = 'a'; c <= 'k'; ++c) {
+        foreign += std::string{" x_"} + c + "=1";
     }
     link.ask("DELEGATE sat1:strike id=7 urgent=yes sig=abc" + foreign);
     const auto& text = ways.to("sat1").text;
-    BOOST_TEST(text.find(" x7=1") != std::string::npos, text);
-    BOOST_TEST(text.find(" x8=1") == std::string::npos, text); // id, deadline, progress, urgent may follow
+    BOOST_TEST(text.find(" x_h=1") != std::string::npos, text);
+    BOOST_TEST(text.find(" x_i=1") == std::string::npos, text); // id, deadline, progress, urgent may follow
 }
 
 BOOST_AUTO_TEST_CASE(a_challenge_is_passed_on_unchanged) {
