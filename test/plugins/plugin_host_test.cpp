@@ -93,6 +93,7 @@ BOOST_AUTO_TEST_CASE(it_tells_what_is_loaded) {
     const auto described = ask("PULL self:cles");
     BOOST_TEST(described.find(R"({"verb":"PULL","task":"number","description":"A number","idempotent":true})") !=
                std::string::npos);
+    BOOST_TEST(described.find(R"({"verb":"PUSH","task":"guarded","signed":true})") != std::string::npos);
     BOOST_TEST(described.find(R"("task":"parameters","parameters":["text"])") != std::string::npos);
 }
 
@@ -103,6 +104,8 @@ BOOST_AUTO_TEST_CASE(handlers_of_all_shapes_answer_as_in_an_application) {
     BOOST_TEST(ask(R"(PUSH self:sum {"a":1.5,"b":2})") == R"({"value":3.5})");
     BOOST_TEST(ask(R"(PUSH self:sum {"a":1.5})").starts_with("bad_request: node: the body is invalid: b"));
     BOOST_TEST(ask("PUSH self:fails") == "denied: node: not you");
+    BOOST_TEST(ask("PUSH self:guarded") ==
+               "denied: node: 'guarded' requires signed requests, and this node has no security");
     BOOST_TEST(ask(R"(UPDATE self:target {"x":1})") == "{}");
     BOOST_TEST(host->figures().jobs == 0U);
     BOOST_TEST(host->figures().answered_twice == 0U);

@@ -28,11 +28,30 @@ class scripted_security final : public core::node_security {
     }
     [[nodiscard]] std::string sign_update(std::string_view path, std::uint64_t seq, std::string_view epoch,
                                           std::string_view body) const override {
-        return signature("car1", path, seq, epoch, body);
+        return signature(self, path, seq, epoch, body);
     }
     [[nodiscard]] bool is_signed(std::string_view publisher, std::string_view path, std::uint64_t seq,
                                  std::string_view epoch, std::string_view body, std::string_view sig) const override {
         return sig == signature(publisher, path, seq, epoch, body);
+    }
+    [[nodiscard]] std::string new_challenge() const override { return "challenge" + std::to_string(++challenges); }
+    [[nodiscard]] std::string sign_request(std::string_view node, std::string_view challenge, verb how,
+                                           std::string_view path, std::string_view body) const override {
+        return challenge.starts_with("challenge") ? request_signature(self, node, challenge, how, path, body)
+                                                  : std::string{};
+    }
+    [[nodiscard]] bool is_request_signed(std::string_view requester, std::string_view challenge, verb how,
+                                         std::string_view path, std::string_view body,
+                                         std::string_view sig) const override {
+        return sig == request_signature(requester, self, challenge, how, path, body);
+    }
+    static std::string request_signature(std::string_view requester, std::string_view node, std::string_view challenge,
+                                         verb how, std::string_view path, std::string_view body) {
+        std::string all;
+        for (const auto part : {requester, node, challenge, to_string(how), path, body}) {
+            all.append(part).push_back('-');
+        }
+        return std::to_string(std::hash<std::string>{}(all));
     }
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override {
         return port;
@@ -74,6 +93,8 @@ class scripted_security final : public core::node_security {
     std::set<std::string> members{"car1", "car2", "car3", "sat1"};
     std::set<std::string> denied;             ///< "car2 PULL car1:speed"
     std::set<std::string> forwarders{"car1"}; ///< for everybody
+    std::string self = "car1";                ///< whose security this is
+    mutable int challenges = 0;               ///< that were drawn
     std::uint32_t version = 7;
     std::string line = "{\"signature\":\"s\",\"roster\":{}}";
 

@@ -34,7 +34,7 @@ extern "C" {
 #endif
 
 #define CLES_PLUGIN_ABI_MAJOR 1u
-#define CLES_PLUGIN_ABI_MINOR 1u
+#define CLES_PLUGIN_ABI_MINOR 2u
 /* The name of the entry point, as text. */
 #define CLES_PLUGIN_ENTRY "cles_plugin_v1"
 
@@ -86,6 +86,9 @@ typedef struct cles_request {
 #define CLES_TASK_IDEMPOTENT 1u
 /* The task is quick enough to run on the I/O thread; the host measures its time. */
 #define CLES_TASK_INLINE_OK 2u
+/* Since 1.2: requests of the task, except CLES_BIND, run only with the signature of a member of the fleet, and updates
+ * of its nouns are signed. An older host ignores this: a plugin that adds such a task checks the host's `abi_minor`. */
+#define CLES_TASK_SIGNED 4u
 
 /* A task that the plugin adds. The host copies it. */
 typedef struct cles_task {

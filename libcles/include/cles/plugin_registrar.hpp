@@ -122,6 +122,9 @@ class plugin_registrar final : public registrar {
             throw error(errc::failed, what + " is a coroutine, for which a plugin has no executor: "
                                              "let the handler take a responder, and `delegate` with it");
         }
+        if (task.info.must_be_signed && host_.abi_minor < 2) {
+            throw error(errc::failed, what + " must be signed, which this host does not support");
+        }
         std::vector<cles_text> parameters;
         for (const auto& name : task.info.parameters) {
             parameters.push_back(abi_text(name));
@@ -138,7 +141,8 @@ class plugin_registrar final : public registrar {
                                  .parameters = parameters.data(),
                                  .parameter_count = parameters.size(),
                                  .flags = (info.idempotent ? CLES_TASK_IDEMPOTENT : 0U) |
-                                          (info.inline_ok ? CLES_TASK_INLINE_OK : 0U),
+                                          (info.inline_ok ? CLES_TASK_INLINE_OK : 0U) |
+                                          (info.must_be_signed ? CLES_TASK_SIGNED : 0U),
                                  .reserved = 0,
                                  .start = handled ? &plugin_task::start : nullptr,
                                  .user = tasks_.back().get()};

@@ -314,7 +314,11 @@ void engine::add(registration offered) {
             }
         };
     }
+    const bool is_announced = entry.info.must_be_signed && node().security && !node().tasks.is_signed(offered.task);
     node().tasks.add(offered.verb, offered.task, std::move(entry));
+    if (is_announced) { // subscribers that do not know of it accept unsigned updates
+        discovery().expedite_announcement();
+    }
 }
 
 std::shared_ptr<update_sink> engine::cross_thread_updates() {

@@ -130,6 +130,7 @@ void local_node::start(const std::vector<std::string>& listen_at) {
     }
     if (node_->security) {
         security_.emplace(*this);
+        signer_.emplace(*this);
     }
     for (const auto& where : listen_at) {
         listen(where);
@@ -262,10 +263,15 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     }
     const auto id = draw_id();
     const auto started = now();
+    const auto deadline = saturating_add(started, time_limit(options.deadline_, how));
+    if (signer_) {
+        operation = signer_->watch(
+            {.how = how, .noun = noun, .body = body, .options = options, .deadline = deadline, .ticket = id},
+            std::move(operation));
+    }
     flush_scheduler_.run_user_call([&] {
-        r->send({.verb = how, .noun = text, .id = id, .carried = {.urgent = options.urgent_}, .body = body},
-                saturating_add(started, time_limit(options.deadline_, how)), started, std::move(operation),
-                options.on_progress_);
+        r->send({.verb = how, .noun = text, .id = id, .carried = {.urgent = options.urgent_}, .body = body}, deadline,
+                started, std::move(operation), options.on_progress_);
     });
     return id;
 }
@@ -310,7 +316,7 @@ void local_node::cancel(std::uint64_t ticket) {
     if (graceful_shutdown_ && graceful_shutdown_->ticket() == ticket) {
         node_->completions.fail(graceful_shutdown_->give_up(), errc::cancelled,
                                 "the wait for the service to close was cancelled");
-    } else if (!peer_channels_.cancel(ticket) && !connections_.cancel(ticket)) {
+    } else if (!cancel_sent(ticket) && !(signer_ && signer_->cancel(ticket))) {
         node_->published.cancel(ticket);
     }
 }
@@ -390,6 +396,7 @@ void local_node::stop() {
     send_updates(node_->unsent, node_->published, now());
     stopped_ = true;
     security_.reset();
+    signer_.reset();
     listeners_.close();
     environment_->stop_timer();
     if (routing_) {

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/node_state.hpp"
 
+#include "node/session/request_challenges.hpp"
+
 #include <utility>
 
 namespace cles::core {
@@ -14,9 +16,13 @@ node_state::node_state(node_options setup, const core::clock& source, const std:
       kept_requests(std::make_shared<memory_account>(memory)), peers(name, setup.epoch, deadlines, bounds.peers),
       unsent(wake),
       published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch, unsent),
-      unsent_relayed(wake), remembered{.limit = bounds.remembered} {
+      unsent_relayed(wake), remembered{.limit = bounds.remembered},
+      challenges(security ? std::make_unique<request_challenges>(*this) : nullptr) {
+    published.sign_for(tasks, security.get());
     peers.begin(setup.pool, started);
 }
+
+node_state::~node_state() = default;
 
 // Forwarded requests are not counted: other nodes do that work.
 node_load node_state::load_now() const noexcept {

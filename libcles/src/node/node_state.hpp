@@ -27,6 +27,7 @@ namespace cles::core {
 
 class gossip;
 class node_security;
+class request_challenges;
 
 /// The settings of a node.
 struct node_options {
@@ -49,6 +50,9 @@ class router;
 struct node_state {
     /// `wake` schedules a call of `send_updates`.
     node_state(node_options setup, const core::clock& source, const std::function<void()>& wake);
+    node_state(const node_state&) = delete;
+    node_state& operator=(const node_state&) = delete;
+    ~node_state();
 
     const std::string name;
     const std::string epoch;
@@ -79,7 +83,8 @@ struct node_state {
     unsent_topics unsent_relayed; ///< of other nodes, forwarded by this one
     dedup_memory remembered;
     reflection_limit reflection;
-    std::uint64_t next_id = 1;       ///< of the requests that this node sends
+    const std::unique_ptr<request_challenges> challenges; ///< null: the node is not secured
+    std::uint64_t next_id = 1;                            ///< of the requests that this node sends
     router* active_router = nullptr; ///< serves requests for `any`, `all` and other nodes; null: none
 
     // These do not let exceptions of the user's functions out.

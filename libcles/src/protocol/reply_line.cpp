@@ -74,6 +74,10 @@ bool parse_failure(std::string_view body, failure& out) {
             }
         } else if (key == "message" && reader.peek() == json_reader::kind::string) {
             reader.read(out.message);
+        } else if (key == "node" && reader.peek() == json_reader::kind::string) {
+            reader.read(out.node);
+        } else if (key == "challenge" && reader.peek() == json_reader::kind::string) {
+            reader.read(out.challenge);
         } else if (key == "retry_ms" && reader.peek() == json_reader::kind::number) {
             std::string_view raw;
             if (reader.read_raw(raw)) {
@@ -106,6 +110,12 @@ void append_failure(std::string& out, const failure& f) {
     if (f.retry_ms || f.code == errc::busy) {
         writer.key("retry_ms");
         writer.value(f.retry_ms.value_or(default_retry_ms));
+    }
+    if (!f.node.empty()) {
+        writer.key("node");
+        writer.value(std::string_view{f.node});
+        writer.key("challenge");
+        writer.value(std::string_view{f.challenge});
     }
     writer.end_object();
 }

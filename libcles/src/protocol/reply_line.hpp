@@ -42,7 +42,9 @@ struct failure {
     std::string message;
     std::optional<std::uint64_t> retry_ms{};
     bool ran = false;
-    std::string answer{}; ///< if it is forwarded: the complete body, as another node wrote it
+    std::string node{};      ///< which executes the request if it is signed; empty: it need not be
+    std::string challenge{}; ///< to sign, if `node` is set
+    std::string answer{};    ///< if it is forwarded: the complete body, as another node wrote it
 };
 
 /// Parses a failure's members; an unknown code counts as `failed`. False: it is not valid JSON.

@@ -135,6 +135,34 @@ bool secured_node::is_signed(std::string_view publisher, std::string_view path, 
                   signed_update{.publisher = publisher, .noun = path, .seq = seq, .epoch = epoch, .body = body}, sig);
 }
 
+std::string secured_node::new_challenge() const { return security::new_challenge(); }
+
+std::string secured_node::sign_request(std::string_view node, std::string_view challenge, verb how,
+                                       std::string_view path, std::string_view body) const {
+    try {
+        return sign(
+            fleet_->own_key(), fleet_->in_force().fleet(),
+            signed_request{
+                .requester = name(), .node = node, .challenge = challenge, .kind = how, .noun = path, .body = body});
+    } catch (const security_error& e) {
+        log(log_level::warning, std::string{"a request was not signed: "} + e.what());
+        return {};
+    }
+}
+
+bool secured_node::is_request_signed(std::string_view requester, std::string_view challenge, verb how,
+                                     std::string_view path, std::string_view body, std::string_view sig) const {
+    const auto* const who = fleet_->in_force().find(requester);
+    return who != nullptr && verify(who->key, fleet_->in_force().fleet(),
+                                    signed_request{.requester = requester,
+                                                   .node = name(),
+                                                   .challenge = challenge,
+                                                   .kind = how,
+                                                   .noun = path,
+                                                   .body = body},
+                                    sig);
+}
+
 std::shared_ptr<core::group_port> secured_node::seal(std::shared_ptr<core::group_port> port) {
     return std::make_shared<sealed_group_port>(datagrams_, std::move(port),
                                                [this](std::uint32_t member, const std::vector<std::string>& endpoints) {

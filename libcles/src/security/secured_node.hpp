@@ -55,6 +55,12 @@ class secured_node final : public core::node_security {
                                           std::string_view body) const override;
     [[nodiscard]] bool is_signed(std::string_view publisher, std::string_view path, std::uint64_t seq,
                                  std::string_view epoch, std::string_view body, std::string_view sig) const override;
+    [[nodiscard]] std::string new_challenge() const override;
+    [[nodiscard]] std::string sign_request(std::string_view node, std::string_view challenge, verb how,
+                                           std::string_view path, std::string_view body) const override;
+    [[nodiscard]] bool is_request_signed(std::string_view requester, std::string_view challenge, verb how,
+                                         std::string_view path, std::string_view body,
+                                         std::string_view sig) const override;
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
     [[nodiscard]] std::uint64_t unsealed_datagrams() const override { return datagrams_->unsealed(); }
     [[nodiscard]] std::uint32_t roster_version() const override { return fleet_->in_force().version(); }

@@ -79,6 +79,7 @@ void register_tasks(cles::registrar& to, const sound_settings& wanted) {
                {.description = "A number", .idempotent = true});
     to.on_pull("parameters", [](const cles::request& asked) { return asked.parameter(0).size(); },
                {.parameters = {"text"}, .inline_ok = true});
+    to.on_push("guarded", [] { return 1; }, {.must_be_signed = true});
     to.on_push("sum", [](const sum& s) { return s.a + s.b; });
     to.on_push("fails", [](const cles::request&) { throw cles::error(cles::errc::denied, "not you"); });
     to.on_delegate("elsewhere", [thread](const cles::request& asked, const cles::responder& answer) {

@@ -82,6 +82,7 @@ struct counters {
     std::uint64_t updates_too_large = 0; ///< not sent by datagram
     std::uint64_t updates_received = 0;  ///< and delivered to a feed
     std::uint64_t updates_dropped = 0;   ///< unwanted, repeated or malformed
+    std::uint64_t updates_unsigned = 0;  ///< dropped, because they are not signed as their publisher announces
     std::uint64_t announcements_sent = 0;
     std::uint64_t announcements_received = 0; ///< from others, and accepted
     std::uint64_t announcements_dropped = 0;  ///< malformed or old
@@ -115,10 +116,11 @@ BOOST_DESCRIBE_STRUCT(counters, (),
                       (errors, errors_unsent, housekeeping, housekeeping_errors, handlers_running, routed,
                        requests_repeated, requests_sent, requests_resent, replies_dropped, updates_published,
                        nouns_retired, updates_delivered, updates_shed, updates_too_large, updates_received,
-                       updates_dropped, announcements_sent, announcements_received, announcements_dropped,
-                       announcements_foreign, peers_known, peers_refused, tables_asked, tables_failed, tables_told,
-                       entries_dropped, leases_expired, datagrams_withheld, datagrams_unsealed, group_received,
-                       group_dropped, group_repeated, group_sent, group_unsent, group_leases, links_open,
-                       links_accepted, links_refused, links_evicted, links_lost, bytes_received, bytes_sent))
+                       updates_dropped, updates_unsigned, announcements_sent, announcements_received,
+                       announcements_dropped, announcements_foreign, peers_known, peers_refused, tables_asked,
+                       tables_failed, tables_told, entries_dropped, leases_expired, datagrams_withheld,
+                       datagrams_unsealed, group_received, group_dropped, group_repeated, group_sent, group_unsent,
+                       group_leases, links_open, links_accepted, links_refused, links_evicted, links_lost,
+                       bytes_received, bytes_sent))
 
 } // namespace cles::core

@@ -2,6 +2,7 @@
 #include "node/membership/announcement.hpp"
 
 #include "json/json_members.hpp"
+#include "node/session/task_execution.hpp"
 #include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
@@ -47,6 +48,19 @@ bool read_sources(json_reader& r, std::vector<group_source>& out) {
             out.push_back(*source);
         }
     });
+}
+
+// None may be skipped: an update without a signature would be accepted.
+bool read_signed(json_reader& r, std::vector<std::string>& out) {
+    out.clear();
+    std::size_t bytes = 0;
+    const bool good = read_texts(r, [&](std::string_view task) {
+        bytes += task.size() + 1;
+        if (bytes <= 2 * task_registry::max_signed_names) {
+            out.emplace_back(task);
+        }
+    });
+    return good && (bytes <= 2 * task_registry::max_signed_names || r.fail("the list of signed tasks is too long"));
 }
 
 bool read_load(json_reader& r, node_load& out) {
@@ -113,6 +127,7 @@ bool read_announcement_member(json_reader& r, std::string_view key, announcement
            : key == "pool"        ? r.read(out.pool)
            : key == "sources"     ? read_sources(r, out.sources)
            : key == "roster"      ? read_count(r, out.roster)
+           : key == "signed"      ? read_signed(r, out.signed_tasks)
                                   : r.skip();
 }
 
@@ -155,10 +170,17 @@ void append_body(std::string& out, const announcement& said, std::size_t endpoin
     if (said.roster != 0) {
         write_member(w, "roster", said.roster);
     }
+    write_signed_member(w, said.signed_tasks);
     w.end_object();
 }
 
 } // namespace
+
+void write_signed_member(json_writer& w, const std::vector<std::string>& tasks) {
+    if (!tasks.empty()) {
+        write_member(w, "signed", tasks);
+    }
+}
 
 void write_load_member(json_writer& w, const node_load& load) {
     w.plain_key("load");

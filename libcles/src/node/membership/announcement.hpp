@@ -46,7 +46,8 @@ struct announcement {
     std::string pool{}; ///< empty: the pool without a name
     /// The node's sources in the group, one per interface; empty if it uses one interface.
     std::vector<group_source> sources{};
-    std::uint32_t roster = 0; ///< the version of its roster; 0: the node is not secured
+    std::uint32_t roster = 0;                ///< the version of its roster; 0: the node is not secured
+    std::vector<std::string> signed_tasks{}; ///< tasks whose updates it signs
 };
 
 /// Reads an update of the noun `<node>:cles`. On failure returns false, and `why` contains the reason.
@@ -62,6 +63,8 @@ void append_announcement(std::string& out, const announcement& said, std::uint64
 
 // Members that several kinds of entries have.
 
+/// Writes the list of signed tasks, unless it is empty.
+void write_signed_member(json_writer& w, const std::vector<std::string>& tasks);
 void write_load_member(json_writer& w, const node_load& load);
 /// Writes at most `most` of the endpoints.
 void write_endpoints_member(json_writer& w, const std::vector<std::string>& endpoints, std::size_t most);

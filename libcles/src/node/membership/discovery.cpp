@@ -197,7 +197,8 @@ void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
                       .tasks = digest_of_tasks(tasks),
                       .leaving = leaving,
                       .pool = node.peers.pool(),
-                      .roster = node.security ? node.security->roster_version() : 0};
+                      .roster = node.security ? node.security->roster_version() : 0,
+                      .signed_tasks = node.security ? node.tasks.signed_tasks() : std::vector<std::string>{}};
     ++seq_;
     if (gossip_ && !leaving) {
         said.endpoints = endpoints_for_gossip();

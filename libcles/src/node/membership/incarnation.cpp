@@ -79,7 +79,8 @@ bool incarnation::is_significant_load_change(const node_load& now) const noexcep
 void incarnation::apply(const sighting& w, std::uint64_t& numbers) {
     const bool placed = apply_endpoints(w);
     const bool describes = w.seq != 0 || !w.announced.tasks.empty();
-    if (placed || is_significant_load_change(w.announced.load) || (describes && announced.tasks != w.announced.tasks)) {
+    if (placed || is_significant_load_change(w.announced.load) ||
+        (describes && (announced.tasks != w.announced.tasks || announced.signed_tasks != w.announced.signed_tasks))) {
         described_revision = ++numbers;
         service_us = w.announced.load.service_us;
     }
@@ -89,6 +90,7 @@ void incarnation::apply(const sighting& w, std::uint64_t& numbers) {
     announced.interval = w.announced.interval;
     if (describes) {
         announced.tasks = w.announced.tasks;
+        announced.signed_tasks = w.announced.signed_tasks;
     }
     if (!w.is_from_gossip()) {
         announced.sources = w.announced.sources;

@@ -480,6 +480,11 @@ const incarnation* membership::announced(std::string_view node) const noexcept {
     return found != peers_.end() && found->second.owner.from != group_source{} ? &found->second.owner : nullptr;
 }
 
+const announcement* membership::announcement_of(std::string_view node) const noexcept {
+    const auto found = peers_.find(node);
+    return found == peers_.end() ? nullptr : &found->second.owner.announced;
+}
+
 std::optional<membership::member> membership::find_member(std::string_view node) const {
     const auto found = peers_.find(node);
     return found == peers_.end() ? std::nullopt : std::optional{member_of(*found)};

@@ -126,6 +126,8 @@ class membership final : private deadline {
 
     /// The owner of the name; null if it was not received in the group. Valid until the next change.
     [[nodiscard]] const incarnation* announced(std::string_view node) const noexcept;
+    /// The last announcement of a node, received from it or by gossip; null if there is none.
+    [[nodiscard]] const announcement* announcement_of(std::string_view node) const noexcept;
     /// Nothing if the node is unknown.
     [[nodiscard]] std::optional<member> find_member(std::string_view node) const;
     /// The node with the next name; after the last the first; nothing if none is known.

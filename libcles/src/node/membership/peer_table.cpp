@@ -47,6 +47,7 @@ void write_entry(json_writer& w, const delta_entry& item, time_point now, std::s
     if (said != nullptr) {
         write_load_member(w, said->load);
         write_member(w, "tasks", said->tasks);
+        write_signed_member(w, said->signed_tasks);
     }
     w.end_object();
 }

@@ -5,6 +5,7 @@
 
 #include "node/base/deadlines.hpp"
 #include "node/local_node.hpp"
+#include "node/publish/signed_updates.hpp"
 #include "node/routing/peer_channels.hpp"
 #include "node/session/outbound.hpp"
 #include "node/session/request_checks.hpp"
@@ -85,6 +86,18 @@ detail::pending_ptr feed_links::on_reply(const core::feed_machine& feed, reply_f
     return detail::pending_ptr{new feed_reply(host_.weak_from_this(), feed.entry().handle, std::move(then))};
 }
 
+// The value in a reply is not signed. So if updates must be, or that is not known, only the publisher's own reply
+// counts.
+bool feed_links::is_value_trusted(core::feed_machine& feed) const {
+    const auto c = feed.entry().on.lock();
+    if (!host_.node().security || !c || feed.target() == "all" || feed.target() == "self" ||
+        c->peer().transport == "inproc" || c->peer().name == feed.target()) {
+        return true;
+    }
+    const auto task = std::string_view{feed.path()}.substr(0, feed.path().find('/'));
+    return !must_be_signed(host_.node(), feed.target(), task).value_or(true);
+}
+
 void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked,
                                marking marks) {
     auto last = received.text;
@@ -105,11 +118,16 @@ void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, 
         }
         last = "{}";
     }
-    if (received.mark && marks == marking::up_to_it) {
-        feed.skip_to(*received.mark);
+    auto mark = received.mark;
+    if (!is_value_trusted(feed)) {
+        last = "{}";
+        mark.reset();
+    }
+    if (mark && marks == marking::up_to_it) {
+        feed.skip_to(*mark);
     }
     const auto lease = host_.bounds().lease;
-    feed.on_bound(last, marks == marking::as_update ? received.mark : std::nullopt);
+    feed.on_bound(last, marks == marking::as_update ? mark : std::nullopt);
     if (asked) {
         feed.on_leased(*asked, lease);
     }

@@ -59,6 +59,7 @@ class feed_links final : public core::feed_host {
 
     [[nodiscard]] detail::pending_ptr on_reply(const core::feed_machine& feed, reply_function then);
     /// `asked`: when the BIND was sent by datagram; empty for a stream.
+    [[nodiscard]] bool is_value_trusted(core::feed_machine& feed) const;
     void on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked, marking marks);
     void send_bind(core::feed_machine& feed, const std::shared_ptr<connection>& c);
     void ask_for_features(core::feed_machine& feed, const std::shared_ptr<connection>& c);

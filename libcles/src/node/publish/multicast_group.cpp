@@ -4,6 +4,7 @@
 #include <cles/json_reader.hpp>
 
 #include "node/membership/membership.hpp"
+#include "node/publish/signed_updates.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
 #include "protocol/request_line.hpp"
@@ -221,11 +222,16 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
         ++counts.updates_dropped;
         return true;
     }
+    const auto check = node_->security ? check_signature(*node_, update, false) : update_check::unsigned_one;
+    if (check == update_check::refused) {
+        ++counts.updates_unsigned;
+        return true;
+    }
     const auto found = sources_.look(noun.target, from, now);
     if (found == verdict::another) {
         feeds_.forget(noun.target);
     }
-    if (found != verdict::refused && datagram.accept() && feeds_.take(update)) {
+    if (found != verdict::refused && datagram.accept(check == update_check::signed_one) && feeds_.take(update)) {
         ++counts.updates_received;
     } else if (found == verdict::one_of_several) {
         ++counts.group_repeated;

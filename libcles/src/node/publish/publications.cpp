@@ -6,6 +6,8 @@
 
 #include "node/base/scoped_flag.hpp"
 #include "node/session/reply_writer.hpp"
+#include "node/session/task_execution.hpp"
+#include "port/node_security.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -141,6 +143,7 @@ void publications::remove(topic& t) {
 }
 
 void publications::publish(std::string_view path, const std::function<void(json_writer&)>& write) {
+    const bool is_signed = must_sign(path);
     auto& t = open(path, true);
     if (t.is_begun()) {
         throw error(errc::failed, "'" + t.path() + "' cannot be published while a value of it is being written");
@@ -151,18 +154,37 @@ void publications::publish(std::string_view path, const std::function<void(json_
     auto& line = t.begin();
     const auto start = line.size();
     protocol::append_update_head(line, publisher_, t.path(), t.seq() + 1, epoch_);
-    const auto body = line.size();
+    auto body = line.size();
     try {
         json_writer writer{line};
         write(writer);
         cles::detail::require_utf8(writer);
         close_body(line, body);
+        body = is_signed ? sign(t, line, body) : body;
         end(t, body - start);
     } catch (...) {
         t.roll_back();
         remove_if_unused(t);
         throw;
     }
+}
+
+bool publications::must_sign(std::string_view path) const {
+    if (registered_ == nullptr || !registered_->is_signed(task_of(path))) {
+        return false;
+    }
+    if (security_ == nullptr) {
+        throw error(errc::denied,
+                    "updates of '" + std::string{path} + "' must be signed, and " + publisher_ + " has no security");
+    }
+    return true;
+}
+
+std::size_t publications::sign(const topic& t, std::string& line, std::size_t body) const {
+    const auto made = security_->sign_update(t.path(), t.seq() + 1, epoch_, std::string_view{line}.substr(body));
+    const auto adverb = "sig=" + made + " ";
+    line.insert(body, adverb);
+    return body + adverb.size();
 }
 
 // When memory runs out, updates that slow subscribers have not taken are dropped first; then idle nouns retire.

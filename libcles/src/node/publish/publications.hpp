@@ -20,6 +20,9 @@
 
 namespace cles::core {
 
+class node_security;
+class task_registry;
+
 /// The topics with updates that have not been sent to their subscribers. `flush_scheduler` sends them.
 class unsent_topics {
   public:
@@ -77,9 +80,15 @@ class publications final : public topic_source {
     publications(topic_context shared, const cles::limits& bounds, completion_queue& completions, std::string publisher,
                  std::string epoch, unsent_topics& unsent);
 
+    /// From now on, updates of tasks that are registered as signed are; without `security`, they are refused with
+    /// `denied`. Both must outlive this.
+    void sign_for(const task_registry& tasks, const node_security* security) noexcept {
+        registered_ = &tasks;
+        security_ = security;
+    }
     /// Publishes what `write` writes (a body, or a scalar, which is wrapped). The path is canonical.
-    /// \throws cles::error: `too_large`, `busy`, `failed`; what `write` throws. Then nothing is published, but nouns
-    /// may have retired.
+    /// \throws cles::error: `too_large`, `busy`, `failed`, `denied`; what `write` throws. Then nothing is published,
+    /// but nouns may have retired.
     void publish(std::string_view path, const std::function<void(json_writer&)>& write);
     /// Publishes JSON that is known to be valid and compact.
     void publish_body(std::string_view path, std::string_view body);
@@ -147,6 +156,9 @@ class publications final : public topic_source {
     /// What slow subscribers have not taken is kept, whatever memory it needs.
     void publish_lossless(std::string_view path, std::string_view body);
     void end(topic& t, std::size_t body_at);
+    [[nodiscard]] bool must_sign(std::string_view path) const;
+    /// Inserts the signature before the body, and returns where the body is then.
+    [[nodiscard]] std::size_t sign(const topic& t, std::string& line, std::size_t body) const;
 
     topic_context shared_;
     const cles::limits& bounds_;
@@ -159,6 +171,8 @@ class publications final : public topic_source {
     string_map<std::unique_ptr<topic>> topics_;
     std::uint64_t highest_retired_ = 0; // the highest `seq` of all nouns that were removed
     bool lossless_ = false;
+    const task_registry* registered_ = nullptr;
+    const node_security* security_ = nullptr;
     topic* recent_ = nullptr; // usually the same noun is published again
 };
 

@@ -196,7 +196,10 @@ std::string forwarded_adverbs(const protocol::request_line& r, std::string_view 
     if (states_requester) {
         out.append(" from=").append(requester);
     }
-    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0));
+    if (!r.sig.empty()) {
+        out.append(" sig=").append(r.sig);
+    }
+    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0) - (r.sig.empty() ? 0 : 1));
     return out;
 }
 

@@ -56,7 +56,7 @@ class next_hop {
 };
 
 /// The adverbs of a forwarded request, except those that are members of `outgoing_request`: `hops` less one, `via` with
-/// this node's name, and those that this version does not know.
+/// this node's name, the requester, its signature, and those that this version does not know.
 std::string forwarded_adverbs(const protocol::request_line& request, std::string_view own_name,
                               std::string_view requester = {});
 

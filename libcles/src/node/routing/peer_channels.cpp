@@ -292,7 +292,9 @@ std::string peer_channels::address_of(std::string_view target) const {
     if (const auto configured = directory_.find(target); configured != directory_.end()) {
         return configured->second;
     }
-    if (const auto endpoint = listeners.shared_endpoint(target); host_.environment().is_open(endpoint)) {
+    // With security, the other end would take this node for itself.
+    if (const auto endpoint = listeners.shared_endpoint(target);
+        !host_.node().security && host_.environment().is_open(endpoint)) {
         return "inproc://" + endpoint;
     }
     if (protocol::is_reserved_target(target)) {

@@ -314,7 +314,11 @@ std::string listeners::shared_endpoint(std::string_view name) const {
 }
 
 void listeners::open_local_endpoints() {
-    for (const auto& endpoint : {self_endpoint(), shared_endpoint(host_.node().name)}) {
+    std::vector<std::string> endpoints{self_endpoint()};
+    if (!host_.node().security) { // requests of other nodes would count as its own
+        endpoints.push_back(shared_endpoint(host_.node().name));
+    }
+    for (const auto& endpoint : endpoints) {
         try {
             auto made = host_.environment().listen({.scheme = "inproc", .host = endpoint, .port = 0, .path = {}},
                                                    host_.bounds());

@@ -35,6 +35,9 @@ void write_task(json_writer& w, std::string_view verb, std::string_view task, co
     if (info.idempotent) {
         write_member(w, "idempotent", true);
     }
+    if (info.must_be_signed) {
+        write_member(w, "signed", true);
+    }
     w.end_object();
 }
 

@@ -2,6 +2,7 @@
 #include "node/session/session.hpp"
 
 #include "node/membership/roster_exchange.hpp"
+#include "node/publish/signed_updates.hpp"
 #include "node/session/request_checks.hpp"
 #include "protocol/line.hpp"
 #include "protocol/request_line.hpp"
@@ -112,6 +113,12 @@ void session::on_reply(std::string_view line) {
 
 void session::on_update(const subscriptions::match& found) {
     const auto& update = *found.update;
+    // What comes from this process was checked before.
+    if (node_->security && found.whose != nullptr && peer_.transport != "inproc" &&
+        check_signature(*node_, update, peer_.name == update.noun.target) == update_check::refused) {
+        ++node_->counts.updates_unsigned;
+        return;
+    }
     if (found.whose == nullptr || protocol::begins_with_error(update.body) || !subscriptions_.deliver(found)) {
         ++node_->counts.updates_dropped;
     } else {

@@ -5,8 +5,10 @@
 
 #include "node/session/call.hpp"
 #include "node/session/handler_failure.hpp"
+#include "node/session/request_challenges.hpp"
 #include "node/session/request_checks.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <exception>
 #include <utility>
@@ -27,12 +29,31 @@ void task_registry::add(cles::verb verb, std::string_view task, handler entry) {
     if (task == "cles") {
         throw error(errc::invalid_name, "the task 'cles' is reserved");
     }
-    auto& slot = tasks_[std::string{task}][static_cast<std::size_t>(verb)];
-    if (slot.present) {
+    if (find(verb, task) != nullptr) {
         throw error(errc::already_registered, std::string{to_string(verb)} + " '" + std::string{task} + "'");
     }
+    if (entry.info.must_be_signed && !is_signed(task)) {
+        add_signed(task);
+    }
+    auto& slot = tasks_[std::string{task}][static_cast<std::size_t>(verb)];
     slot = std::move(entry);
     slot.present = true;
+}
+
+void task_registry::add_signed(std::string_view task) {
+    auto bytes = task.size();
+    for (const auto& each : signed_) {
+        bytes += each.size();
+    }
+    if (bytes > max_signed_names) {
+        throw error(errc::too_large, "the names of signed tasks have more than " + std::to_string(max_signed_names) +
+                                         " bytes with '" + std::string{task} + "'");
+    }
+    signed_.emplace_back(task);
+}
+
+bool task_registry::is_signed(std::string_view task) const noexcept {
+    return std::find(signed_.begin(), signed_.end(), task) != signed_.end();
 }
 
 const handler* task_registry::find(cles::verb verb, std::string_view task) const noexcept {
@@ -123,6 +144,13 @@ std::optional<protocol::failure> task_execution::refusal(const memory_account* m
     if (handler_ == nullptr) {
         return no_such_task(*node_, line_);
     }
+    if (auto why = capacity_refusal(memory)) { // first: a challenge is valid once
+        return why;
+    }
+    return handler_->info.must_be_signed && line_.verb != verb::bind ? signature_refusal() : std::nullopt;
+}
+
+std::optional<protocol::failure> task_execution::capacity_refusal(const memory_account* memory) {
     if (memory != nullptr && !memory->has_capacity(1)) {
         return no_memory(*node_);
     }
@@ -130,6 +158,15 @@ std::optional<protocol::failure> task_execution::refusal(const memory_account* m
         return busy(node_->name + ": '" + std::string{line_.noun.task} + "' has reached its limit of nouns");
     }
     return handler_->plain ? std::nullopt : no_capacity_to_run(*node_);
+}
+
+std::optional<protocol::failure> task_execution::signature_refusal() {
+    if (!node_->challenges) {
+        return protocol::failure{.code = errc::denied,
+                                 .message = node_->name + ": '" + std::string{line_.noun.task} +
+                                            "' requires signed requests, and this node has no security"};
+    }
+    return node_->challenges->refusal(*data_.peer, line_, due_, now_);
 }
 
 void task_execution::write(json_writer& w) {

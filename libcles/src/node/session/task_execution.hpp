@@ -12,12 +12,14 @@
 #include <boost/container/static_vector.hpp>
 
 #include <array>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace cles::core {
 
@@ -36,7 +38,8 @@ struct handler {
 /// The tasks that a node offers.
 class task_registry {
   public:
-    /// \throws cles::error: `invalid_name`, `already_registered`
+    /// \throws cles::error: `invalid_name`, `already_registered`, and `too_large` if the names of signed tasks exceed
+    /// `max_signed_names`
     void add(cles::verb verb, std::string_view task, handler entry);
 
     /// The handler, or null.
@@ -44,12 +47,21 @@ class task_registry {
     /// Whether a BIND of the task is served: BIND or UPDATE is registered for it.
     [[nodiscard]] bool can_bind(std::string_view task) const noexcept;
 
+    /// The total size of the names of signed tasks, which announcements list.
+    static constexpr std::size_t max_signed_names = 512;
+    /// Tasks of which at least one verb must be signed, in order of registration.
+    [[nodiscard]] const std::vector<std::string>& signed_tasks() const noexcept { return signed_; }
+    [[nodiscard]] bool is_signed(std::string_view task) const noexcept;
+
     using handlers = std::array<handler, verb_count>;
     /// All tasks, sorted by name.
     [[nodiscard]] const std::map<std::string, handlers, std::less<>>& tasks() const noexcept { return tasks_; }
 
   private:
+    void add_signed(std::string_view task);
+
     std::map<std::string, handlers, std::less<>> tasks_;
+    std::vector<std::string> signed_;
 };
 
 /// \throws cles::error with `invalid_name` if the name of a task or the like is not valid
@@ -116,6 +128,8 @@ class task_execution {
 
   private:
     [[nodiscard]] std::optional<protocol::failure> refusal(const memory_account* memory);
+    [[nodiscard]] std::optional<protocol::failure> capacity_refusal(const memory_account* memory);
+    [[nodiscard]] std::optional<protocol::failure> signature_refusal();
     void start(task_sink& to, const std::shared_ptr<memory_account>& memory);
     [[nodiscard]] std::string_view publish_path() { return protocol::canonical_path(line_.noun, path_); }
 

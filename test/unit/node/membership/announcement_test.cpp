@@ -55,6 +55,26 @@ BOOST_AUTO_TEST_CASE(format_matches_the_protocol) {
                "\"tasks\":\"cbf29ce484222325\"}\n");
 }
 
+BOOST_AUTO_TEST_CASE(lists_signed_tasks) {
+    const statement said{.node = "car1", .signed_tasks = {"control", "strike"}};
+    const auto line = written(said);
+    BOOST_TEST(line.ends_with(",\"signed\":[\"control\",\"strike\"]}\n"));
+    const auto r = read(std::string_view{line}.substr(0, line.size() - 1));
+    BOOST_REQUIRE_MESSAGE(r.good, r.why);
+    BOOST_TEST(r.said.signed_tasks == said.signed_tasks, boost::test_tools::per_element());
+    BOOST_TEST(written({.node = "car1"}).find("signed") == std::string::npos);
+}
+
+BOOST_AUTO_TEST_CASE(a_list_of_signed_tasks_is_read_as_a_whole_or_refused) {
+    BOOST_TEST(!read_body(R"({"node":"car1","signed":"control"})").good);
+    BOOST_TEST(!read_body(R"({"node":"car1","signed":[1]})").good);
+    std::string many = "\"a\"";
+    for (int i = 0; i < 600; ++i) {
+        many += ",\"a\"";
+    }
+    BOOST_TEST(!read_body(R"({"node":"car1","signed":[)" + many + "]}").good);
+}
+
 BOOST_AUTO_TEST_CASE(lists_its_sources_with_several_interfaces) {
     const statement said{
         .node = "car1", .endpoints = {"tcp://0.0.0.0:1"}, .sources = {{0x7F000001, 7}, {0x0A000007, 8}}};

@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/request_signer.hpp"
+
+#include "json/json_members.hpp"
+#include "node/local_node.hpp"
+#include "node/session/request_checks.hpp"
+#include "port/node_security.hpp"
+#include "protocol/line.hpp"
+#include "protocol/reply_line.hpp"
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+namespace cles::core {
+namespace {
+
+/// What is needed to send a request once more.
+struct repeatable_request {
+    std::weak_ptr<local_node> host;
+    verb how = verb::pull;
+    std::string target;
+    std::string path;
+    std::string body;
+    std::string at;
+    bool urgent = false;
+    outbound::progress_function progress;
+    time_point deadline{};
+    std::uint64_t ticket = 0;
+};
+
+// A node could have anything signed under the name of another.
+bool may_sign_for(local_node& host, const repeatable_request& r, const std::string& node) {
+    const auto& own = host.node().name;
+    if (!protocol::is_name(node) || protocol::is_reserved_target(node)) {
+        return false;
+    }
+    if (r.target == "self") {
+        return r.at.empty() && node == own;
+    }
+    if (r.target == "any" || r.target == "all") {
+        return permits(host.node(), own, node, r.how, r.path);
+    }
+    return node == r.target;
+}
+
+/// The node that has asked for a signature with this failure, if it may get one; else nothing. `sig` is the signature.
+std::optional<std::string> signing_node(local_node& host, const repeatable_request& r, std::string_view answer,
+                                        std::string& sig) {
+    protocol::failure why;
+    if (!protocol::is_failure(answer) || !protocol::parse_failure(answer, why) || why.code != errc::denied ||
+        why.challenge.empty() || !may_sign_for(host, r, why.node)) {
+        return {};
+    }
+    protocol::noun_view noun;
+    std::string unused;
+    const auto whole = why.node + ":" + r.path;
+    if (!protocol::parse_noun(whole, noun, unused)) {
+        return {};
+    }
+    std::string scratch;
+    sig = host.node().security->sign_request(why.node, why.challenge, r.how, protocol::canonical_path(noun, scratch),
+                                             r.body);
+    return sig.empty() ? std::nullopt : std::optional{std::move(why.node)};
+}
+
+void send_signed(local_node& host, request_signer& by, const repeatable_request& r, const std::string& node,
+                 std::string_view sig, detail::pending_ptr reply, outbound::progress_function progress) {
+    const auto noun = node + ":" + r.path;
+    const auto adverbs = std::string{"sig="}.append(sig);
+    host.flush_scheduler().run_user_call([&] {
+        const auto id = host.peer_channels().send(
+            node, r.at,
+            {.verb = r.how, .noun = noun, .carried = {.urgent = r.urgent}, .adverbs = adverbs, .body = r.body},
+            r.deadline, std::move(reply), std::move(progress));
+        if (id != 0) {
+            by.note(r.ticket, id);
+        }
+    });
+}
+
+/// Ends the entry of a request in the signer.
+class noted_ticket {
+  public:
+    noted_ticket(std::weak_ptr<local_node> host, std::uint64_t ticket) : host_(std::move(host)), ticket_(ticket) {}
+    noted_ticket(const noted_ticket&) = delete;
+    noted_ticket& operator=(const noted_ticket&) = delete;
+    ~noted_ticket() {
+        const auto host = host_.lock();
+        if (auto* const signer = host ? host->signer() : nullptr) {
+            signer->forget(ticket_);
+        }
+    }
+
+  private:
+    std::weak_ptr<local_node> host_;
+    std::uint64_t ticket_;
+};
+
+/// Passes the outcome of a second attempt on. Whatever it is, there is no third one.
+class second_attempt final : public detail::pending {
+  public:
+    second_attempt(std::weak_ptr<local_node> host, std::uint64_t ticket, detail::pending_ptr operation)
+        : ticket_(std::move(host), ticket), operation_(std::move(operation)) {}
+
+    verdict offer(std::string_view json) override {
+        std::unique_ptr<second_attempt> self{this};
+        auto* const operation = operation_.release();
+        const auto found = operation->offer(json);
+        if (found == verdict::malformed) {
+            operation_.reset(operation);
+            static_cast<void>(self.release());
+        }
+        return found;
+    }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::unique_ptr<second_attempt> self{this};
+        operation_.release()->fail(code, message);
+    }
+    void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
+        const std::unique_ptr<second_attempt> self{this};
+        operation_.release()->refuse(code, message, answer);
+    }
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
+
+  private:
+    noted_ticket ticket_;
+    detail::pending_ptr operation_;
+};
+
+/// The reply to a request for `all` while nodes in it are asked once more, with the signature.
+class gathered_reply {
+  public:
+    gathered_reply(const std::weak_ptr<local_node>& host, std::uint64_t ticket) : host_(host), ticket_(host, ticket) {}
+    gathered_reply(const gathered_reply&) = delete;
+    gathered_reply& operator=(const gathered_reply&) = delete;
+
+    /// Reads the reply to the first attempt. False if it has another form.
+    bool read(std::string_view json) {
+        json_reader r{json, detail::answer_depth};
+        const auto take = [&r](outcomes& into) {
+            return read_members(r, [&](std::string_view key) {
+                const std::string node{key};
+                std::string_view raw;
+                return r.read_raw(raw) && into.insert_or_assign(node, std::string{raw}).second;
+            });
+        };
+        return read_members(r,
+                            [&](std::string_view key) {
+                                return key == "results" ? take(results_) : key == "errors" ? take(errors_) : r.skip();
+                            }) &&
+               r.at_end();
+    }
+    [[nodiscard]] const std::map<std::string, std::string>& errors() const noexcept { return errors_; }
+    /// Completes `operation` after this many outcomes.
+    void take(detail::pending_ptr operation, std::size_t open) noexcept {
+        operation_ = std::move(operation);
+        open_ = open;
+    }
+    void on_result(const std::string& node, std::string_view json) {
+        errors_.erase(node);
+        results_.insert_or_assign(node, std::string{json});
+        finish_one();
+    }
+    void on_cancelled(std::string_view message) {
+        if (const auto host = host_.lock(); host && operation_) {
+            host->completions().fail(std::move(operation_), errc::cancelled, message);
+        }
+    }
+    void on_error(const std::string& node, std::string_view json) {
+        errors_.insert_or_assign(node, std::string{json});
+        finish_one();
+    }
+
+  private:
+    using outcomes = std::map<std::string, std::string>;
+
+    void finish_one() {
+        if (--open_ != 0) {
+            return;
+        }
+        if (const auto host = host_.lock(); host && operation_) {
+            host->completions().succeed(std::move(operation_), text());
+        }
+    }
+    static std::string members(const outcomes& all) {
+        std::string text;
+        for (const auto& [node, json] : all) {
+            text.append(text.empty() ? "\"" : ",\"").append(node).append("\":").append(json);
+        }
+        return text;
+    }
+    [[nodiscard]] std::string text() const {
+        return R"({"results":{)" + members(results_) + R"(},"errors":{)" + members(errors_) + "}}";
+    }
+
+    std::weak_ptr<local_node> host_;
+    noted_ticket ticket_;
+    detail::pending_ptr operation_;
+    outcomes results_;
+    outcomes errors_;
+    std::size_t open_ = 0;
+};
+
+class part_of_gathered final : public detail::pending {
+  public:
+    part_of_gathered(std::shared_ptr<gathered_reply> whole, std::string node)
+        : whole_(std::move(whole)), node_(std::move(node)) {}
+
+    verdict offer(std::string_view json) override {
+        if (!detail::is_valid_answer(json)) {
+            return verdict::malformed;
+        }
+        const std::unique_ptr<part_of_gathered> self{this};
+        whole_->on_result(node_, json);
+        return verdict::completed;
+    }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::unique_ptr<part_of_gathered> self{this};
+        if (code == errc::cancelled) {
+            whole_->on_cancelled(message);
+            return;
+        }
+        const bool ours = code.category() == error_category();
+        whole_->on_error(node_, failure_text({.code = ours ? static_cast<errc>(code.value()) : errc::unavailable,
+                                              .message = node_ + ": " + std::string{message}}));
+    }
+    void refuse(boost::system::error_code, std::string_view, std::string_view answer) override {
+        const std::unique_ptr<part_of_gathered> self{this};
+        whole_->on_error(node_, answer);
+    }
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
+
+  private:
+    std::shared_ptr<gathered_reply> whole_;
+    std::string node_;
+};
+
+/// Completes its operation, unless the reply asks for a signature.
+class first_attempt final : public detail::pending {
+  public:
+    first_attempt(repeatable_request r, detail::pending_ptr operation)
+        : request_(std::move(r)), operation_(std::move(operation)) {}
+
+    verdict offer(std::string_view json) override {
+        std::unique_ptr<first_attempt> self{this};
+        if (request_.target == "all" && gather(json)) {
+            return verdict::completed;
+        }
+        auto* const operation = operation_.release();
+        const auto found = operation->offer(json);
+        if (found == verdict::malformed) {
+            operation_.reset(operation);
+            static_cast<void>(self.release());
+        }
+        return found;
+    }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        const std::unique_ptr<first_attempt> self{this};
+        operation_.release()->fail(code, message);
+    }
+    void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
+        const std::unique_ptr<first_attempt> self{this};
+        if (code != errc::denied || !repeat(answer)) {
+            operation_.release()->refuse(code, message, answer);
+        }
+    }
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
+
+  private:
+    bool repeat(std::string_view answer) {
+        const auto host = request_.host.lock();
+        auto* const signer = host ? host->signer() : nullptr;
+        if (signer == nullptr) {
+            return false;
+        }
+        std::string sig;
+        const auto node = signing_node(*host, request_, answer, sig);
+        if (!node) {
+            return false;
+        }
+        send_signed(*host, *signer, request_, *node, sig,
+                    detail::pending_ptr{new second_attempt(host, request_.ticket, std::move(operation_))},
+                    std::move(request_.progress));
+        return true;
+    }
+
+    bool gather(std::string_view json) {
+        const auto host = request_.host.lock();
+        auto* const signer = host ? host->signer() : nullptr;
+        if (signer == nullptr || json.find(R"("challenge":)") == std::string_view::npos) {
+            return false;
+        }
+        auto whole = std::make_shared<gathered_reply>(host, request_.ticket);
+        if (!whole->read(json)) {
+            return false;
+        }
+        std::map<std::string, std::string> signatures;
+        for (const auto& [node, error] : whole->errors()) {
+            std::string sig;
+            if (signing_node(*host, request_, error, sig) == node) {
+                signatures.emplace(node, std::move(sig));
+            }
+        }
+        if (signatures.empty()) {
+            return false;
+        }
+        whole->take(std::move(operation_), signatures.size());
+        for (const auto& [node, sig] : signatures) {
+            send_signed(*host, *signer, request_, node, sig, detail::pending_ptr{new part_of_gathered(whole, node)},
+                        {});
+        }
+        return true;
+    }
+
+    repeatable_request request_;
+    detail::pending_ptr operation_;
+};
+
+} // namespace
+
+detail::pending_ptr request_signer::watch(const outgoing& r, detail::pending_ptr operation) {
+    if (r.noun.task == "cles") { // never signed
+        return operation;
+    }
+    return detail::pending_ptr{new first_attempt({.host = host_.weak_from_this(),
+                                                  .how = r.how,
+                                                  .target = std::string{r.noun.target},
+                                                  .path = std::string{r.noun.path},
+                                                  .body = std::string{protocol::trim(r.body)},
+                                                  .at = r.options.at_,
+                                                  .urgent = r.options.urgent_,
+                                                  .progress = r.options.on_progress_,
+                                                  .deadline = r.deadline,
+                                                  .ticket = r.ticket},
+                                                 std::move(operation))};
+}
+
+bool request_signer::cancel(std::uint64_t ticket) {
+    const auto found = repeated_.find(ticket);
+    if (found == repeated_.end()) {
+        return false;
+    }
+    for (const auto id : std::vector{found->second}) { // each may end the entry
+        host_.cancel_sent(id);
+    }
+    return true;
+}
+
+} // namespace cles::core
