@@ -34,6 +34,7 @@ class scripted_security final : public core::node_security {
                                  std::string_view epoch, std::string_view body, std::string_view sig) const override {
         return sig == signature(publisher, path, seq, epoch, body);
     }
+    [[nodiscard]] std::string new_challenge() const override { return challenge; }
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override {
         return port;
     }
@@ -74,6 +75,7 @@ class scripted_security final : public core::node_security {
     std::set<std::string> members{"car1", "car2", "car3", "sat1"};
     std::set<std::string> denied;             ///< "car2 PULL car1:speed"
     std::set<std::string> forwarders{"car1"}; ///< for everybody
+    std::string challenge = "AAAAAAAAAAAAAAAAAAAAAA";
     std::uint32_t version = 7;
     std::string line = "{\"signature\":\"s\",\"roster\":{}}";
 

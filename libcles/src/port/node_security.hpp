@@ -71,6 +71,8 @@ class node_security {
                                                   std::string_view body) const = 0;
     [[nodiscard]] virtual bool is_signed(std::string_view publisher, std::string_view path, std::uint64_t seq,
                                          std::string_view epoch, std::string_view body, std::string_view sig) const = 0;
+    /// Random, for another node to sign.
+    [[nodiscard]] virtual std::string new_challenge() const = 0;
     /// A port that seals what it sends with that one, and delivers what it can open, with its sender.
     [[nodiscard]] virtual std::shared_ptr<group_port> seal(std::shared_ptr<group_port> port) = 0;
 

@@ -120,6 +120,8 @@ bool secured_node::is_signed(std::string_view publisher, std::string_view path, 
                   signed_update{.publisher = publisher, .noun = path, .seq = seq, .epoch = epoch, .body = body}, sig);
 }
 
+std::string secured_node::new_challenge() const { return security::new_challenge(); }
+
 std::shared_ptr<core::group_port> secured_node::seal(std::shared_ptr<core::group_port> port) {
     return std::make_shared<sealed_group_port>(datagrams_, std::move(port),
                                                [this](std::uint32_t member, const std::vector<std::string>& endpoints) {

@@ -49,6 +49,7 @@ class secured_node final : public core::node_security {
                                           std::string_view body) const override;
     [[nodiscard]] bool is_signed(std::string_view publisher, std::string_view path, std::uint64_t seq,
                                  std::string_view epoch, std::string_view body, std::string_view sig) const override;
+    [[nodiscard]] std::string new_challenge() const override;
     [[nodiscard]] std::shared_ptr<core::group_port> seal(std::shared_ptr<core::group_port> port) override;
     [[nodiscard]] std::uint32_t roster_version() const override { return fleet_->in_force().version(); }
     [[nodiscard]] const std::string& roster_line() const override { return fleet_->in_force().line(); }
