@@ -34,7 +34,7 @@ class scripted_security final : public core::node_security {
                                  std::string_view epoch, std::string_view body, std::string_view sig) const override {
         return sig == signature(publisher, path, seq, epoch, body);
     }
-    [[nodiscard]] std::string new_challenge() const override { return "challenge" + std::to_string(++challenges); }
+    [[nodiscard]] std::string new_challenge() const override { return challenge.empty() ? "challenge" + std::to_string(++challenges) : challenge; }
     [[nodiscard]] std::string sign_request(std::string_view node, std::string_view challenge, verb how,
                                            std::string_view path, std::string_view body) const override {
         return challenge.starts_with("challenge") ? request_signature(self, node, challenge, how, path, body)
@@ -95,6 +95,7 @@ class scripted_security final : public core::node_security {
     std::set<std::string> forwarders{"car1"}; ///< for everybody
     std::string self = "car1";                ///< whose security this is
     mutable int challenges = 0;               ///< that were drawn
+    std::string challenge{};                  ///< if it is set, the one that is always drawn
     std::uint32_t version = 7;
     std::string line = "{\"signature\":\"s\",\"roster\":{}}";
 

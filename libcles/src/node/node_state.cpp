@@ -14,7 +14,7 @@ node_state::node_state(node_options setup, const core::clock& source, const std:
       started(source.now()), completions(std::move(setup.complete)), memory(bounds.memory),
       kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
       kept_requests(std::make_shared<memory_account>(memory)), peers(name, setup.epoch, deadlines, bounds.peers),
-      unsent(wake),
+      confirmed(bounds.peers), unsent(wake),
       published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch, unsent),
       unsent_relayed(wake), remembered{.limit = bounds.remembered},
       challenges(security ? std::make_unique<request_challenges>(*this) : nullptr) {

@@ -10,6 +10,7 @@
 #include "node/base/deadlines.hpp"
 #include "node/base/memory_budget.hpp"
 #include "node/base/metrics.hpp"
+#include "node/membership/confirmed_epochs.hpp"
 #include "node/membership/membership.hpp"
 #include "node/publish/publications.hpp"
 #include "node/session/datagram_rules.hpp"
@@ -74,6 +75,7 @@ struct node_state {
     task_registry tasks;
     deadline_queue deadlines;
     membership peers;
+    confirmed_epochs confirmed;         ///< if it is secured
     gossip* gossip_responder = nullptr; ///< answers gossip requests; null if this node does not gossip
     counters counts;
     latency_histogram handler_time; ///< of all handlers that reply later, and of a sample of the others

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Tables of nodes from other nodes, one a line: what is accepted stays within its limits, what is sent in turn can be
-// read, and a node that repeatedly asks for changes finally receives everything.
+// read, and a node that repeatedly asks for changes finally receives everything. If the first line is "signed", they
+// are those of a secured fleet; whether signatures are valid is not part of this.
 
 #include <cles/json_reader.hpp>
 
@@ -10,6 +11,7 @@
 #include "protocol/grammar.hpp"
 
 #include <chrono>
+#include <memory>
 #include <string>
 
 namespace cles::fuzz {
@@ -17,12 +19,16 @@ namespace {
 
 using std::chrono::milliseconds;
 
+using core::entry_form;
+
 constexpr std::size_t most_peers = 4;
 
 // Reads a table and applies it to `table`. Returns false if it is not valid.
-bool learn(core::membership& table, std::string_view text, std::size_t most, time_point now, core::peer_table& read) {
-    const bool good = core::read_table(text, most, core::usual_interval, read);
+bool learn(core::membership& table, std::string_view text, std::size_t most, entry_form form, time_point now,
+           core::peer_table& read) {
+    const bool good = core::read_table(text, most, core::usual_interval, read, form);
     for (const auto& r : read.reports) {
+        require((r.announced.original != nullptr) == (form == entry_form::signed_by_node), "entries have one form");
         require(protocol::is_name(r.announced.node) && !protocol::is_reserved_target(r.announced.node),
                 "a node has a name");
         require(r.announced.endpoints.size() <= core::max_endpoints, "endpoints are bounded");
@@ -38,7 +44,7 @@ bool learn(core::membership& table, std::string_view text, std::size_t most, tim
 }
 
 // For another node that asks this one until there is nothing more.
-void check_told(const core::membership& table, time_point now) {
+void check_told(const core::membership& table, entry_form form, time_point now) {
     core::deadline_queue deadlines;
     core::membership other{"other", 2, deadlines, most_peers * 2};
     std::string since = "0";
@@ -50,16 +56,17 @@ void check_told(const core::membership& table, time_point now) {
         require(text.size() <= 1200, "an answer fits a datagram", text);
         require(is_valid_json(text), "an answer is JSON", text);
         core::peer_table read;
-        require(learn(other, text, 64, now, read), "an answer can be read", text);
+        require(learn(other, text, 64, form, now, read), "an answer can be read", text);
         require(!read.next.empty(), "an answer says what to ask with next", text);
         since = read.next;
         if (!read.more) {
             break;
         }
     }
-    table.for_each([&](const core::membership::member& k) {
-        require(k.suspect || k.node == "other" || other.find_member(k.node).has_value(), "who is live is told of",
-                k.node);
+    table.for_each([&](const core::membership::member& k) { // a signed entry may be too large for a datagram
+        require(form == entry_form::signed_by_node || k.suspect || k.node == "other" ||
+                    other.find_member(k.node).has_value(),
+                "who is live is told of", k.node);
     });
 }
 
@@ -69,7 +76,15 @@ void run(std::string_view input) {
     core::deadline_queue deadlines;
     core::membership table{"me", 1, deadlines, most_peers};
     time_point now{std::chrono::hours{1}};
-    table.announce_self({.node = "me", .endpoints = {"tcp://0.0.0.0:1"}}, 1, now);
+    constexpr std::string_view mark = "signed\n";
+    const auto form = input.starts_with(mark) ? entry_form::signed_by_node : entry_form::plain;
+    core::announcement own{.node = "me", .endpoints = {"tcp://0.0.0.0:1"}};
+    if (form == entry_form::signed_by_node) {
+        input.remove_prefix(mark.size());
+        own.original = std::make_shared<core::signed_announcement>(
+            core::signed_announcement{R"({"node":"me","endpoints":["tls://10.0.0.1:1"]})", "x"});
+    }
+    table.announce_self(own, 1, now);
     while (!input.empty()) {
         const auto end = input.find('\n');
         const auto line = input.substr(0, end);
@@ -77,10 +92,10 @@ void run(std::string_view input) {
         now += milliseconds{static_cast<int>(line.size()) * 3};
         deadlines.expire(now);
         core::peer_table read;
-        learn(table, line, 8, now, read);
+        learn(table, line, 8, form, now, read);
         require(read.reports.size() + read.beats.size() + read.bad_entries <= 16, "only so many entries count", line);
         require(table.size() <= most_peers, "the table is bounded", line);
-        check_told(table, now);
+        check_told(table, form, now);
         core::peer_report ignored;
         core::read_description(line, core::usual_interval, ignored);
     }

@@ -13,7 +13,8 @@
 namespace cles::core {
 namespace {
 
-constexpr std::size_t depth = 8; // allows for additions of later versions
+constexpr std::size_t depth = 8;               // allows for additions of later versions
+constexpr std::size_t bytes_of_signature = 91; // with its adverb and the space after it
 
 /// Reads an array of strings and passes each to `take`, valid during the call.
 template <class F>
@@ -224,22 +225,50 @@ bool read_announcement(const protocol::request_line& update, announcement& out, 
     return true;
 }
 
-void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch,
-                         const node_security* security) {
+bool read_announcement(std::string_view body, announcement& out) {
+    json_reader reader{body, depth};
+    return read_body(reader, out);
+}
+
+void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch) {
     const auto start = out.size();
     for (auto endpoints = std::min(said.endpoints.size(), max_endpoints);; --endpoints) {
         protocol::append_update_head(out, said.node, "cles", seq, epoch);
-        std::string body;
-        append_body(body, said, endpoints);
-        if (security != nullptr) {
-            out.append("sig=").append(security->sign_update("cles", seq, epoch, body)).append(" ");
-        }
-        out.append(body).push_back('\n');
+        append_body(out, said, endpoints);
+        out.push_back('\n');
         if (out.size() - start <= protocol::datagram_bytes || endpoints == 0) {
             return;
         }
         out.resize(start);
     }
+}
+
+std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::uint64_t seq,
+                                                             std::string_view epoch, const node_security& security) {
+    return sign_announcement(said, "cles", seq, epoch, security);
+}
+
+std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::string_view path,
+                                                             std::uint64_t seq, std::string_view epoch,
+                                                             const node_security& security) {
+    auto made = std::make_shared<signed_announcement>();
+    for (auto endpoints = std::min(said.endpoints.size(), max_endpoints);; --endpoints) {
+        made->body.clear();
+        append_body(made->body, said, endpoints);
+        std::string line;
+        protocol::append_update_head(line, said.node, path, seq, epoch);
+        if (line.size() + bytes_of_signature + made->body.size() < protocol::datagram_bytes || endpoints == 0) {
+            break;
+        }
+    }
+    made->sig = security.sign_update(path, seq, epoch, made->body);
+    return made;
+}
+
+void append_announcement(std::string& out, std::string_view node, const signed_announcement& said, std::uint64_t seq,
+                         std::string_view epoch) {
+    protocol::append_update_head(out, node, "cles", seq, epoch);
+    out.append("sig=").append(said.sig).append(" ").append(said.body).push_back('\n');
 }
 
 std::string digest_of_tasks(std::string_view json) {

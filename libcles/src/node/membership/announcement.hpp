@@ -13,6 +13,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -36,6 +37,14 @@ inline constexpr std::size_t max_sources = multicast_options::most_interfaces;
 /// The maximum time between two announcements of a node that knows this many others.
 std::chrono::milliseconds interval_among(std::size_t others) noexcept;
 
+/// An announcement as its node has signed it. Others pass it on unchanged.
+struct signed_announcement {
+    std::string body;
+    std::string sig;
+
+    bool operator==(const signed_announcement&) const = default;
+};
+
 struct announcement {
     std::string node;
     std::vector<std::string> endpoints{}; ///< as announced
@@ -46,20 +55,33 @@ struct announcement {
     std::string pool{}; ///< empty: the pool without a name
     /// The node's sources in the group, one per interface; empty if it uses one interface.
     std::vector<group_source> sources{};
-    std::uint32_t roster = 0;                ///< the version of its roster; 0: the node is not secured
-    std::vector<std::string> signed_tasks{}; ///< tasks whose updates it signs
+    std::uint32_t roster = 0;                              ///< the version of its roster; 0: the node is not secured
+    std::vector<std::string> signed_tasks{};               ///< tasks whose updates it signs
+    std::shared_ptr<const signed_announcement> original{}; ///< null: it is not signed
 };
 
 /// Reads an update of the noun `<node>:cles`. On failure returns false, and `why` contains the reason.
 bool read_announcement(const protocol::request_line& update, announcement& out, std::string& why);
 
+/// Reads its body. Returns false if it is malformed.
+bool read_announcement(std::string_view body, announcement& out);
+
 /// Reads the value of one key; an unknown key is skipped.
 bool read_announcement_member(json_reader& r, std::string_view key, announcement& out);
 
-/// Appends the line with its LF, at most 1200 bytes: endpoints that do not fit are omitted, the last first. With
-/// `security`, it is signed.
-void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch,
-                         const node_security* security = nullptr);
+/// Appends the line with its LF, at most 1200 bytes: endpoints that do not fit are omitted, the last first.
+void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch);
+
+/// Signs it. What it omits is the same as in the line.
+std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::uint64_t seq,
+                                                             std::string_view epoch, const node_security& security);
+/// The same for the reply to a question for the epoch: signed as an update of `path`.
+std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::string_view path,
+                                                             std::uint64_t seq, std::string_view epoch,
+                                                             const node_security& security);
+/// Appends the line of a signed announcement with its LF.
+void append_announcement(std::string& out, std::string_view node, const signed_announcement& said, std::uint64_t seq,
+                         std::string_view epoch);
 
 // Members that several kinds of entries have.
 
@@ -78,7 +100,7 @@ bool read_interval(json_reader& r, std::chrono::milliseconds& out);
 /// Digest for comparing lists of tasks: FNV-1a, 64 bits, in hex, of `tasks` in the reply to `PULL self:cles`.
 std::string digest_of_tasks(std::string_view json);
 
-/// An entry received by gossip: the last announcement of a node, and its age.
+/// An entry received by gossip: an announcement of a node, and the age of its last one.
 struct peer_report {
     announcement announced;
     std::uint32_t epoch = 0;

@@ -155,10 +155,14 @@ void discovery::leave() {
         return;
     }
     announcer_.stop();
+    const bool is_secured = host_.node().security != nullptr;
+    if (is_secured && seq_ != 0) {
+        announce(usual_interval, true); // gossip sends what was signed
+    }
     if (gossip_) {
         gossip_->leave(host_.now());
     }
-    if (group_ != nullptr && seq_ != 0) {
+    if (group_ != nullptr && !is_secured && seq_ != 0) {
         announce(usual_interval, true);
     }
 }
@@ -199,6 +203,10 @@ void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
                       .pool = node.peers.pool(),
                       .roster = node.security ? node.security->roster_version() : 0,
                       .signed_tasks = node.security ? node.tasks.signed_tasks() : std::vector<std::string>{}};
+    if (node.security) {
+        announce_signed(said);
+        return;
+    }
     ++seq_;
     if (gossip_ && !leaving) {
         said.endpoints = endpoints_for_gossip();
@@ -212,19 +220,48 @@ void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
 // By each interface with the endpoints usable there, and with the same `seq`, since it is one announcement.
 void discovery::announce_to_group(announcement& said) {
     auto& node = host_.node();
-    if (const auto& ports = group_->ports(); ports.size() > 1) {
-        for (const auto* port : ports) {
-            said.sources.push_back(port->source());
-        }
-    }
+    said.sources = sources_in_group();
     bool sent = false;
     for (auto* port : group_->ports()) {
-        said.endpoints = node.security ? endpoints_of_interfaces() : endpoints_for_group(port->source().is_loopback());
+        said.endpoints = endpoints_for_group(port->source().is_loopback());
         std::string line;
-        append_announcement(line, said, seq_, node.epoch, node.security.get());
+        append_announcement(line, said, seq_, node.epoch);
         sent = group_->send(*port, line) || sent;
     }
     node.counts.announcements_sent += sent ? 1 : 0;
+}
+
+// The same by all interfaces and by gossip. By gossip alone, it is signed again only when there is something new in it.
+void discovery::announce_signed(announcement& said) {
+    auto& node = host_.node();
+    said.endpoints = endpoints_of_interfaces();
+    if (group_ != nullptr) {
+        said.sources = sources_in_group();
+    }
+    if (group_ != nullptr || node.peers.has_news(said)) {
+        ++seq_;
+        said.original = sign_announcement(said, seq_, node.epoch, *node.security);
+    } else {
+        said.original = node.peers.own()->announced.original;
+    }
+    if (gossip_) {
+        node.peers.announce_self(said, seq_, host_.now());
+    }
+    if (group_ != nullptr) {
+        std::string line;
+        append_announcement(line, node.name, *said.original, seq_, node.epoch);
+        node.counts.announcements_sent += group_->send(line) ? 1 : 0;
+    }
+}
+
+std::vector<group_source> discovery::sources_in_group() const {
+    std::vector<group_source> result;
+    if (const auto& ports = group_->ports(); ports.size() > 1) {
+        for (const auto* port : ports) {
+            result.push_back(port->source());
+        }
+    }
+    return result;
 }
 
 // Readers ignore the endpoints that they cannot use.
@@ -269,6 +306,7 @@ std::vector<std::string> discovery::endpoints_of_interfaces() const {
             result.push_back(std::move(text));
         }
     };
+    std::optional<std::vector<std::string>> hosts;
     for (const auto& endpoint : host_.node().endpoints) {
         auto where = parse_url(endpoint);
         if (where.scheme == "inproc" || where.scheme == "unix") {
@@ -278,9 +316,44 @@ std::vector<std::string> discovery::endpoints_of_interfaces() const {
             add(where);
             continue;
         }
-        for (const auto* port : group_ != nullptr ? group_->ports() : std::vector<group_port*>{}) {
-            where.host = host_text(port->source());
+        if (!hosts) {
+            hosts = own_hosts();
+        }
+        if (where.host == "::") { // IPv6 only, and the addresses are IPv4
+            continue;
+        }
+        for (const auto& host : *hosts) {
+            where.host = host;
             add(where);
+        }
+    }
+    return result;
+}
+
+// The addresses by which others may reach this node: those that it uses in the group, and with gossip all.
+std::vector<std::string> discovery::own_hosts() const {
+    std::vector<std::string> result;
+    const auto add = [&](const group_source& source) {
+        if (auto text = host_text(source); std::ranges::find(result, text) == result.end()) {
+            result.push_back(std::move(text));
+        }
+    };
+    for (const auto* port : group_ != nullptr ? group_->ports() : std::vector<group_port*>{}) {
+        add(port->source());
+    }
+    if (gossip_) {
+        try {
+            const auto all = host_.environment().interfaces();
+            for (const bool loopback : {false, true}) {
+                for (const auto& each : all) {
+                    if (each.running && each.address != 0 && each.loopback == loopback &&
+                        !(loopback && !result.empty())) {
+                        add({.address = each.address});
+                    }
+                }
+            }
+        } catch (const boost::system::system_error& e) {
+            host_.post_log(log_level::warning, std::string{"cannot list the interfaces of this host: "} + e.what());
         }
     }
     return result;
@@ -306,6 +379,10 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
         ++counts.announcements_dropped;
         host_.post_log(log_level::debug, "an announcement from " + host_text(from) + " was dropped: " + why);
         return;
+    }
+    if (host_.node().security) {
+        said.original = std::make_shared<signed_announcement>(
+            signed_announcement{std::string{update.body}, std::string{update.sig}});
     }
     if (!group_->is_of_this_host(from)) { // the loopback of another host
         std::erase_if(said.sources, [](const group_source& each) { return each.is_loopback(); });
@@ -425,20 +502,22 @@ void discovery::follow_incarnation(const std::string& name) {
 // The reply is used in a task of its own, because the link that delivered it must be done with it before it is released
 // and others are notified.
 void discovery::probe(std::uint64_t ticket, const std::string& url) {
-    const auto use_later = [ticket, url](local_node& host, const peer_answer& answer) {
+    // In a fleet, only the node that has the name can answer.
+    const std::string name{host_.node().security ? host_.node().peers.probed_name(ticket) : std::string_view{}};
+    const auto use_later = [ticket, url, name](local_node& host, const peer_answer& answer) {
         auto found = answer.refused ? probe_outcome{}
                      : answer.code  ? failed_probe(answer.code)
                                     : read_probe_answer(answer.json);
-        post(host.environment(), [weak = host.weak_from_this(), ticket, url, found = std::move(found)] {
+        post(host.environment(), [weak = host.weak_from_this(), ticket, url, name, found = std::move(found)] {
             if (const auto alive = weak.lock(); alive && !alive->stopped()) {
                 alive->node().peers.on_probed(ticket, found, alive->now());
-                alive->peer_channels().release(url);
+                alive->peer_channels().release(url, name);
             }
         });
     };
-    host_.peer_channels().send("self", url, {.verb = verb::pull, .noun = "self:cles"},
-                               host_.now() + name_conflicts::probe_limit,
-                               detail::pending_ptr{new peer_reply{host_.weak_from_this(), use_later, true}}, {});
+    host_.peer_channels().send_to_node(name, url, {.verb = verb::pull, .noun = "self:cles"},
+                                       host_.now() + name_conflicts::probe_limit,
+                                       detail::pending_ptr{new peer_reply{host_.weak_from_this(), use_later, true}});
 }
 
 bool discovery::expects_more_of(std::string_view node) const noexcept {

@@ -184,6 +184,9 @@ class discovery final : private announcement_listener, private membership::watch
     void probe(std::uint64_t ticket, const std::string& url);
     void follow_incarnation(const std::string& name);
     void announce_to_group(announcement& said);
+    void announce_signed(announcement& said);
+    [[nodiscard]] std::vector<group_source> sources_in_group() const;
+    [[nodiscard]] std::vector<std::string> own_hosts() const;
     [[nodiscard]] std::vector<std::string> endpoints_for_group(bool loopback) const;
     [[nodiscard]] std::vector<std::string> endpoints_of_interfaces() const;
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;

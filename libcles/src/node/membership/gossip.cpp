@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/gossip.hpp"
 
+#include "port/node_security.hpp"
 #include "protocol/request_line.hpp"
 
 #include <algorithm>
@@ -18,9 +19,9 @@ bool can_be_asked(const membership::member& k) noexcept { return !k.suspect && !
 } // namespace
 
 gossip::gossip(self who, client& out, membership& others, counters& counts, deadline_queue& deadlines, std::size_t most,
-               std::uint32_t seed)
-    : self_(std::move(who)), out_(out), others_(others), counts_(counts), deadlines_(deadlines), jitter_(seed),
-      seeds_(seed * 3 + 1), lost_(most, seed * 5 + 2) {}
+               std::uint32_t seed, const node_security* security)
+    : self_(std::move(who)), out_(out), others_(others), counts_(counts), deadlines_(deadlines), security_(security),
+      jitter_(seed), seeds_(seed * 3 + 1), lost_(most, seed * 5 + 2) {}
 
 void gossip::start(time_point now) {
     started_ = true;
@@ -79,7 +80,7 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
         return;
     }
     peer_table table;
-    const bool good = read_table(json, others_.max_peers() * 2 + 2, interval(), table);
+    const bool good = read(json, others_.max_peers() * 2 + 2, table);
     auto found = apply(table, observed_source::at(c->url), c->sent, now);
     if (!good) {
         on_failure(ticket, now);
@@ -170,7 +171,7 @@ void gossip::write_delta(json_writer& w, const table_question& asked, std::size_
 
 bool gossip::on_pushed_table(std::string_view json, const observed_source& by, time_point now) {
     peer_table table;
-    const bool good = read_table(json, max_pushed_entries, interval(), table);
+    const bool good = read(json, max_pushed_entries, table);
     auto found = apply(table, by, now, now);
     if (started_ && !found.newcomer.empty() && !unknown_peer_) {
         unknown_peer_ = std::move(found.newcomer);
@@ -199,10 +200,36 @@ gossip::learned gossip::apply(const peer_table& table, const observed_source& by
     return found;
 }
 
+bool gossip::read(std::string_view json, std::size_t max_entries, peer_table& table) const {
+    const auto form = security_ != nullptr ? entry_form::signed_by_node : entry_form::plain;
+    return read_table(json, max_entries, interval(), table, form);
+}
+
 membership::verdict gossip::apply(const peer_report& report, const observed_source& by, time_point asked,
                                   time_point now) {
+    if (security_ != nullptr) {
+        return apply_signed(report, by, asked, now);
+    }
     const auto verdict = others_.apply_gossip(report, by, asked, now);
     counts_.peers_refused += verdict == membership::verdict::refused ? 1 : 0;
+    return verdict;
+}
+
+// The path that the entry took says nothing about the node's address; only that a loopback address may be of this host.
+membership::verdict gossip::apply_signed(const peer_report& report, const observed_source& by, time_point asked,
+                                         time_point now) {
+    const auto& said = report.announced;
+    if (!said.original || (!others_.holds(report) &&
+                           !security_->is_signed(said.node, "cles", report.seq, protocol::epoch_text(report.epoch),
+                                                 said.original->body, said.original->sig))) {
+        ++counts_.entries_dropped;
+        return membership::verdict::old;
+    }
+    const auto verdict = others_.apply_gossip(report, {.host = {}, .local = by.local}, asked, now);
+    counts_.peers_refused += verdict == membership::verdict::refused ? 1 : 0;
+    if (verdict == membership::verdict::taken && said.roster != 0) {
+        out_.on_stated_roster(said.node, said.roster);
+    }
     return verdict;
 }
 

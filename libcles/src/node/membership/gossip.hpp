@@ -47,6 +47,8 @@ class gossip : private deadline {
         virtual void push(std::string_view url, std::string_view table) = 0;
         /// No requests follow at `url` for a while.
         virtual void release(std::string_view url) = 0;
+        /// A signed announcement states this version of its node's roster.
+        virtual void on_stated_roster(std::string_view, std::uint32_t) {}
 
       protected:
         ~client() = default;
@@ -66,8 +68,9 @@ class gossip : private deadline {
         std::string epoch; ///< as text
     };
 
+    /// `security`: null if the node is not secured; otherwise only signed entries count.
     gossip(self who, client& out, membership& others, counters& counts, deadline_queue& deadlines, std::size_t most,
-           std::uint32_t seed);
+           std::uint32_t seed, const node_security* security = nullptr);
 
     virtual ~gossip() = default;
 
@@ -104,6 +107,9 @@ class gossip : private deadline {
     };
     learned apply(const peer_table& table, const observed_source& by, time_point asked, time_point now);
     membership::verdict apply(const peer_report& report, const observed_source& by, time_point asked, time_point now);
+    membership::verdict apply_signed(const peer_report& report, const observed_source& by, time_point asked,
+                                     time_point now);
+    bool read(std::string_view json, std::size_t max_entries, peer_table& table) const;
 
     void on_deadline(time_point now) override;
     void review(time_point now);
@@ -128,6 +134,7 @@ class gossip : private deadline {
     membership& others_;
     counters& counts_;
     deadline_queue& deadlines_;
+    const node_security* security_;
     jitter jitter_;
     seeds seeds_;
     lost_nodes lost_;

@@ -20,7 +20,7 @@ class gossip_driver final : private gossip::client, public gossip {
   public:
     gossip_driver(local_node& host, std::uint32_t seed)
         : gossip({host.node().name, host.node().epoch}, *this, host.node().peers, host.node().counts, host.deadlines(),
-                 host.bounds().peers, seed),
+                 host.bounds().peers, seed, host.node().security.get()),
           host_(host) {}
 
   private:
@@ -46,6 +46,10 @@ class gossip_driver final : private gossip::client, public gossip {
                 host->peer_channels().release(url);
             }
         });
+    }
+
+    void on_stated_roster(std::string_view node, std::uint32_t version) override {
+        host_.discovery().ask_for_roster(node, version, host_.now());
     }
 
     /// The operation of a request, whose reply is passed to `taken`. This lives as long as the node.

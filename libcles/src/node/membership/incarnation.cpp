@@ -19,20 +19,23 @@ incarnation incarnation::first(const sighting& w, std::uint64_t& numbers) {
 }
 
 // Gossip arrives by several paths, and nodes on each may have omitted endpoints. For one incarnation, only a longer
-// list replaces a shorter one; otherwise changes would circulate forever.
+// list replaces a shorter one; otherwise changes would circulate forever. Signed announcements arrive unchanged: the
+// list of the newest one counts.
 //
 // An incarnation received by several interfaces keeps the endpoints of the first one; otherwise each announcement would
 // move it.
 bool incarnation::apply_endpoints(const sighting& w) {
     const bool in_group = from != group_source{};
     const bool by_another = !w.is_from_gossip() && in_group && from != w.from;
-    if ((w.is_from_gossip() && in_group) || (by_another && !is_better_endpoint_source(w)) ||
+    if ((w.is_from_gossip() && in_group && !is_lost_in_group(w)) || (by_another && !is_better_endpoint_source(w)) ||
         (!w.is_from_gossip() && from == w.from && announced.endpoints == w.announced.endpoints)) {
         return false;
     }
     auto usable = reachable_endpoints(w.announced.endpoints, w.by);
     auto for_others = endpoints_to_relay(w.announced.endpoints, w.by);
-    if (w.is_from_gossip() && usable.size() <= endpoints.size() && for_others.size() <= relayed_endpoints.size()) {
+    const bool others_announced = w.is_signed() && announced.endpoints != w.announced.endpoints;
+    if (w.is_from_gossip() && !others_announced && usable.size() <= endpoints.size() &&
+        for_others.size() <= relayed_endpoints.size()) {
         return false;
     }
     if (by_another && usable.empty()) {
@@ -53,9 +56,14 @@ bool incarnation::is_better_endpoint_source(const sighting& w) const noexcept {
            w.announced_at - last_seen_at_source >= announced.interval * 7 / 2;
 }
 
+// A signed announcement shows where the node is as well as one that was received in the group.
+bool incarnation::is_lost_in_group(const sighting& w) const noexcept {
+    return w.is_signed() && w.announced_at - last_seen_at_source >= announced.interval * 7 / 2;
+}
+
 bool incarnation::on_repeat(const sighting& w) {
-    if (w.is_from_gossip()) {
-        return endpoints.empty() && apply_endpoints(w); // another path provides an address
+    if (w.is_from_gossip()) { // another path may provide an address
+        return endpoints.empty() && (!w.is_signed() || w.seq == seq) && apply_endpoints(w);
     }
     if (w.seq != seq) { // outdated
         return false;
@@ -79,13 +87,15 @@ bool incarnation::is_significant_load_change(const node_load& now) const noexcep
 void incarnation::apply(const sighting& w, std::uint64_t& numbers) {
     const bool placed = apply_endpoints(w);
     const bool describes = w.seq != 0 || !w.announced.tasks.empty();
-    if (placed || is_significant_load_change(w.announced.load) ||
+    if (placed || is_significant_load_change(w.announced.load) || announced.roster != w.announced.roster ||
         (describes && (announced.tasks != w.announced.tasks || announced.signed_tasks != w.announced.signed_tasks))) {
         described_revision = ++numbers;
         service_us = w.announced.load.service_us;
     }
     announced.node = w.announced.node;
     announced.pool = w.announced.pool;
+    announced.roster = w.announced.roster;
+    announced.original = w.announced.original;
     announced.load = w.announced.load;
     announced.interval = w.announced.interval;
     if (describes) {

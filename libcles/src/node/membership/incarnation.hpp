@@ -8,8 +8,10 @@
 #include "port/group_port.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -29,6 +31,12 @@ class tombstones {
         time_point until{};    ///< when this expires
         bool graceful = false; ///< it announced that it leaves
         std::uint64_t revision = 0;
+        std::shared_ptr<const signed_announcement> original{}; ///< its last signed announcement
+        time_point last_seen{}; ///< it counts as alive after all if it was seen later; for signed announcements only
+
+        [[nodiscard]] bool covers_hint(time_point announced_at) const noexcept {
+            return graceful || announced_at <= last_seen;
+        }
     };
 
     explicit tombstones(std::size_t most) noexcept : max_entries_(most) {}
@@ -44,6 +52,21 @@ class tombstones {
     [[nodiscard]] bool covers(std::uint32_t epoch, std::uint64_t seq) const noexcept {
         const auto found = entries_.find(epoch);
         return found != entries_.end() && seq <= found->second.seq;
+    }
+    /// The same for a signed announcement. Its `seq` stays the same while nothing changes, so the time shows whether a
+    /// node that had become silent is alive after all.
+    [[nodiscard]] bool covers_signed(std::string_view node, std::uint32_t epoch, std::uint64_t seq,
+                                     time_point announced_at) const noexcept {
+        const auto found = entries_.find(epoch);
+        return found != entries_.end() && found->second.node == node &&
+               (seq < found->second.seq || (seq == found->second.seq && found->second.covers_hint(announced_at)));
+    }
+    /// The same for a heartbeat.
+    [[nodiscard]] bool covers_heartbeat(std::uint32_t epoch, std::uint64_t seq,
+                                        time_point announced_at) const noexcept {
+        const auto found = entries_.find(epoch);
+        return found != entries_.end() &&
+               (found->second.original ? found->second.covers_hint(announced_at) : seq <= found->second.seq);
     }
     [[nodiscard]] const std::unordered_map<std::uint32_t, entry>& all() const noexcept { return entries_; }
 
@@ -87,6 +110,7 @@ struct sighting {
     const observed_source& by;
 
     [[nodiscard]] bool is_from_gossip() const noexcept { return from == group_source{}; }
+    [[nodiscard]] bool is_signed() const noexcept { return announced.original != nullptr; }
 };
 
 /// What is known of a node from one start to the next.
@@ -126,6 +150,19 @@ struct incarnation {
     [[nodiscard]] bool is_repeated_by(const sighting& w) const noexcept {
         return !w.is_from_gossip() && !announced.sources.empty() && w.seq == seq;
     }
+    /// Whether a sighting is newer than everything known. Of signed ones, only the `seq` counts.
+    [[nodiscard]] bool is_older_than(const sighting& w) const noexcept {
+        return w.is_signed() ? w.seq > seq : is_older_than(w.seq, w.announced_at);
+    }
+    /// Whether a signed announcement that is not newer, or a heartbeat, shows that the node was alive later.
+    [[nodiscard]] bool is_hinted_alive(time_point announced_at, std::chrono::milliseconds interval) const noexcept {
+        return announced.original != nullptr && announced_at >= last_seen + interval / 2;
+    }
+    /// The node was alive then, by a hint that is not signed.
+    void on_hint(time_point announced_at, std::uint64_t& numbers) noexcept {
+        last_seen = announced_at;
+        revision = ++numbers;
+    }
     /// Whether a sighting is newer than everything known.
     [[nodiscard]] bool is_older_than(std::uint64_t s, time_point announced_at) const noexcept {
         return seq != 0 && s != 0 ? s > seq : announced_at >= (s != 0 ? last_seen : last_seen + announced.interval / 2);
@@ -136,6 +173,7 @@ struct incarnation {
 
   private:
     [[nodiscard]] bool is_better_endpoint_source(const sighting& w) const noexcept;
+    [[nodiscard]] bool is_lost_in_group(const sighting& w) const noexcept;
 };
 
 /// A change of one incarnation to report. Views and pointers are valid until the table changes.
@@ -153,11 +191,12 @@ struct delta_entry {
     std::uint64_t seq = 0;
     time_point last_seen{};
     peer_state state = peer_state::live;
-    std::uint64_t revision = 0; ///< the order of changes
+    std::uint64_t revision = 0;                    ///< the order of changes
+    const signed_announcement* original = nullptr; ///< null: it is not signed
 
     static delta_entry of(kind what, std::string_view node, const incarnation& run, peer_state state) noexcept {
-        return {what,          node,  &run.announced, &run.relayed_endpoints, run.epoch, run.seq,
-                run.last_seen, state, run.revision};
+        return {what,    node,          &run.announced, &run.relayed_endpoints, run.epoch,
+                run.seq, run.last_seen, state,          run.revision,           run.announced.original.get()};
     }
 };
 

@@ -34,7 +34,9 @@ membership::verdict membership::apply_gossip(const peer_heartbeat& beat, time_po
         said.interval = beat.interval;
         said.load.queued = beat.queued;
         said.load.running = beat.running;
-        return take(sighting{said, beat.epoch, beat.seq, announced_at, {}, {}});
+        // The announcement itself is not newer if it is signed.
+        const auto seq = said.original ? r.seq : beat.seq;
+        return take(sighting{said, beat.epoch, seq, announced_at, {}, {}});
     };
     if (beat.epoch == own_epoch_) {
         return verdict::own;
@@ -45,7 +47,7 @@ membership::verdict membership::apply_gossip(const peer_heartbeat& beat, time_po
     }
     auto* const at = by_epoch_.find(beat.epoch);
     if (at == nullptr) {
-        return ended_.covers(beat.epoch, beat.seq) ? verdict::old : verdict::unknown;
+        return ended_.covers_heartbeat(beat.epoch, beat.seq, announced_at) ? verdict::old : verdict::unknown;
     }
     auto& e = at->second;
     if (e.owner.epoch != beat.epoch) {
@@ -56,18 +58,43 @@ membership::verdict membership::apply_gossip(const peer_heartbeat& beat, time_po
         }
         return result;
     }
-    if (!e.owner.is_older_than(beat.seq, announced_at)) {
+    auto& r = e.owner;
+    if (r.announced.original ? !is_hinted_alive(r, announced_at) : !r.is_older_than(beat.seq, announced_at)) {
         return verdict::old;
     }
-    auto& r = e.owner;
-    r.seq = std::max(r.seq, beat.seq);
+    if (!r.announced.original) { // otherwise only what is signed counts
+        r.seq = std::max(r.seq, beat.seq);
+        r.announced.interval = beat.interval;
+    }
     r.last_seen = std::max(r.last_seen, announced_at);
-    r.announced.interval = beat.interval;
     r.announced.load.queued = beat.queued;
     r.announced.load.running = beat.running;
     r.revision = ++revision_;
     on_owner_seen(*at, false, true, now);
     return verdict::taken;
+}
+
+bool membership::holds(const peer_report& report) const noexcept {
+    const auto found = peers_.find(report.announced.node);
+    if (found == peers_.end() || !report.announced.original) {
+        return false;
+    }
+    const auto is_of = [&](const incarnation& r) {
+        return r.epoch == report.epoch && r.seq == report.seq && r.announced.original &&
+               *r.announced.original == *report.announced.original;
+    };
+    const auto& e = found->second;
+    return is_of(e.owner) || (e.second && is_of(e.second->contender));
+}
+
+bool membership::has_news(const announcement& own) const noexcept {
+    if (!own_) {
+        return true;
+    }
+    const auto& last = own_->announced;
+    return last.endpoints != own.endpoints || last.tasks != own.tasks || last.roster != own.roster ||
+           last.leaving != own.leaving || last.signed_tasks != own.signed_tasks ||
+           own_->is_significant_load_change(own.load);
 }
 
 void membership::announce_self(const announcement& own, std::uint64_t seq, time_point now) {
@@ -78,8 +105,7 @@ void membership::announce_self(const announcement& own, std::uint64_t seq, time_
         own_->described_revision = ++revision_;
     }
     auto& r = *own_;
-    if (r.announced.endpoints != own.endpoints || r.announced.tasks != own.tasks ||
-        r.is_significant_load_change(own.load)) {
+    if (has_news(own)) {
         r.described_revision = ++revision_;
         r.service_us = own.load.service_us;
     }
@@ -113,7 +139,7 @@ membership::verdict membership::take_sighting(const sighting& w, time_point now)
     if (own_name && w.epoch == own_epoch_) {
         return verdict::own;
     }
-    if (ended_.covers(w.announced.node, w.epoch, w.seq)) {
+    if (is_of_ended(w)) {
         return verdict::old;
     }
     if (own_name) {
@@ -163,9 +189,20 @@ membership::verdict membership::take_sighting(const sighting& w, time_point now)
     return verdict::taken;
 }
 
+// Whether it was announced before that incarnation ended, or may have been.
+bool membership::is_of_ended(const sighting& w) const noexcept {
+    return w.is_signed() ? ended_.covers_signed(w.announced.node, w.epoch, w.seq, w.announced_at)
+                         : ended_.covers(w.announced.node, w.epoch, w.seq);
+}
+
 membership::verdict membership::take_owner_sighting(entries::iterator at, const sighting& w, time_point now) {
     auto& r = at->second.owner;
-    if (!r.is_older_than(w.seq, w.announced_at)) {
+    if (!r.is_older_than(w)) {
+        if (w.is_from_gossip() && is_hinted_alive(r, w.announced_at)) {
+            r.on_hint(w.announced_at, revision_);
+            on_owner_seen(*at, r.on_repeat(w), true, now);
+            return verdict::taken;
+        }
         const auto result = r.is_repeated_by(w) ? verdict::duplicate : verdict::old;
         if (r.on_repeat(w)) {
             r.described_revision = r.revision = ++revision_;
@@ -176,6 +213,7 @@ membership::verdict membership::take_owner_sighting(entries::iterator at, const 
     }
     if (w.announced.leaving) {
         r.seq = w.seq;
+        r.announced.original = w.announced.original;
         end(at, change::left, now);
         return verdict::taken;
     }
@@ -223,21 +261,28 @@ membership::verdict membership::take_own_name_sighting(const sighting& w, time_p
 membership::verdict membership::take_conflicting_sighting(std::unique_ptr<name_conflict>& second, const sighting& w,
                                                           time_point now) {
     if (second && second->contender.matches(w.epoch, w.from)) {
-        if (!second->contender.is_older_than(w.seq, w.announced_at)) {
+        if (!second->contender.is_older_than(w)) {
+            if (w.is_from_gossip() && is_hinted_alive(second->contender, w.announced_at)) {
+                second->contender.on_hint(w.announced_at, revision_);
+                follow(suspect_at(second->contender));
+                return verdict::taken;
+            }
             const auto result = second->contender.is_repeated_by(w) ? verdict::duplicate : verdict::old;
             second->contender.on_repeat(w);
             return result;
         }
         if (w.announced.leaving) {
             second->contender.seq = w.seq;
+            second->contender.announced.original = w.announced.original;
             remember(w.announced.node, second->contender, true, now);
             second.reset();
             return verdict::taken;
         }
         second->contender.apply(w, revision_);
         follow(suspect_at(second->contender));
-        // A single announcement may be a late one, of an incarnation that has ended.
-        if (second->owner_seen_since) {
+        // A single announcement may be a late one, of an incarnation that has ended. Signed ones can be repeated by
+        // others: only the probes decide.
+        if (second->owner_seen_since && !(w.is_signed() && w.is_from_gossip())) {
             report_conflict(*second);
         }
         return verdict::taken;
@@ -335,17 +380,30 @@ membership::verdict membership::take_leave(const sighting& w, time_point now) {
     const auto at = peers_.find(w.announced.node);
     if (at != peers_.end() && at->second.owner.epoch == w.epoch) {
         auto& r = at->second.owner;
-        if (r.from != group_source{} || w.seq < r.seq) { // it would have left in the group
+        // Without a signature, it would have left in the group.
+        if (w.is_signed() ? w.seq <= r.seq : r.from != group_source{} || w.seq < r.seq) {
             return verdict::old;
         }
         r.seq = w.seq;
+        r.announced.original = w.announced.original;
         end(at, change::left, now);
         return verdict::taken;
     }
     if (at != peers_.end() && at->second.second && at->second.second->contender.epoch == w.epoch) {
+        if (w.is_signed() && w.seq <= at->second.second->contender.seq) {
+            return verdict::old;
+        }
         drop_second(at);
     }
-    ended_.add(w.epoch, {w.announced.node, w.seq, w.announced_at, until, true, ++revision_}, now);
+    ended_.add(w.epoch,
+               {.node = w.announced.node,
+                .seq = w.seq,
+                .at = w.announced_at,
+                .until = until,
+                .graceful = true,
+                .revision = ++revision_,
+                .original = w.announced.original},
+               now);
     return verdict::taken;
 }
 
@@ -389,8 +447,14 @@ void membership::drop_second(entries::iterator at) {
 void membership::remember(const std::string& node, const incarnation& over, bool graceful, time_point now) {
     if (over.seq != 0 || graceful) { // without `seq`, past and future announcements look the same
         ended_.add(over.epoch,
-                   {node, over.seq, now, now + interval_of(over.announced, over.from) * 15, graceful,
-                    graceful ? ++revision_ : 0},
+                   {.node = node,
+                    .seq = over.seq,
+                    .at = now,
+                    .until = now + interval_of(over.announced, over.from) * 15,
+                    .graceful = graceful,
+                    .revision = graceful ? ++revision_ : 0,
+                    .original = over.announced.original,
+                    .last_seen = over.last_seen + interval_of(over.announced, over.from) / 2},
                    now);
     }
 }
@@ -539,7 +603,8 @@ std::vector<delta_entry> membership::deltas_since(std::uint64_t revision, time_p
                              .epoch = epoch,
                              .seq = ended.seq,
                              .last_seen = ended.at,
-                             .revision = ended.revision});
+                             .revision = ended.revision,
+                             .original = ended.original.get()});
         }
     }
     std::sort(items.begin(), items.end(), [](const auto& a, const auto& b) { return a.revision < b.revision; });

@@ -99,12 +99,20 @@ class membership final : private deadline {
     /// Applies what another node reported. `asked`: when the request for it was sent; ages count from then.
     verdict apply_gossip(const peer_report& report, const observed_source& by, time_point asked, time_point now);
     verdict apply_gossip(const peer_heartbeat& beat, time_point asked, time_point now);
+    /// Whether that signed announcement is known already.
+    [[nodiscard]] bool holds(const peer_report& report) const noexcept;
+    /// Whether this node's own announcement has changed by more than heartbeats report.
+    [[nodiscard]] bool has_news(const announcement& own) const noexcept;
     /// Records this node's own announcement. From now on it is reported to others.
     void announce_self(const announcement& own, std::uint64_t seq, time_point now);
     /// Records that this node leaves. From now on it is reported as left.
     void leave(time_point now);
     /// This node as last announced; null before the first `announce_self`.
     [[nodiscard]] const incarnation* own() const noexcept { return own_ ? &*own_ : nullptr; }
+    /// The name for which a probe was sent; empty if the ticket is unknown.
+    [[nodiscard]] std::string_view probed_name(std::uint64_t ticket) const noexcept {
+        return conflicts_.probed_name(ticket);
+    }
     /// The outcome of a probe.
     void on_probed(std::uint64_t ticket, const probe_outcome& found, time_point now);
     /// The URL of the second live node of that name; nothing unless both have answered a probe.
@@ -180,6 +188,10 @@ class membership final : private deadline {
     verdict take_own_name_sighting(const sighting& w, time_point now);
     verdict take_conflicting_sighting(std::unique_ptr<name_conflict>& second, const sighting& w, time_point now);
     verdict take_leave(const sighting& w, time_point now);
+    [[nodiscard]] bool is_of_ended(const sighting& w) const noexcept;
+    [[nodiscard]] bool is_hinted_alive(const incarnation& r, time_point announced_at) const {
+        return r.is_hinted_alive(announced_at, interval_of(r.announced, r.from));
+    }
     void swap_with_contender(entries::iterator at);
     void confirm_conflict(name_conflict& conflict);
     void report_conflict(name_conflict& conflict);

@@ -79,6 +79,11 @@ void name_conflicts::check_own_name(const std::string& name, name_conflict& conf
     }
 }
 
+std::string_view name_conflicts::probed_name(std::uint64_t ticket) const noexcept {
+    const auto found = probes_.find(ticket);
+    return found == probes_.end() ? std::string_view{} : found->second;
+}
+
 std::optional<std::string> name_conflicts::take_probe(std::uint64_t ticket) {
     auto asked = probes_.extract(ticket);
     return asked ? std::optional{std::move(asked.mapped())} : std::nullopt;

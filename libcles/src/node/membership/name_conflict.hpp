@@ -93,6 +93,8 @@ class name_conflicts {
     void check_owner(const std::string& name, const incarnation& owner, name_conflict& conflict, time_point now);
     /// The contender of this node's own name was received: probes it, once. The owner is live.
     void check_own_name(const std::string& name, name_conflict& conflict, time_point now);
+    /// The name for which that probe was sent; empty if the ticket is unknown.
+    [[nodiscard]] std::string_view probed_name(std::uint64_t ticket) const noexcept;
     /// The name for which that probe was sent, once; nothing if the ticket is unknown.
     std::optional<std::string> take_probe(std::uint64_t ticket);
     /// The outcome of the last probe for `conflict`.

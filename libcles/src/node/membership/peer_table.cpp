@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <utility>
 
@@ -23,8 +24,25 @@ std::int64_t age_of(time_point last_seen, time_point now) {
     return std::max<std::int64_t>(0, std::chrono::ceil<milliseconds>(now - last_seen).count());
 }
 
+void write_signed_entry(json_writer& w, const delta_entry& item, time_point now) {
+    const bool left = item.what == delta_entry::kind::leave || (item.announced != nullptr && item.announced->leaving);
+    w.begin_object();
+    w.plain_key("announced");
+    w.raw(item.original->body);
+    write_member(w, "seq", item.seq);
+    write_member(w, "epoch", protocol::epoch_text(item.epoch));
+    write_member(w, "sig", item.original->sig);
+    write_member(w, "age_ms", age_of(item.last_seen, now));
+    write_member(w, "state", left ? "left" : to_string(item.state));
+    w.end_object();
+}
+
 // Another node that has left is only named.
 void write_entry(json_writer& w, const delta_entry& item, time_point now, std::size_t endpoints) {
+    if (item.original != nullptr) {
+        write_signed_entry(w, item, now);
+        return;
+    }
     const auto* const said = item.what == delta_entry::kind::leave ? nullptr : item.announced;
     const bool left = said == nullptr || said->leaving;
     w.begin_object();
@@ -110,7 +128,9 @@ page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::s
             p.more = true;
             break;
         }
-        if (p.size() > longest && item.what == delta_entry::kind::description) {
+        if (p.size() > longest && item.original != nullptr) { // it cannot be shortened
+            p.peers.resize(peers_before);
+        } else if (p.size() > longest && item.what == delta_entry::kind::description) {
             // Not even one entry fits: it is written with fewer endpoints.
             for (auto count = item.endpoints->size(); p.size() > longest && count-- > 0;) {
                 p.peers.resize(peers_before);
@@ -152,7 +172,43 @@ bool read_entry(std::string_view json, peer_report& out) {
     return good && has_epoch && is_of_a_node(out);
 }
 
-bool read_entries(json_reader& r, std::size_t most, std::chrono::milliseconds usual, peer_table& out) {
+// Signed announcements are passed on unchanged. So an unspecified address or Unix socket in one means nothing, and a
+// loopback address may be that of another host.
+void keep_endpoints_for_others(std::vector<std::string>& endpoints) {
+    std::erase_if(endpoints, [](std::string_view url) {
+        return url.starts_with("unix:") || url.find("://0.0.0.0:") != std::string_view::npos ||
+               url.find("://[::]:") != std::string_view::npos;
+    });
+    std::ranges::stable_partition(endpoints, [](std::string_view url) {
+        return url.find("://127.") == std::string_view::npos && url.find("://[::1]:") == std::string_view::npos;
+    });
+}
+
+// Beside the announcement, only its age counts.
+bool read_signed_entry(std::string_view json, peer_report& out) {
+    bool has_epoch = false;
+    std::string_view body;
+    std::string sig;
+    json_reader r{json, table_depth + 1};
+    const bool good = read_members(r, [&](std::string_view key) {
+        return key == "announced" ? r.read_raw(body)
+               : key == "epoch"   ? (has_epoch = read_epoch(r, out.epoch))
+               : key == "seq"     ? r.read(out.seq)
+               : key == "sig"     ? r.read(sig)
+               : key == "age_ms"  ? read_milliseconds(r, out.age, max_age)
+                                  : r.skip();
+    });
+    if (!good || !has_epoch || out.seq == 0 || sig.empty() || body.size() > protocol::datagram_bytes ||
+        !read_announcement(body, out.announced) || !is_of_a_node(out)) {
+        return false;
+    }
+    keep_endpoints_for_others(out.announced.endpoints);
+    out.announced.original =
+        std::make_shared<signed_announcement>(signed_announcement{std::string{body}, std::move(sig)});
+    return true;
+}
+
+bool read_entries(json_reader& r, std::size_t most, std::chrono::milliseconds usual, entry_form form, peer_table& out) {
     if (!r.begin_array()) {
         return false;
     }
@@ -167,7 +223,7 @@ bool read_entries(json_reader& r, std::size_t most, std::chrono::milliseconds us
         --most;
         peer_report report;
         report.announced.interval = usual;
-        if (read_entry(text, report)) {
+        if (form == entry_form::plain ? read_entry(text, report) : read_signed_entry(text, report)) {
             out.reports.push_back(std::move(report));
         } else {
             ++out.bad_entries;
@@ -248,13 +304,14 @@ void write_own_entry(json_writer& w, const incarnation& own, time_point now) {
     w.end_object();
 }
 
-bool read_table(std::string_view json, std::size_t max_entries, std::chrono::milliseconds usual, peer_table& out) {
+bool read_table(std::string_view json, std::size_t max_entries, std::chrono::milliseconds usual, peer_table& out,
+                entry_form form) {
     out = {};
-    json_reader r{json, table_depth};
+    json_reader r{json, table_depth + (form == entry_form::plain ? 0U : 3U)};
     bool has_peers = false;
     const bool good = read_members(r, [&](std::string_view key) {
         has_peers = has_peers || key == "peers";
-        return key == "peers"   ? read_entries(r, max_entries, usual, out)
+        return key == "peers"   ? read_entries(r, max_entries, usual, form, out)
                : key == "beats" ? read_heartbeats(r, max_entries, out)
                : key == "node"  ? r.read(out.node)
                : key == "epoch" ? r.read(out.epoch)

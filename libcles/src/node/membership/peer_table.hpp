@@ -9,6 +9,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -55,9 +56,17 @@ struct peer_table {
     std::size_t bad_entries = 0; ///< that could not be read, and were skipped
 };
 
+/// How the entries of tables are written.
+enum class entry_form : std::uint8_t {
+    plain,
+    signed_by_node, ///< with the announcement as it was signed (docs/security.md, "Announcements")
+};
+
 /// Reads a reply, or a table sent without a request; the entries beyond `max_entries` are skipped. `usual`: the
-/// interval of entries without one. Returns false if it is not a table; `out` has the entries before the error.
-bool read_table(std::string_view json, std::size_t max_entries, std::chrono::milliseconds usual, peer_table& out);
+/// interval of entries without one. Returns false if it is not a table; `out` has the entries before the error. The
+/// signatures of entries are not verified.
+bool read_table(std::string_view json, std::size_t max_entries, std::chrono::milliseconds usual, peer_table& out,
+                entry_form form = entry_form::plain);
 
 /// Reads the name, epoch, endpoints and pool from the reply to `PULL self:cles`. Returns false if the name or the epoch
 /// is missing.

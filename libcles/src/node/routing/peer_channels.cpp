@@ -282,6 +282,19 @@ std::uint64_t peer_channels::send(std::string_view target, std::string_view at, 
     return r.id;
 }
 
+void peer_channels::send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r,
+                                 time_point deadline, detail::pending_ptr operation) {
+    boost::system::error_code code;
+    std::string why;
+    auto* channel = find(name, at, false, code, why, name);
+    if (channel == nullptr) {
+        host_.fail_later(std::move(operation), code, std::move(why), {});
+        return;
+    }
+    r.id = host_.draw_id();
+    channel->send(r, deadline, host_.now(), std::move(operation), {});
+}
+
 std::string peer_channels::address_of(std::string_view target) const {
     const auto& own_name = host_.node().name;
     const auto& listeners = host_.listeners();
@@ -323,11 +336,11 @@ std::string peer_channels::address_of(std::string_view target) const {
 }
 
 peer_channel* peer_channels::find(std::string_view target, std::string_view at, bool urgent,
-                                  boost::system::error_code& code, std::string& why) {
+                                  boost::system::error_code& code, std::string& why, std::string_view expected) {
     try {
         const auto address = at.empty() ? address_of(target) : std::string{at};
         const bool waits = at.empty() && address.starts_with(undiscovered);
-        const auto name = name_to_check(target, at, address);
+        const auto name = expected.empty() ? name_to_check(target, at, address) : expected;
         const auto key = address + name_suffix(name) + (urgent && !waits ? std::string{urgent_suffix} : std::string{});
         if (const auto found = channels_.find(key); found != channels_.end()) {
             return found->second.get();
@@ -404,8 +417,8 @@ void peer_channels::drop(const connection& c) {
     }
 }
 
-void peer_channels::release(std::string_view url) {
-    if (const auto found = channels_.find(url); found != channels_.end()) {
+void peer_channels::release(std::string_view url, std::string_view name) {
+    if (const auto found = channels_.find(std::string{url} + name_suffix(name)); found != channels_.end()) {
         const auto held = found->second;
         held->release();
     }

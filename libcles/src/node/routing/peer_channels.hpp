@@ -117,6 +117,9 @@ class peer_channels {
     /// there, the operation fails later. Returns the id, or 0.
     std::uint64_t send(std::string_view target, std::string_view at, protocol::outgoing_request r, time_point deadline,
                        detail::pending_ptr operation, outbound::progress_function progress);
+    /// The same at an address where only the node of that name is to answer.
+    void send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r, time_point deadline,
+                      detail::pending_ptr operation);
     /// The address of the node has become known, unknown, or another.
     void on_address_changed(std::string_view node);
     /// Resolves or fails the names that wait for discovery.
@@ -134,8 +137,8 @@ class peer_channels {
 
     /// `c` was lost or can no longer be used.
     void drop(const connection& c);
-    /// No requests follow at that URL for a while: closes its idle links.
-    void release(std::string_view url);
+    /// No requests follow at that URL for a while: closes its idle links. `name`: as passed to `send_to_node`.
+    void release(std::string_view url, std::string_view name = {});
     /// Stops dialling, and fails the waiting requests.
     void stop();
 
@@ -144,8 +147,9 @@ class peer_channels {
     url checked_url(std::string_view where) const;
     [[nodiscard]] std::string_view name_to_check(std::string_view target, std::string_view at,
                                                  std::string_view address) const;
+    /// `expected`: the name of the node that must answer at `at`, if any.
     peer_channel* find(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
-                       std::string& why);
+                       std::string& why, std::string_view expected = {});
 
     local_node& host_;
     std::map<std::string, std::string, std::less<>> directory_;                  // the configured URLs, by node

@@ -4,6 +4,7 @@
 #include "node/membership/roster_exchange.hpp"
 #include "node/publish/signed_updates.hpp"
 #include "node/session/request_checks.hpp"
+#include "node/session/unconfirmed_updates.hpp"
 #include "protocol/line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -119,11 +120,34 @@ void session::on_update(const subscriptions::match& found) {
         ++node_->counts.updates_unsigned;
         return;
     }
+    if (node_->security && found.whose != nullptr && !is_confirmed(update)) {
+        hold(update);
+        return;
+    }
     if (found.whose == nullptr || protocol::begins_with_error(update.body) || !subscriptions_.deliver(found)) {
         ++node_->counts.updates_dropped;
     } else {
         ++node_->counts.updates_received;
     }
+}
+
+// The peer has stated its own epoch when it proved its name. What it passes on may be of an earlier incarnation.
+bool session::is_confirmed(const protocol::request_line& update) const noexcept {
+    return update.noun.target == peer_.name || peer_.transport == "inproc" || peer_.name == node_->name ||
+           node_->confirmed.contain(update.noun.target, *update.epoch);
+}
+
+void session::hold(const protocol::request_line& update) {
+    if (!unconfirmed_) {
+        unconfirmed_ = std::make_shared<unconfirmed_updates>(*node_, outbound_, [this](std::string_view line) {
+            protocol::request_line again;
+            protocol::malformed_request ignored; // it was valid on arrival
+            if (!closed_ && protocol::parse_request(line, again, ignored)) {
+                on_update(subscriptions_.find(line, again));
+            }
+        });
+    }
+    unconfirmed_->hold(update, node_->time.now());
 }
 
 void session::on_leaving() {

@@ -11,6 +11,8 @@
 
 namespace cles::core {
 
+class unconfirmed_updates;
+
 /// The protocol on one link, whatever its transport: requests and replies in both directions. Lines and time are the
 /// input; the output goes to the line sink.
 class session {
@@ -52,6 +54,8 @@ class session {
     void on_leaving();
     void on_hello(const protocol::request_line& hello, time_point now);
     void on_update(const subscriptions::match& found);
+    [[nodiscard]] bool is_confirmed(const protocol::request_line& update) const noexcept;
+    void hold(const protocol::request_line& update);
 
     std::shared_ptr<node_state> node_;
     line_sink& out_;
@@ -59,8 +63,9 @@ class session {
     inbound inbound_;
     outbound outbound_;
     subscriptions subscriptions_;
-    bool may_be_refused_ = false; // by the first line
-    std::string refusal_;         // the line that refused the link, if it remains the only one
+    std::shared_ptr<unconfirmed_updates> unconfirmed_; // null: there were none
+    bool may_be_refused_ = false;                      // by the first line
+    std::string refusal_;                              // the line that refused the link, if it remains the only one
     bool closed_ = false;
 };
 

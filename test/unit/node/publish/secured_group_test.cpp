@@ -129,9 +129,10 @@ BOOST_AUTO_TEST_CASE(a_binding_needs_the_right) {
 }
 
 BOOST_AUTO_TEST_CASE(an_announcement_is_signed_with_the_version_of_the_roster) {
+    const auto made = cles::core::sign_announcement(
+        {.node = "car1", .endpoints = {"tls://10.0.0.2:25370"}, .roster = 7}, 17, "5f3a09c1", *security);
     std::string line;
-    cles::core::append_announcement(line, {.node = "car1", .endpoints = {"tls://10.0.0.2:25370"}, .roster = 7}, 17,
-                                    "5f3a09c1", security.get());
+    cles::core::append_announcement(line, "car1", *made, 17, "5f3a09c1");
     BOOST_TEST(line.ends_with("\n"));
     cles::protocol::request_line read;
     BOOST_REQUIRE(cles::protocol::parse_group_message(line, read));

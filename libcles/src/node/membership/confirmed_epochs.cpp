@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/confirmed_epochs.hpp"
+
+#include <algorithm>
+
+namespace cles::core {
+
+bool confirmed_epochs::contain(std::string_view node, std::uint32_t epoch) const noexcept {
+    const auto found = nodes_.find(node);
+    return found != nodes_.end() && found->second.epoch == epoch;
+}
+
+void confirmed_epochs::confirm(std::string_view node, std::uint32_t epoch, time_point now) {
+    of(node, now).epoch = epoch;
+}
+
+time_point confirmed_epochs::next_question(std::string_view node) const noexcept {
+    const auto found = nodes_.find(node);
+    return found == nodes_.end() || found->second.asked == time_point::min() ? time_point::min()
+                                                                             : found->second.asked + pause;
+}
+
+void confirmed_epochs::on_asked(std::string_view node, time_point now) { of(node, now).asked = now; }
+
+confirmed_epochs::entry& confirmed_epochs::of(std::string_view node, time_point now) {
+    auto at = nodes_.find(node);
+    if (at == nodes_.end()) {
+        if (nodes_.size() >= max_entries_ && !nodes_.empty()) {
+            nodes_.erase(std::ranges::min_element(nodes_, {}, [](const auto& each) { return each.second.used; }));
+        }
+        at = nodes_.emplace(std::string{node}, entry{}).first;
+    }
+    at->second.used = now;
+    return at->second;
+}
+
+} // namespace cles::core

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/session/unconfirmed_updates.hpp"
+
+#include "node/membership/epoch_confirmation.hpp"
+#include "port/node_security.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+namespace cles::core {
+
+/// The reply to the question for a publisher's epoch.
+class unconfirmed_updates::reply final : public detail::pending {
+  public:
+    reply(std::weak_ptr<unconfirmed_updates> owner, std::string publisher, std::string challenge)
+        : owner_(std::move(owner)), publisher_(std::move(publisher)), challenge_(std::move(challenge)) {}
+
+    verdict offer(std::string_view json) override {
+        const std::unique_ptr<reply> self{this};
+        if (const auto owner = owner_.lock()) {
+            owner->on_answer(publisher_, read_confirmed_epoch(json, publisher_, challenge_, *owner->node_.security));
+        }
+        return verdict::completed;
+    }
+    void fail(boost::system::error_code, std::string_view) override {
+        const std::unique_ptr<reply> self{this};
+        if (const auto owner = owner_.lock()) {
+            owner->on_answer(publisher_, {});
+        }
+    }
+    void discard() noexcept override { delete this; }
+    [[nodiscard]] bool calls_user() const noexcept override { return false; }
+
+  private:
+    std::weak_ptr<unconfirmed_updates> owner_;
+    std::string publisher_;
+    std::string challenge_;
+};
+
+void unconfirmed_updates::hold(const protocol::request_line& update, time_point now) {
+    const auto& line = update.text;
+    if (held_.size() >= max_lines || bytes_ + line.size() > max_bytes) {
+        ++node_.counts.updates_dropped;
+        return;
+    }
+    bytes_ += line.size();
+    held_.push_back({.publisher = std::string{update.noun.target}, .epoch = *update.epoch, .line = std::string{line}});
+    if (!asked_.contains(update.noun.target)) {
+        ask(held_.back().publisher, now);
+    }
+}
+
+// Now, or as soon as that node may be asked again.
+void unconfirmed_updates::ask(const std::string& publisher, time_point now) {
+    if (const auto next = node_.confirmed.next_question(publisher); next > now) {
+        if (!armed() || next < due()) {
+            node_.deadlines.arm(*this, next);
+        }
+        return;
+    }
+    node_.confirmed.on_asked(publisher, now);
+    asked_.insert(publisher);
+    for (auto& each : held_) {
+        each.asked = each.asked || each.publisher == publisher;
+    }
+    const auto challenge = node_.security->new_challenge();
+    const auto noun = epoch_question(publisher, challenge);
+    outbound_.send({.verb = verb::pull, .noun = noun, .id = node_.next_id++},
+                   now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
+                   detail::pending_ptr{new reply(weak_from_this(), publisher, challenge)});
+}
+
+// Delivered in a turn of its own, since this may be inside the processing of a line.
+void unconfirmed_updates::on_answer(const std::string& publisher, std::optional<std::uint32_t> epoch) {
+    const auto now = node_.time.now();
+    asked_.erase(publisher);
+    if (epoch) {
+        node_.confirmed.confirm(publisher, *epoch, now);
+    }
+    std::erase_if(held_, [&](const held_update& each) {
+        if (!each.asked || each.publisher != publisher || epoch == each.epoch) {
+            return false;
+        }
+        bytes_ -= each.line.size();
+        ++node_.counts.updates_dropped;
+        return true;
+    });
+    if (!held_.empty()) {
+        node_.deadlines.arm(*this, now);
+    }
+}
+
+void unconfirmed_updates::on_deadline(time_point now) {
+    const auto keep = shared_from_this(); // user code may close the link
+    if (!deliver_confirmed()) {
+        return;
+    }
+    std::set<std::string> waiting;
+    for (const auto& each : held_) {
+        if (!asked_.contains(each.publisher)) {
+            waiting.insert(each.publisher);
+        }
+    }
+    for (const auto& publisher : waiting) {
+        ask(publisher, now);
+    }
+}
+
+bool unconfirmed_updates::deliver_confirmed() {
+    std::list<held_update> ready;
+    for (auto at = held_.begin(); at != held_.end();) {
+        const auto next = std::next(at);
+        if (node_.confirmed.contain(at->publisher, at->epoch)) {
+            bytes_ -= at->line.size();
+            ready.splice(ready.end(), held_, at);
+        }
+        at = next;
+    }
+    for (const auto& each : ready) {
+        if (weak_from_this().use_count() == 1) { // only the caller still has it
+            return false;
+        }
+        deliver_(each.line);
+    }
+    return weak_from_this().use_count() != 1;
+}
+
+} // namespace cles::core
