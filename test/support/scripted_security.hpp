@@ -34,7 +34,9 @@ class scripted_security final : public core::node_security {
                                  std::string_view epoch, std::string_view body, std::string_view sig) const override {
         return sig == signature(publisher, path, seq, epoch, body);
     }
-    [[nodiscard]] std::string new_challenge() const override { return challenge.empty() ? "challenge" + std::to_string(++challenges) : challenge; }
+    [[nodiscard]] std::string new_challenge() const override {
+        return challenge.empty() ? "challenge" + std::to_string(++challenges) : challenge;
+    }
     [[nodiscard]] std::string sign_request(std::string_view node, std::string_view challenge, verb how,
                                            std::string_view path, std::string_view body) const override {
         return challenge.starts_with("challenge") ? request_signature(self, node, challenge, how, path, body)

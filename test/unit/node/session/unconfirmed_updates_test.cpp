@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // Forwarded updates in a secured fleet (docs/security.md, "Announcements"). car2 forwards those of car3.
 #include "node/session/unconfirmed_updates.hpp"
+#include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"
 
@@ -30,7 +31,13 @@ class listener final : public cles::core::subscription {
 };
 
 struct fixture {
-    fixture() { link.session().bound().add(feed); }
+    fixture() {
+        security->challenge = "AAAAAAAAAAAAAAAAAAAAAA";
+        // Updates of nodes that have not announced themselves are not forwarded.
+        node.host->peers.apply_announcement({.node = "car3", .tasks = "d"}, 0xB, 1, cles::test::source_at(4001),
+                                            node.clock.now());
+        link.session().bound().add(feed);
+    }
 
     static std::string update(int seq, const std::string& epoch, const std::string& publisher = "car3") {
         return "UPDATE " + publisher + ":pose seq=" + std::to_string(seq) + " epoch=" + epoch + " {}";
