@@ -17,7 +17,7 @@ from run_doc_commands import commands_of
 
 OURS = re.compile(r"cles(d|-\w+)?$|(scripts|perf|build|\$|/tmp)/?")
 # Of the shell, coreutils, grep and sed.
-BASE = {"cat", "cd", "cp", "cut", "echo", "export", "grep", "head", "kill", "ls", "printf", "rm", "sed", "sleep", "source", "test",
+BASE = {"cat", "cd", "cp", "cut", "echo", "env", "export", "grep", "head", "kill", "ls", "printf", "rm", "sed", "sleep", "source", "test",
         "timeout", "true", "unset"}
 PACKAGES = {"c++": "g++", "cmake": "cmake", "ctest": "cmake", "nc": "netcat-openbsd", "pkg-config": "pkg-config",
             "python3": "python3", "ip": "iproute2"}

@@ -156,8 +156,8 @@ BOOST_AUTO_TEST_CASE(an_epoch_is_confirmed_through_a_node_that_forwards) {
     forwarding.routing = cles::routing();
     cles::service car1{contexts[0], std::move(forwarding)};
     cles::service car2{contexts[1], gossiping("car2", {&car1})};
-    cles::service car3{contexts[2], fleet.knowing("car3", car1)};
-    wait([&] { return contains(known_to(car1), "car2"); });
+    cles::service car3{contexts[2], gossiping("car3", {&car1})};
+    wait([&] { return contains(known_to(car1), "car2") && contains(known_to(car3), "car2"); });
     car2.update("pose", 1);
     std::vector<int> seen;
     cles::feed<int> feed;

@@ -82,7 +82,8 @@ BOOST_AUTO_TEST_CASE(with_security_other_hosts_are_reached_by_default) {
     auto c = default_config("host", 1);
     c.security.keys = "/etc/cles/keys";
     apply_security_defaults(c);
-    BOOST_TEST(c.listen == std::vector<std::string>{"tls://0.0.0.0:25370"}, boost::test_tools::per_element());
+    BOOST_TEST(c.listen == (std::vector<std::string>{"tls://0.0.0.0:25370", "udp://0.0.0.0:25370"}),
+               boost::test_tools::per_element());
     BOOST_TEST(c.multicast.interface == "auto");
     BOOST_TEST(!c.multicast.required);
     BOOST_TEST(refusal(c) == "accepted");

@@ -113,7 +113,7 @@ class Configuration(unittest.TestCase):
         self.assertEqual(clesd("--config", file, "--check"), (0, f"{file}: can be used\n", ""))
         code, out, _ = clesd("--keys", keys, "--print-config", cwd="/")
         self.assertEqual(code, 0)
-        for line in ('node: "car1"', 'listen: ["tls://0.0.0.0:25370"]', f'security: "{keys}"'):
+        for line in ('node: "car1"', 'listen: ["tls://0.0.0.0:25370", "udp://0.0.0.0:25370"]', f'security: "{keys}"'):
             self.assertIn(line, out)
 
     def test_a_missing_directory(self):
