@@ -179,7 +179,7 @@ void keep_endpoints_for_others(std::vector<std::string>& endpoints) {
         return url.starts_with("unix:") || url.find("://0.0.0.0:") != std::string_view::npos ||
                url.find("://[::]:") != std::string_view::npos;
     });
-    std::ranges::stable_partition(endpoints, [](std::string_view url) {
+    std::stable_partition(endpoints.begin(), endpoints.end(), [](std::string_view url) {
         return url.find("://127.") == std::string_view::npos && url.find("://[::1]:") == std::string_view::npos;
     });
 }

@@ -25,6 +25,7 @@ struct relayed_path {
     std::string text;
     std::string requester{}; ///< in a secured fleet, the member whose rights apply
 
+    // NOLINTNEXTLINE(modernize-use-nullptr): clang-tidy 14 takes the resulting zero for a pointer
     auto operator<=>(const relayed_path&) const = default;
     /// Identifies the noun and its requester among those of a node: "car2:pose", "car2:pose from=car1". No noun
     /// contains a space.
