@@ -52,7 +52,7 @@ class session {
     void note_refusal(std::string_view line);
     void lose_requests(std::string_view why);
     void on_leaving();
-    void on_hello(const protocol::request_line& hello, time_point now);
+    void on_hello(const protocol::request_line& r, time_point now);
     void on_update(const subscriptions::match& found);
     [[nodiscard]] bool is_confirmed(const protocol::request_line& update) const noexcept;
     void hold(const protocol::request_line& update);
