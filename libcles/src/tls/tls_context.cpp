@@ -98,13 +98,15 @@ tls_context::tls_context(const security::signing_key& own) : context_(::SSL_CTX_
     require(key != nullptr, "cannot use the key for TLS");
     const auto certificate = make_certificate(key.get());
 
+    std::string group{"X25519"}; // these macros take no constants
+    std::string signatures{"ed25519"};
     require(::SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION) == 1 &&
                 ::SSL_CTX_set_max_proto_version(context, TLS1_3_VERSION) == 1 &&
                 ::SSL_CTX_set_ciphersuites(
                     context, "TLS_AES_128_GCM_SHA256:TLS_CHACHA20_POLY1305_SHA256:TLS_AES_256_GCM_SHA384") == 1 &&
-                ::SSL_CTX_set1_groups_list(context, "X25519") == 1 &&
-                ::SSL_CTX_set1_sigalgs_list(context, "ed25519") == 1 &&
-                ::SSL_CTX_set1_client_sigalgs_list(context, "ed25519") == 1 &&
+                ::SSL_CTX_set1_groups_list(context, group.data()) == 1 &&
+                ::SSL_CTX_set1_sigalgs_list(context, signatures.data()) == 1 &&
+                ::SSL_CTX_set1_client_sigalgs_list(context, signatures.data()) == 1 &&
                 ::SSL_CTX_use_certificate(context, certificate.get()) == 1 &&
                 ::SSL_CTX_use_PrivateKey(context, key.get()) == 1 && ::SSL_CTX_set_num_tickets(context, 0) == 1 &&
                 ::SSL_CTX_set_alpn_protos(context, application_protocol.data(),
