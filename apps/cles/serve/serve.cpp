@@ -106,7 +106,9 @@ int serve(const serve_arguments& args, int verbosity) {
         }
     });
     for (const auto& endpoint : node.service().endpoints()) {
-        write_output(name + " listening on " + endpoint + "\n");
+        std::string line{name};
+        line.append(" listening on ").append(endpoint).push_back('\n');
+        write_output(line);
     }
     cles::run(io, {.busy_poll = std::chrono::microseconds{args.busy_poll_us},
                    .fifo_priority = args.real_time,
