@@ -96,7 +96,7 @@ void init(const fleet_arguments& args) {
     const auto made = security::create_fleet(args.directory);
     write_output(printable(args.directory) + "\n");
     note("created a fleet with the public key " + made.fleet);
-    note("keep " + in_folder(args.directory, "fleet.key") + " off the nodes: whoever has it decides who is a member");
+    note("keep " + in_folder(args.directory, "fleet.key") + " off the nodes: it decides who is a member");
     if (names.empty()) {
         note("next: create the key of a node there (cles keys new car1), carry car1.pub here, and run: cles fleet add "
              "car1.pub --keys " +
@@ -120,11 +120,7 @@ void add_init(CLI::App& fleet, context& shared) {
                     "Examples:\n"
                     "  cles fleet init ~/fleet\n"
                     "  cles fleet init /tmp/fleet --with car1,car2,sat1");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        init(*args);
-        shared.exit_code = exit_code::success;
-    });
+    run_with_keys(*command, shared, args, init);
 }
 
 // --- add ---
@@ -161,11 +157,7 @@ void add_add(CLI::App& fleet, context& shared) {
         "Examples:\n"
         "  cles fleet add car1.pub car2.pub\n"
         "  cles fleet add sat1.pub --may 'pull,bind *:localization' --offers none --forwards 'car*'");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        add_nodes(*args);
-        shared.exit_code = exit_code::success;
-    });
+    run_with_keys(*command, shared, args, add_nodes);
 }
 
 // --- rights ---
@@ -193,11 +185,7 @@ void add_rights(CLI::App& fleet, context& shared) {
         "Examples:\n"
         "  cles fleet rights car1 --may 'pull,bind *:*/**' --may 'push car2:target'\n"
         "  cles fleet rights car1 --may all --forwards none");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        change_rights(*args);
-        shared.exit_code = exit_code::success;
-    });
+    run_with_keys(*command, shared, args, change_rights);
 }
 
 // --- remove, rotate ---
@@ -210,12 +198,10 @@ void add_remove(CLI::App& fleet, context& shared) {
     command->footer("A node that returns, or gets a new key, is added again.\n\n"
                     "Examples:\n"
                     "  cles fleet remove car1");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        const auto directory = args->keys.directory();
-        security::remove_members(directory, args->names);
+    run_with_keys(*command, shared, args, [](const fleet_arguments& given) {
+        const auto directory = given.keys.directory();
+        security::remove_members(directory, given.names);
         note_new_roster(directory);
-        shared.exit_code = exit_code::success;
     });
 }
 
@@ -226,12 +212,10 @@ void add_rotate(CLI::App& fleet, context& shared) {
     command->footer("Nodes that do not have the new roster yet can still be understood, until the next rotation.\n\n"
                     "Examples:\n"
                     "  cles fleet rotate");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        const auto directory = args->keys.directory();
+    run_with_keys(*command, shared, args, [](const fleet_arguments& given) {
+        const auto directory = given.keys.directory();
         security::rotate_group_keys(directory);
         note_new_roster(directory);
-        shared.exit_code = exit_code::success;
     });
 }
 

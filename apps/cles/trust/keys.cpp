@@ -54,11 +54,7 @@ void add_new(CLI::App& keys, context& shared) {
                     "Examples:\n"
                     "  cles keys new car1\n"
                     "  cles keys new car1 --keys /etc/cles/car1");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        create_key(*args);
-        shared.exit_code = exit_code::success;
-    });
+    run_with_keys(*command, shared, args, create_key);
 }
 
 // --- show ---
@@ -127,11 +123,7 @@ void add_show(CLI::App& keys, context& shared) {
     command->footer("Examples:\n"
                     "  cles keys show\n"
                     "  cles keys show --keys /etc/cles/car1 -o json | jq -r .version");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        show_keys(*args);
-        shared.exit_code = exit_code::success;
-    });
+    run_with_keys(*command, shared, args, show_keys);
 }
 
 // --- join ---
@@ -160,11 +152,7 @@ void add_join(CLI::App& keys, context& shared) {
         "Examples:\n"
         "  cles keys join car1.join\n"
         "  ssh authority cat fleet/car1.join | cles keys join -");
-    command->callback([args, &shared] {
-        const no_core_dumps guard;
-        join(*args);
-        shared.exit_code = exit_code::success;
-    });
+    run_with_keys(*command, shared, args, join);
 }
 
 } // namespace

@@ -1,6 +1,14 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "commands.hpp"
+#include "output/errors.hpp"
+
+#include <CLI/App.hpp>
+
+#include <memory>
+#include <utility>
+
 #include <sys/resource.h>
 
 namespace tool {
@@ -19,5 +27,15 @@ class no_core_dumps {
     rlimit limit_{};
     int dumpable_ = 0;
 };
+
+/// Has the command call `run` with its arguments, without core dumps. For commands that read private keys.
+template <class Arguments, class F>
+void run_with_keys(CLI::App& command, context& shared, std::shared_ptr<Arguments> args, F run) {
+    command.callback([args = std::move(args), &shared, run] {
+        const no_core_dumps guard;
+        run(*args);
+        shared.exit_code = exit_code::success;
+    });
+}
 
 } // namespace tool

@@ -54,7 +54,7 @@ struct service_options {
     std::vector<std::string> listen{};          ///< link URLs, see docs/links.md; none: it does not listen
     std::map<std::string, std::string> peers{}; ///< URLs of other nodes, by name
     bool insecure = false;                      ///< allow listening beyond this host without credentials
-    /// `cles::security(directory)` authenticates all peers and encrypts what is sent to other hosts
+    /// `cles::secured(directory)` authenticates all peers and encrypts what is sent to other hosts
     /// (<cles/security.hpp>, docs/security.md). Each service needs its own.
     std::shared_ptr<detail::security_part> security{};
     /// Networks ("10.0.0.0/8", "fd00::/8") whose source addresses are trusted, so the amount sent to them by UDP is not

@@ -14,7 +14,7 @@ class node_security;
 
 namespace cles::detail {
 
-/// What `cles::security` returns: the security of one service. An interface, so that programs without security do not
+/// What `cles::secured` returns: the security of one service. An interface, so that programs without security do not
 /// link it.
 class security_part {
   public:

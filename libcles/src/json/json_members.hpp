@@ -28,6 +28,22 @@ bool read_members(json_reader& r, Member&& member) {
     return r.ok();
 }
 
+/// Reads an array of strings: passes each to `take`, valid during the call. False if this is anything else.
+template <class F>
+bool read_texts(json_reader& r, F&& take) {
+    if (!r.begin_array()) {
+        return false;
+    }
+    while (r.next_element()) {
+        std::string_view text;
+        if (!r.read(text)) {
+            return false;
+        }
+        take(text);
+    }
+    return r.ok();
+}
+
 /// Writes a member of an object: text, a number, a flag or an array of texts. Its name needs no escapes.
 template <class T>
 void write_member(json_writer& w, std::string_view name, const T& value) {

@@ -103,6 +103,16 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     void forget(connection& c, std::uint64_t received, std::uint64_t sent);
     [[nodiscard]] core::flush_scheduler& flush_scheduler() noexcept { return flush_scheduler_; }
 
+    /// Calls `function` with this node in a task of its own, unless the node has been stopped or destroyed by then.
+    template <class F>
+    void post_while_running(F function) {
+        post(*environment_, [weak = weak_from_this(), function = std::move(function)]() mutable {
+            if (const auto self = weak.lock(); self && !self->stopped_) {
+                function(*self);
+            }
+        });
+    }
+
     // flush_host
     void post_flush() override;
     [[nodiscard]] bool stopped() const override { return stopped_; }

@@ -19,11 +19,7 @@ local_security::~local_security() { host_.node().security->end(); }
 
 // In a task of its own: the line that brought the roster belongs to a link that may be closed.
 void local_security::on_security_changed() {
-    post(host_.environment(), [weak = host_.weak_from_this(), this] {
-        if (const auto host = weak.lock(); host && !host->stopped()) {
-            apply_change();
-        }
-    });
+    host_.post_while_running([this](local_node&) { apply_change(); });
 }
 
 void local_security::apply_change() {

@@ -100,14 +100,16 @@ class noted_ticket {
     std::uint64_t ticket_;
 };
 
-/// Passes the outcome of a second attempt on. Whatever it is, there is no third one.
-class second_attempt final : public detail::pending {
+/// One attempt of a request, which passes its outcome on to the operation.
+class attempt_of_request : public detail::pending {
   public:
-    second_attempt(std::weak_ptr<local_node> host, std::uint64_t ticket, detail::pending_ptr operation)
-        : ticket_(std::move(host), ticket), operation_(std::move(operation)) {}
+    explicit attempt_of_request(detail::pending_ptr operation) : operation_(std::move(operation)) {}
+    attempt_of_request(const attempt_of_request&) = delete;
+    attempt_of_request& operator=(const attempt_of_request&) = delete;
+    virtual ~attempt_of_request() = default;
 
     verdict offer(std::string_view json) override {
-        std::unique_ptr<second_attempt> self{this};
+        std::unique_ptr<attempt_of_request> self{this};
         auto* const operation = operation_.release();
         const auto found = operation->offer(json);
         if (found == verdict::malformed) {
@@ -117,19 +119,28 @@ class second_attempt final : public detail::pending {
         return found;
     }
     void fail(boost::system::error_code code, std::string_view message) override {
-        const std::unique_ptr<second_attempt> self{this};
+        const std::unique_ptr<attempt_of_request> self{this};
         operation_.release()->fail(code, message);
     }
     void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
-        const std::unique_ptr<second_attempt> self{this};
+        const std::unique_ptr<attempt_of_request> self{this};
         operation_.release()->refuse(code, message, answer);
     }
     void discard() noexcept override { delete this; }
     [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
 
+  protected:
+    detail::pending_ptr operation_;
+};
+
+/// Whatever its outcome is, there is no third one.
+class second_attempt final : public attempt_of_request {
+  public:
+    second_attempt(std::weak_ptr<local_node> host, std::uint64_t ticket, detail::pending_ptr operation)
+        : attempt_of_request(std::move(operation)), ticket_(std::move(host), ticket) {}
+
   private:
     noted_ticket ticket_;
-    detail::pending_ptr operation_;
 };
 
 /// The reply to a request for `all` while nodes in it are asked once more, with the signature.
@@ -242,36 +253,27 @@ class part_of_gathered final : public detail::pending {
 };
 
 /// Completes its operation, unless the reply asks for a signature.
-class first_attempt final : public detail::pending {
+class first_attempt final : public attempt_of_request {
   public:
     first_attempt(repeatable_request r, detail::pending_ptr operation)
-        : request_(std::move(r)), operation_(std::move(operation)) {}
+        : attempt_of_request(std::move(operation)), request_(std::move(r)) {}
 
     verdict offer(std::string_view json) override {
         std::unique_ptr<first_attempt> self{this};
         if (request_.target == "all" && gather(json)) {
             return verdict::completed;
         }
-        auto* const operation = operation_.release();
-        const auto found = operation->offer(json);
-        if (found == verdict::malformed) {
-            operation_.reset(operation);
-            static_cast<void>(self.release());
-        }
-        return found;
-    }
-    void fail(boost::system::error_code code, std::string_view message) override {
-        const std::unique_ptr<first_attempt> self{this};
-        operation_.release()->fail(code, message);
+        static_cast<void>(self.release());
+        return attempt_of_request::offer(json);
     }
     void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) override {
-        const std::unique_ptr<first_attempt> self{this};
-        if (code != errc::denied || !repeat(answer)) {
-            operation_.release()->refuse(code, message, answer);
+        std::unique_ptr<first_attempt> self{this};
+        if (code == errc::denied && repeat(answer)) {
+            return;
         }
+        static_cast<void>(self.release());
+        attempt_of_request::refuse(code, message, answer);
     }
-    void discard() noexcept override { delete this; }
-    [[nodiscard]] bool calls_user() const noexcept override { return operation_->calls_user(); }
 
   private:
     bool repeat(std::string_view answer) {
@@ -320,7 +322,6 @@ class first_attempt final : public detail::pending {
     }
 
     repeatable_request request_;
-    detail::pending_ptr operation_;
 };
 
 } // namespace

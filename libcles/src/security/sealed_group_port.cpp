@@ -32,22 +32,11 @@ std::vector<std::string> endpoints_in(std::string_view line) {
     }
     json_reader r{said.body, depth};
     core::read_members(r, [&](std::string_view key) {
-        if (key != "endpoints") {
-            return r.skip();
-        }
-        if (!r.begin_array()) {
-            return false;
-        }
-        while (r.next_element()) {
-            std::string_view text;
-            if (!r.read(text)) {
-                return false;
-            }
+        return key != "endpoints" ? r.skip() : core::read_texts(r, [&](std::string_view text) {
             if (found.size() < max_endpoints) {
                 found.emplace_back(text);
             }
-        }
-        return r.ok();
+        });
     });
     return found;
 }

@@ -19,7 +19,8 @@ secured_node::secured_node(const std::string& directory) : directory_(directory)
     fleet_ = std::make_shared<security::fleet>(found.own.name, std::move(found.own.key), std::move(found.newest));
     datagrams_ = std::make_shared<sealed_datagrams>(*fleet_);
     observation_ = fleet_->observe([this](const roster&) { on_roster(); }); // links bring rosters, too
-    read_rules();
+    rules_ = read_local_rules(directory_.folder());
+    adopt_changes();
     files_ = file_state();
 }
 
@@ -231,11 +232,6 @@ void secured_node::adopt_changes() {
 
 // -- files ---------------------------------------------------------------------------------------------------------
 
-void secured_node::read_rules() {
-    rules_ = read_local_rules(directory_.folder());
-    policy_ = std::make_unique<access_policy>(name(), fleet_->share(), rules_);
-}
-
 // Which files there are, and when they were changed: enough to see whether to read them.
 std::string secured_node::file_state() const {
     std::vector<std::string> names{"rules", "roster"};
@@ -249,22 +245,23 @@ std::string secured_node::file_state() const {
 }
 
 void secured_node::check_files() {
-    if (auto now = file_state(); now == files_) {
+    auto now = file_state();
+    if (now == files_) {
         return;
-    } else {
-        files_ = std::move(now);
     }
+    files_ = std::move(now);
     rules_ = read_local_rules(directory_.folder());
     if (rules_.denies_everything()) {
         log(log_level::error, "every request is denied: " + rules_.error());
     }
+    const auto before = roster_version();
     try {
         std::vector<std::string> warnings;
         const auto newest = directory_.read_newest_roster(warnings);
         for (auto& each : warnings) {
             log(log_level::warning, std::move(each));
         }
-        if (newest && newest->version() > roster_version()) {
+        if (newest && newest->version() > before) {
             if (const auto why = offer_roster(newest->line())) {
                 log(log_level::error, "a roster in " + directory_.folder().path() + " is refused: " + *why);
             }
@@ -272,7 +269,9 @@ void secured_node::check_files() {
     } catch (const security_error& e) {
         log(log_level::error, e.what());
     }
-    adopt_changes();
+    if (roster_version() == before) { // else `on_roster` has adopted the rules, too
+        adopt_changes();
+    }
 }
 
 } // namespace cles::security

@@ -81,7 +81,6 @@ class secured_node final : public core::node_security {
     void on_roster();
     void adopt_changes();
     void store();
-    void read_rules();
     void check_files();
     [[nodiscard]] std::string file_state() const;
     void report_unanswered(std::uint32_t member, const std::vector<std::string>& endpoints) const;

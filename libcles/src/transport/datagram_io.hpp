@@ -86,6 +86,23 @@ class receive_batch {
         return !empty() && socket.is_open();
     }
 
+    /// The same. If something is left, also because `each` throws, calls `go_on_soon`, which has this called again in
+    /// another turn. \return whether nothing is left: wait for more
+    template <class F, class G>
+    [[nodiscard]] bool hand_over_in_turns(boost::asio::ip::udp::socket& socket, F&& each, G&& go_on_soon) {
+        bool left = false;
+        try {
+            left = hand_over(socket, each);
+        } catch (...) { // of a handler, for the thread that runs the context; other datagrams are not affected
+            go_on_soon();
+            throw;
+        }
+        if (left) {
+            go_on_soon();
+        }
+        return !left;
+    }
+
     /// Receives without waiting. Returns true if there may be more: all places were filled, or the network reported an
     /// error. \pre empty
     bool fetch(boost::asio::ip::udp::socket& socket) noexcept;

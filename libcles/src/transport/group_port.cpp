@@ -419,24 +419,16 @@ void group_port::wait_for_own() {
 }
 
 void group_port::deliver_own() {
-    const auto go_on_soon = [this] {
-        asio::post(own_.get_executor(), [self = shared_from_this()] { self->deliver_own(); });
-    };
-    bool left = false;
-    try {
-        left = own_arrived_->hand_over(own_, [this](const receive_batch::datagram& one) {
+    const bool all = own_arrived_->hand_over_in_turns(
+        own_,
+        [this](const receive_batch::datagram& one) {
             if (owner_ != nullptr) {
                 const auto from = source_of(one.from);
                 owner_->on_datagram({.from = from, .text = one.text, .request = nullptr, .to_group = false});
             }
-        });
-    } catch (...) { // of a handler, for the thread that runs the context; other datagrams are not affected
-        go_on_soon();
-        throw;
-    }
-    if (left) {
-        go_on_soon();
-    } else if (own_.is_open()) {
+        },
+        [this] { asio::post(own_.get_executor(), [self = shared_from_this()] { self->deliver_own(); }); });
+    if (all && own_.is_open()) {
         wait_for_own();
     }
 }

@@ -94,22 +94,13 @@ void udp_port::receive() {
 
 // Counts as receiving until everything is delivered: a link that starts meanwhile must not start to wait.
 void udp_port::hand_over() {
-    const auto go_on_soon = [this] {
-        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); });
-    };
-    bool left = false;
-    try {
-        left = arrived_.hand_over(socket_, [this](const receive_batch::datagram& one) { hand_over(one); });
-    } catch (...) { // of a handler, for the thread that runs the context; other datagrams are not affected
-        go_on_soon();
-        throw;
+    const bool all = arrived_.hand_over_in_turns(
+        socket_, [this](const receive_batch::datagram& one) { hand_over(one); },
+        [this] { asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); }); });
+    if (all) {
+        receiving_ = false;
+        receive();
     }
-    if (left) {
-        go_on_soon();
-        return;
-    }
-    receiving_ = false;
-    receive();
 }
 
 void udp_port::hand_over(const receive_batch::datagram& one) {
@@ -171,7 +162,7 @@ void udp_port::on_opened(const datagram_origin& from, std::uint32_t epoch, std::
 }
 
 // What this socket has accepted ends: the next line makes a link to the new process. A link that was dialled goes on,
-// since its requests are to reach whoever is there.
+// since its requests are for the member, in whatever process.
 void udp_port::on_established(const datagram_origin& with, std::uint32_t epoch) {
     const auto keep = shared_from_this();
     if (auto* const link = find(with.at, with.member)) {

@@ -16,22 +16,6 @@ namespace {
 constexpr std::size_t depth = 8;               // allows for additions of later versions
 constexpr std::size_t bytes_of_signature = 91; // with its adverb and the space after it
 
-/// Reads an array of strings and passes each to `take`, valid during the call.
-template <class F>
-bool read_texts(json_reader& r, F take) {
-    if (!r.begin_array()) {
-        return false;
-    }
-    while (r.next_element()) {
-        std::string_view text;
-        if (!r.read(text)) {
-            return false;
-        }
-        take(text);
-    }
-    return r.ok();
-}
-
 bool read_endpoints(json_reader& r, std::vector<std::string>& out) {
     out.clear();
     return read_texts(r, [&out](std::string_view url) {

@@ -120,11 +120,7 @@ void discovery::start() {
     if (!begun_) {
         discovery_grace_.expect();
     }
-    post(host_.environment(), [weak = host_.weak_from_this(), this] {
-        if (const auto host = weak.lock(); host && !host->stopped()) {
-            begin();
-        }
-    });
+    host_.post_while_running([this](local_node&) { begin(); });
 }
 
 void discovery::begin() {
@@ -306,7 +302,7 @@ std::vector<std::string> discovery::endpoints_of_interfaces() const {
             result.push_back(std::move(text));
         }
     };
-    std::optional<std::vector<std::string>> hosts;
+    std::optional<std::vector<std::string>> hosts; // looked up once, and only if they are needed
     for (const auto& endpoint : host_.node().endpoints) {
         auto where = parse_url(endpoint);
         if (where.scheme == "inproc" || where.scheme == "unix") {
@@ -316,11 +312,11 @@ std::vector<std::string> discovery::endpoints_of_interfaces() const {
             add(where);
             continue;
         }
-        if (!hosts) {
-            hosts = own_hosts();
-        }
         if (where.host == "::") { // IPv6 only, and the addresses are IPv4
             continue;
+        }
+        if (!hosts) {
+            hosts = own_hosts();
         }
         for (const auto& host : *hosts) {
             where.host = host;
@@ -420,11 +416,7 @@ void discovery::ask_for_roster(std::string_view node, std::uint32_t version, tim
 void discovery::visit(std::string_view node, const std::string& url) {
     const auto noun = std::string{node} + ":cles/roster";
     const auto release = [url](local_node& host, const peer_answer&) {
-        post(host.environment(), [weak = host.weak_from_this(), url] {
-            if (const auto alive = weak.lock(); alive && !alive->stopped()) {
-                alive->peer_channels().release(url);
-            }
-        });
+        host.post_while_running([url](local_node& alive) { alive.peer_channels().release(url); });
     };
     host_.peer_channels().send(node, url, {.verb = verb::pull, .noun = noun},
                                host_.now() + std::chrono::milliseconds{protocol::default_deadline_ms},
@@ -508,11 +500,9 @@ void discovery::probe(std::uint64_t ticket, const std::string& url) {
         auto found = answer.refused ? probe_outcome{}
                      : answer.code  ? failed_probe(answer.code)
                                     : read_probe_answer(answer.json);
-        post(host.environment(), [weak = host.weak_from_this(), ticket, url, name, found = std::move(found)] {
-            if (const auto alive = weak.lock(); alive && !alive->stopped()) {
-                alive->node().peers.on_probed(ticket, found, alive->now());
-                alive->peer_channels().release(url, name);
-            }
+        host.post_while_running([ticket, url, name, found = std::move(found)](local_node& alive) {
+            alive.node().peers.on_probed(ticket, found, alive.now());
+            alive.peer_channels().release(url, name);
         });
     };
     host_.peer_channels().send_to_node(name, url, {.verb = verb::pull, .noun = "self:cles"},

@@ -41,11 +41,7 @@ class gossip_driver final : private gossip::client, public gossip {
     }
     // Posted, because the last reply may have just arrived on this link.
     void release(std::string_view url) override {
-        core::post(host_.environment(), [weak = host_.weak_from_this(), url = std::string{url}] {
-            if (const auto host = weak.lock(); host && !host->stopped()) {
-                host->peer_channels().release(url);
-            }
-        });
+        host_.post_while_running([url = std::string{url}](local_node& host) { host.peer_channels().release(url); });
     }
 
     void on_stated_roster(std::string_view node, std::uint32_t version) override {
