@@ -3,6 +3,7 @@
 // counted; the client in another one.
 #include <cles/service.hpp>
 
+#include "counted_allocations.hpp"
 #include "scripted_client.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -17,39 +18,6 @@
 
 #include <sys/prctl.h>
 #include <sys/wait.h>
-
-// --- Counting --------------------------------------------------------------------------------------------------------
-
-// The names that glibc uses for the functions that are replaced here. `operator new` calls `malloc` too.
-extern "C" {
-void* __libc_malloc(std::size_t);
-void* __libc_calloc(std::size_t, std::size_t);
-void* __libc_realloc(void*, std::size_t);
-void* __libc_memalign(std::size_t, std::size_t);
-}
-
-namespace {
-std::uint64_t allocations = 0;
-}
-
-extern "C" {
-void* malloc(std::size_t size) {
-    ++allocations;
-    return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) {
-    ++allocations;
-    return __libc_calloc(count, size);
-}
-void* realloc(void* memory, std::size_t size) {
-    ++allocations;
-    return __libc_realloc(memory, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) {
-    ++allocations;
-    return __libc_memalign(alignment, size);
-}
-}
 
 namespace {
 

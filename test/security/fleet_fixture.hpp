@@ -2,6 +2,7 @@
 #pragma once
 
 #include "security/fleet_authority.hpp"
+#include "security/hex.hpp"
 #include "security/keys.hpp"
 #include "security/roster.hpp"
 
@@ -46,25 +47,6 @@ inline const boost::json::object& vectors() {
 
 inline std::string text_at(const boost::json::object& in, std::string_view key) {
     return boost::json::value_to<std::string>(in.at(key));
-}
-
-inline std::vector<std::uint8_t> from_hex(std::string_view hex) {
-    std::vector<std::uint8_t> bytes;
-    for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
-        bytes.push_back(static_cast<std::uint8_t>(std::stoi(std::string{hex.substr(i, 2)}, nullptr, 16)));
-    }
-    return bytes;
-}
-
-template <class Bytes>
-std::string to_hex(const Bytes& bytes) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string hex;
-    for (const std::uint8_t byte : bytes) {
-        hex.push_back(digits[byte >> 4U]);
-        hex.push_back(digits[byte & 15U]);
-    }
-    return hex;
 }
 
 /// A key of the vectors: fleet, car1, car2.

@@ -5,6 +5,7 @@
 
 #include "security/secured_services.hpp"
 #include "security/signed_text.hpp"
+#include "support/feed_log.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -159,28 +160,14 @@ BOOST_AUTO_TEST_CASE(an_epoch_is_confirmed_through_a_node_that_forwards) {
     cles::service car3{contexts[2], gossiping("car3", {&car1})};
     wait([&] { return contains(known_to(car1), "car2") && contains(known_to(car3), "car2"); });
     car2.update("pose", 1);
-    std::vector<int> seen;
-    cles::feed<int> feed;
-    std::function<void()> next = [&] {
-        feed.async_next([&](boost::system::error_code failed, const auto& event) {
-            if (!failed) {
-                seen.push_back(event.value);
-                next();
-            }
-        });
-    };
-    car3.async_bind<int>("car2:pose", cles::bind_options{}.at(car1.endpoints().front()),
-                         [&](boost::system::error_code code, cles::feed<int> made) {
-                             BOOST_REQUIRE_MESSAGE(!code, code.message());
-                             feed = std::move(made);
-                             next();
-                         });
+    cles::test::feed_log feed;
+    feed.bind(car3, "car2:pose", cles::bind_options{}.at(car1.endpoints().front()));
     int value = 1;
     wait([&] {
         car2.update("pose", ++value);
-        return seen.size() > 10;
+        return feed.items.size() > 10;
     });
-    feed.close();
+    BOOST_TEST(feed.bound);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/secured_services.hpp"
+#include "support/feed_log.hpp"
 #include "support/group_address.hpp"
 
 #include <boost/test/unit_test.hpp>
@@ -69,18 +70,10 @@ BOOST_AUTO_TEST_CASE(a_handler_sees_who_asks) {
 
 BOOST_AUTO_TEST_CASE(updates_arrive) {
     car1.update("pose", 1);
-    std::vector<int> seen;
-    cles::feed<int> feed;
-    car2.async_bind<int>("car1:pose", [&](boost::system::error_code code, cles::feed<int> made) {
-        BOOST_REQUIRE(!code);
-        feed = std::move(made);
-        feed.async_next([&](boost::system::error_code failed, const auto& event) {
-            BOOST_REQUIRE(!failed);
-            seen.push_back(event.value);
-        });
-    });
-    cles::test::run_until(io, [&] { return !seen.empty(); });
-    BOOST_TEST(seen.front() == 1);
+    cles::test::feed_log feed;
+    feed.bind(car2, "car1:pose");
+    cles::test::run_until(io, [&] { return !feed.items.empty(); });
+    BOOST_TEST(feed.items.front().value.text == "{\"value\":1}");
 }
 
 BOOST_AUTO_TEST_CASE(a_key_that_is_not_in_the_roster_is_refused) {
@@ -165,26 +158,12 @@ BOOST_AUTO_TEST_CASE(local_rules_narrow_them_within_a_second) {
 
 BOOST_AUTO_TEST_CASE(a_binding_ends_with_the_right_to_it) {
     car1.update("pose", 1);
-    std::vector<cles::feed_event> seen;
-    cles::feed<int> feed;
-    std::function<void()> next = [&] {
-        feed.async_next([&](boost::system::error_code failed, const auto& event) {
-            if (!failed) {
-                seen.push_back(event.kind);
-                next();
-            }
-        });
-    };
-    car2.async_bind<int>("car1:pose", [&](boost::system::error_code code, cles::feed<int> made) {
-        BOOST_REQUIRE(!code);
-        feed = std::move(made);
-        next();
-    });
-    cles::test::run_until(io, [&] { return !seen.empty(); });
+    cles::test::feed_log feed;
+    feed.bind(car2, "car1:pose");
+    cles::test::run_until(io, [&] { return !feed.items.empty(); });
     fleet.authority.set_rights("car2", {.may = std::vector<std::string>{"pull *:speed"}});
     offer(car1);
-    cles::test::run_until(io, [&] { return seen.back() == cles::feed_event::lost; });
-    feed.close();
+    cles::test::run_until(io, [&] { return feed.items.back().kind == cles::feed_event::lost; });
 }
 
 BOOST_AUTO_TEST_SUITE_END()
@@ -306,27 +285,14 @@ BOOST_AUTO_TEST_CASE(updates_are_received_through_it) {
     auto second = fleet.options("sat2");
     second.multicast = where;
     cles::service sat2{io, std::move(second)};
-    std::vector<int> seen;
-    cles::feed<int> feed;
-    std::function<void()> next = [&] {
-        feed.async_next([&](boost::system::error_code failed, const auto& event) {
-            if (!failed) {
-                seen.push_back(event.value);
-                next();
-            }
-        });
-    };
-    sat2.async_bind<int>("all:pose", cles::bind_options{}.multicast(), [&](boost::system::error_code code, auto made) {
-        BOOST_REQUIRE(!code);
-        feed = std::move(made);
-        next();
-    });
+    cles::test::feed_log feed;
+    feed.bind(sat2, "all:pose", cles::bind_options{}.multicast());
     int value = 0;
     cles::test::run_until(io, [&] {
         sat1.update("pose", ++value);
-        return seen.size() > 10;
+        return feed.items.size() > 10;
     });
-    feed.close();
+    BOOST_TEST(feed.bound);
 }
 
 BOOST_AUTO_TEST_SUITE_END()

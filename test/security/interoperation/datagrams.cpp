@@ -9,14 +9,15 @@
 //   wait MILLISECONDS
 //   seal LINE                           for the group
 //   open DATAGRAM                       from the group
+#include "protocol/request_line.hpp"
 #include "security/datagram_sessions.hpp"
 #include "security/group_receiver.hpp"
 #include "security/group_sender.hpp"
+#include "security/hex.hpp"
 
 #include <algorithm>
 #include <chrono>
 #include <exception>
-#include <iomanip>
 #include <iostream>
 #include <memory>
 #include <sstream>
@@ -27,32 +28,10 @@
 namespace {
 
 using namespace cles::security;
+using cles::security::test::from_hex;
+using cles::security::test::to_hex;
 
 constexpr auto peer_at = datagram_path::v4(0x7f000001, 25370);
-
-std::vector<std::uint8_t> from_hex(std::string_view hex) {
-    std::vector<std::uint8_t> bytes;
-    for (std::size_t i = 0; i + 1 < hex.size(); i += 2) {
-        bytes.push_back(static_cast<std::uint8_t>(std::stoul(std::string{hex.substr(i, 2)}, nullptr, 16)));
-    }
-    return bytes;
-}
-
-std::string hex_of(bytes_view bytes) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string hex;
-    for (const auto byte : bytes) {
-        hex.push_back(digits[byte >> 4U]);
-        hex.push_back(digits[byte & 15U]);
-    }
-    return hex;
-}
-
-std::string hex_of(std::uint32_t number) {
-    std::ostringstream text;
-    text << std::hex << std::setfill('0') << std::setw(8) << number;
-    return text.str();
-}
 
 std::shared_ptr<const roster> read_roster(const std::string& line, bytes_view fleet_key) {
     public_key key{};
@@ -81,7 +60,7 @@ class node final : public datagram_sink {
             now_ += std::chrono::milliseconds{std::stoi(rest)};
             sessions_.on_time(now_);
         } else if (command == "seal") {
-            std::cout << "sealed " << hex_of(sender_.seal(rest)) << "\n";
+            std::cout << "sealed " << to_hex(sender_.seal(rest)) << "\n";
         } else if (command == "open") {
             open(from_hex(rest));
         } else {
@@ -98,7 +77,7 @@ class node final : public datagram_sink {
         if (result.what == group_receiver::verdict::opened) {
             const bool accepted = receiver_.accept(result.accepted_by, group_receiver::ordered_by::counter);
             std::cout << (accepted ? "accepted " : "refused ") << result.accepted_by.member << " "
-                      << hex_of(result.epoch) << " " << result.line << "\n";
+                      << cles::protocol::epoch_text(result.epoch) << " " << result.line << "\n";
         }
         if (result.contact) {
             std::cout << "unknown " << result.contact->member << "\n";
@@ -106,7 +85,7 @@ class node final : public datagram_sink {
     }
 
     void send(const datagram_path&, bytes_view datagram) override {
-        std::cout << "datagram " << hex_of(datagram) << "\n";
+        std::cout << "datagram " << to_hex(datagram) << "\n";
     }
     node_statement statement() override {
         return {.roster = fleet_.in_force().version(),
@@ -116,11 +95,12 @@ class node final : public datagram_sink {
     }
     void established(const datagram_source& with, const node_statement& stated, bool restarted) override {
         receiver_.learn(with.member, stated);
-        std::cout << "established " << with.member << " " << stated.roster << " " << hex_of(stated.epoch) << " "
-                  << hex_of(stated.salt) << " " << stated.counter << " " << (restarted ? "restarted" : "-") << "\n";
+        std::cout << "established " << with.member << " " << stated.roster << " "
+                  << cles::protocol::epoch_text(stated.epoch) << " " << to_hex(stated.salt) << " " << stated.counter
+                  << " " << (restarted ? "restarted" : "-") << "\n";
     }
     void opened(const datagram_source& from, std::uint32_t epoch, std::string_view line) override {
-        std::cout << "opened " << from.member << " " << hex_of(epoch) << " " << line << "\n";
+        std::cout << "opened " << from.member << " " << cles::protocol::epoch_text(epoch) << " " << line << "\n";
     }
     void gave_up(const datagram_source& with, bool) override { std::cout << "gave_up " << with.member << "\n"; }
 

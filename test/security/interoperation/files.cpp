@@ -8,6 +8,7 @@
 
 #include "security/fleet_authority.hpp"
 #include "security/group_keys.hpp"
+#include "security/hex.hpp"
 #include "security/key_directory.hpp"
 #include "security/signed_text.hpp"
 
@@ -20,6 +21,7 @@
 namespace {
 
 using namespace cles::security;
+using cles::security::test::to_hex;
 
 void write_text_file(const key_directory& files, const std::string& name, std::string_view text) {
     files.folder().replace_file(name, {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()},
@@ -61,16 +63,6 @@ void write_fleet(const std::string& folder) {
     write_signatures(car1_files, car1.key, authority.newest().fleet());
 }
 
-std::string hex_of(bytes_view bytes) {
-    constexpr std::string_view digits = "0123456789abcdef";
-    std::string hex;
-    for (const auto byte : bytes) {
-        hex.push_back(digits[byte >> 4U]);
-        hex.push_back(digits[byte & 15U]);
-    }
-    return hex;
-}
-
 void write_texts(cles::json_writer& out, std::string_view key, const std::vector<std::string>& texts) {
     out.key(key);
     out.begin_array();
@@ -96,21 +88,21 @@ void print_node(const std::string& folder) {
     const auto keys = open_group_keys(newest.find(node.own.name)->group_keys, node.own.key);
     out.begin_object();
     text_value("node", node.own.name);
-    text_value("fleet", hex_of(newest.fleet()));
+    text_value("fleet", to_hex(newest.fleet()));
     number("version", newest.version());
     number("last", newest.last());
     number("generation", newest.generation());
     number("oldest", newest.oldest());
-    text_value("current", hex_of(keys.current.view()));
-    text_value("next", hex_of(keys.next.view()));
+    text_value("current", to_hex(keys.current.view()));
+    text_value("next", to_hex(keys.next.view()));
     out.key("members");
     out.begin_array();
     for (const auto& entry : newest.members()) {
         out.begin_object();
         number("number", entry.number);
         text_value("name", entry.name);
-        text_value("key", hex_of(entry.key));
-        text_value("agreement", hex_of(entry.agreement));
+        text_value("key", to_hex(entry.key));
+        text_value("agreement", to_hex(entry.agreement));
         if (entry.may) {
             write_texts(out, "may", *entry.may);
         }
