@@ -10,9 +10,9 @@
 #include "perf/support/child_process.hpp"
 #include "perf/support/latency_recorder.hpp"
 #include "perf/support/pinning.hpp"
-#include "security/fleet.hpp"
-#include "security/fleet_authority.hpp"
-#include "security/keys.hpp"
+#include "security/fleet/fleet.hpp"
+#include "security/fleet/fleet_authority.hpp"
+#include "security/keys/keys.hpp"
 #include "tls/tls_transport.hpp"
 
 #include <boost/asio/io_context.hpp>

@@ -3,9 +3,9 @@
 
 #include <cles/link.hpp>
 
-#include "security/fleet.hpp"
-#include "security/fleet_authority.hpp"
-#include "security/keys.hpp"
+#include "security/fleet/fleet.hpp"
+#include "security/fleet/fleet_authority.hpp"
+#include "security/keys/keys.hpp"
 #include "tls/tls_transport.hpp"
 
 #include <boost/test/unit_test.hpp>

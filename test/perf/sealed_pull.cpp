@@ -5,9 +5,9 @@
 #include <cles/service.hpp>
 
 #include "counted_allocations.hpp"
-#include "security/fleet_authority.hpp"
-#include "security/key_directory.hpp"
-#include "security/noise_kk.hpp"
+#include "security/datagrams/noise_kk.hpp"
+#include "security/fleet/fleet_authority.hpp"
+#include "security/fleet/key_directory.hpp"
 
 #include <boost/asio/io_context.hpp>
 

@@ -90,10 +90,10 @@ SANS_IO = {"json", "protocol", "port", "node", "security"}
 # file -> such headers that it may include and use nevertheless, each with a reason.
 WITHOUT_IO = {
     "libcles/src/node/base/ip_network.cpp": {"arpa/inet.h"},  # inet_pton and inet_ntop read and write text
-    "libcles/src/security/fork_count.cpp": {"pthread.h"},  # pthread_atfork: keys must not be used on in a child process
+    "libcles/src/security/datagrams/fork_count.cpp": {"pthread.h"},  # pthread_atfork: keys must not be used on in a child process
     # Key files; each is checked after it has been opened.
-    "libcles/src/security/protected_folder.cpp": {"fcntl.h", "sys/file.h", "sys/stat.h", "unistd.h"},
-    "libcles/src/security/secret.cpp": {"mutex"},  # any thread may destroy a secret
+    "libcles/src/security/fleet/protected_folder.cpp": {"fcntl.h", "sys/file.h", "sys/stat.h", "unistd.h"},
+    "libcles/src/security/keys/secret.cpp": {"mutex"},  # any thread may destroy a secret
 }
 
 # What sans-I/O code must not use, because it is passed the time and its random numbers.
@@ -347,11 +347,11 @@ GOOD = {
     "libcles/src/asio/dial.cpp": '#include "node/session.hpp"\n#include "transport/tcp.hpp"\n#include <boost/asio/post.hpp>\n',
     "libcles/src/node/session.hpp": "#pragma once\n",
     "libcles/src/transport/tcp.hpp": "#pragma once\n",
-    "libcles/src/security/keys.cpp": '#include "json/reader.hpp"\n#include "security/secret.hpp"\n#include <sodium.h>\n',
-    "libcles/src/security/secret.hpp": "#pragma once\n",
-    "libcles/src/security/secret.cpp": "#include <mutex>\nstatic std::mutex guard;\n",
+    "libcles/src/security/keys/keys.cpp": '#include "json/reader.hpp"\n#include "security/keys/secret.hpp"\n#include <sodium.h>\n',
+    "libcles/src/security/keys/secret.hpp": "#pragma once\n",
+    "libcles/src/security/keys/secret.cpp": "#include <mutex>\nstatic std::mutex guard;\n",
     "libcles/src/json/reader.hpp": "#pragma once\n",
-    "libcles/src/tls/engine.hpp": '#include "security/secret.hpp"\n#include "transport/tcp.hpp"\n#include <openssl/ssl.h>\n',
+    "libcles/src/tls/engine.hpp": '#include "security/keys/secret.hpp"\n#include "transport/tcp.hpp"\n#include <openssl/ssl.h>\n',
     "libcles/src/api/service.cpp": '#include <cles/service.hpp>\n#include "api/connection.hpp"\n',
     "libcles/src/api/connection.hpp": "#pragma once\n",
     "runtime/src/config/config.cpp": "#include <yaml-cpp/yaml.h>\n#include <cles/service.hpp>\n",
@@ -382,13 +382,13 @@ PLANTED = [
     ("libcles/src/transport/a.cpp", '#include "node/session.hpp"\n', "transport must not include node"),
     ("libcles/src/transport/a.cpp", '#include "api/connection.hpp"\n', "transport must not include api"),
     ("libcles/src/transport/a.cpp", "#include <cles/service.hpp>\n", "must not include the facade"),
-    ("libcles/src/node/a.cpp", '#include "security/secret.hpp"\n', "node must not include security"),
+    ("libcles/src/node/a.cpp", '#include "security/keys/secret.hpp"\n', "node must not include security"),
     ("libcles/src/transport/a.cpp", "#include <sodium.h>\n", "libsodium belongs to security alone"),
     ("libcles/src/security/a.cpp", "#include <openssl/ssl.h>\n", "OpenSSL belongs to tls alone"),
     ("libcles/src/transport/a.cpp", '#include "tls/engine.hpp"\n', "transport must not include tls"),
     ("libcles/src/security/a.cpp", "#include <fcntl.h>\n", "security is sans-I/O"),
     ("libcles/src/security/a.cpp", '#include "node/session.hpp"\n', "security must not include node"),
-    ("libcles/src/security/secret.cpp", "static std::mutex guard;\nstd::thread t;\n", "waits, locks or starts threads"),
+    ("libcles/src/security/keys/secret.cpp", "static std::mutex guard;\nstd::thread t;\n", "waits, locks or starts threads"),
     ("libcles/src/api/a.cpp", "#include <spdlog/spdlog.h>\n", "spdlog is for programs"),
     ("apps/cles/output/a.cpp", "#include <thread>\n", "this program has one thread"),
     ("libcles/src/api/a.cpp", '#include "nowhere.hpp"\n', "is not a file of this project"),

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/access_policy.hpp"
+#include "security/access/access_policy.hpp"
 
 #include <boost/json.hpp>
 #include <boost/test/unit_test.hpp>

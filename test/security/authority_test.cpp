@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/fleet_authority.hpp"
+#include "security/fleet/fleet_authority.hpp"
 #include "security/fleet_fixture.hpp"
 
 #include <boost/test/unit_test.hpp>

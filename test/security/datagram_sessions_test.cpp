@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/child_process.hpp"
-#include "security/datagram_sessions.hpp"
+#include "security/datagrams/datagram_sessions.hpp"
 #include "security/sealed_network.hpp"
 
 #include <boost/test/unit_test.hpp>

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/fleet_authority.hpp"
+#include "security/fleet/fleet_authority.hpp"
+#include "security/fleet/roster.hpp"
 #include "security/hex.hpp"
-#include "security/keys.hpp"
-#include "security/roster.hpp"
+#include "security/keys/keys.hpp"
 
 #include <boost/json.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/child_process.hpp"
-#include "security/fork_count.hpp"
+#include "security/datagrams/fork_count.hpp"
 
 #include <boost/test/unit_test.hpp>
 

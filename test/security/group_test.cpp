@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/child_process.hpp"
-#include "security/group_receiver.hpp"
-#include "security/group_sender.hpp"
+#include "security/datagrams/group_receiver.hpp"
+#include "security/datagrams/group_sender.hpp"
 #include "security/sealed_network.hpp"
 
 #include <boost/test/unit_test.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/fleet_fixture.hpp"
-#include "security/identity.hpp"
+#include "security/keys/identity.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "security/fleet/key_directory.hpp"
 #include "security/fleet_fixture.hpp"
-#include "security/key_directory.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/datagram_format.hpp"
-#include "security/noise_kk.hpp"
+#include "security/datagrams/datagram_format.hpp"
+#include "security/datagrams/noise_kk.hpp"
 #include "security/sealed_network.hpp"
 
 #include <boost/test/unit_test.hpp>

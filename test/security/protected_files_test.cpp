@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "security/fleet/protected_folder.hpp"
 #include "security/fleet_fixture.hpp"
-#include "security/protected_folder.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/rate_limit.hpp"
+#include "security/datagrams/rate_limit.hpp"
 
 #include <boost/test/unit_test.hpp>
 

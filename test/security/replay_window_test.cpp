@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/replay_window.hpp"
+#include "security/datagrams/replay_window.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/rights.hpp"
+#include "security/access/rights.hpp"
 
 #include <boost/test/unit_test.hpp>
 

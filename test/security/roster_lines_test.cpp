@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "security/fleet/group_keys.hpp"
+#include "security/fleet/roster.hpp"
 #include "security/fleet_fixture.hpp"
-#include "security/group_keys.hpp"
-#include "security/roster.hpp"
 
 #include <boost/test/unit_test.hpp>
 

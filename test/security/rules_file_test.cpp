@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/local_rules.hpp"
+#include "security/access/local_rules.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/datagram_sessions.hpp"
-#include "security/fleet_authority.hpp"
+#include "security/datagrams/datagram_sessions.hpp"
+#include "security/datagrams/group_receiver.hpp"
+#include "security/datagrams/group_sender.hpp"
+#include "security/fleet/fleet_authority.hpp"
 #include "security/fleet_fixture.hpp"
-#include "security/group_receiver.hpp"
-#include "security/group_sender.hpp"
 
 #include <chrono>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/secret.hpp"
+#include "security/keys/secret.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -3,15 +3,14 @@
 #include <cles/gossip.hpp>
 #include <cles/routing.hpp>
 
+#include "security/keys/signed_text.hpp"
 #include "security/secured_services.hpp"
-#include "security/signed_text.hpp"
 #include "support/feed_log.hpp"
 
 #include <boost/test/unit_test.hpp>
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <utility>

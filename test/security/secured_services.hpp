@@ -4,9 +4,9 @@
 #include <cles/security.hpp>
 #include <cles/service.hpp>
 
-#include "security/fleet_authority.hpp"
+#include "security/fleet/fleet_authority.hpp"
+#include "security/fleet/key_directory.hpp"
 #include "security/fleet_fixture.hpp"
-#include "security/key_directory.hpp"
 #include "support/run_until.hpp"
 
 #include <boost/asio/io_context.hpp>

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/fleet_fixture.hpp"
-#include "security/signed_text.hpp"
+#include "security/keys/signed_text.hpp"
 
 #include <boost/test/unit_test.hpp>
 

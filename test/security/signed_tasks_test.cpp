@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/routing.hpp>
 
+#include "security/keys/signed_text.hpp"
 #include "security/secured_services.hpp"
-#include "security/signed_text.hpp"
 #include "support/group_address.hpp"
 #include "tls/tls_transport.hpp"
 

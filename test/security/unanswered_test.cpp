@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/unanswered.hpp"
+#include "security/datagrams/unanswered.hpp"
 
 #include <boost/test/unit_test.hpp>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "security/wildcard.hpp"
+#include "security/access/wildcard.hpp"
 
 #include <boost/test/unit_test.hpp>
 

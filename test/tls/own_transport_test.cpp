@@ -3,7 +3,7 @@
 
 #include "asio/asio_environment.hpp"
 #include "node/local_node.hpp"
-#include "security/fleet.hpp"
+#include "security/fleet/fleet.hpp"
 #include "security/fleet_fixture.hpp"
 #include "support/recorded_reply.hpp"
 #include "support/run_until.hpp"

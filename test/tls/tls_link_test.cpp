@@ -3,7 +3,7 @@
 
 #include <cles/link.hpp>
 
-#include "security/fleet.hpp"
+#include "security/fleet/fleet.hpp"
 #include "security/fleet_fixture.hpp"
 #include "security/link_admission.hpp"
 #include "support/link_recorder.hpp"

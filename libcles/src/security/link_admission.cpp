@@ -5,7 +5,7 @@
 
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
-#include "security/roster.hpp"
+#include "security/fleet/roster.hpp"
 
 #include <algorithm>
 #include <utility>

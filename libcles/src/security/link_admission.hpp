@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/fleet.hpp"
+#include "security/fleet/fleet.hpp"
 
 #include <cstddef>
 #include <cstdint>

@@ -3,9 +3,9 @@
 
 #include <cles/error.hpp>
 
-#include "security/rules_file.hpp"
-#include "security/sealed_group_port.hpp"
-#include "security/signed_text.hpp"
+#include "security/access/rules_file.hpp"
+#include "security/datagrams/sealed_group_port.hpp"
+#include "security/keys/signed_text.hpp"
 
 #include <algorithm>
 #include <cstddef>

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "port/node_security.hpp"
-#include "security/access_policy.hpp"
-#include "security/fleet.hpp"
-#include "security/key_directory.hpp"
-#include "security/sealed_datagrams.hpp"
+#include "security/access/access_policy.hpp"
+#include "security/datagrams/sealed_datagrams.hpp"
+#include "security/fleet/fleet.hpp"
+#include "security/fleet/key_directory.hpp"
 
 #include <chrono>
 #include <cstdint>

@@ -3,7 +3,7 @@
 
 #include <cles/link.hpp>
 
-#include "security/sealed_datagrams.hpp"
+#include "security/datagrams/sealed_datagrams.hpp"
 
 #include <memory>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/keys.hpp"
+#include "security/keys/keys.hpp"
 
 #include <memory>
 

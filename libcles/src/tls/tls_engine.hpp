@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/keys.hpp"
+#include "security/keys/keys.hpp"
 #include "tls/tls_context.hpp"
 
 #include <boost/system/error_code.hpp>

@@ -3,7 +3,7 @@
 
 #include <cles/link.hpp>
 
-#include "security/fleet.hpp"
+#include "security/fleet/fleet.hpp"
 
 #include <chrono>
 #include <functional>

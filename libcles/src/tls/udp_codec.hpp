@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include "security/sealed_datagrams.hpp"
+#include "security/datagrams/sealed_datagrams.hpp"
 #include "transport/datagram_codec.hpp"
 
 #include <cstdint>

@@ -10,7 +10,7 @@
 #include "protocol/line.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
-#include "security/fleet_authority.hpp"
+#include "security/fleet/fleet_authority.hpp"
 
 #include <array>
 #include <cstdint>

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // A requester, a verb and a noun in the first line, and then a file of rules: it is read, or denies everything and says
 // why; each rule can be written and read again; the first rule that matches by the simplest reading of it decides.
-#include "security/local_rules.hpp"
+#include "security/access/local_rules.hpp"
 
 #include "fuzz/fuzz.hpp"
 #include "fuzz/naive_rights.hpp"

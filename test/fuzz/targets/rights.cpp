@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 // A verb and a noun in the first line, and a right in each further one: a right of another form permits nothing and
 // says why, and one that is valid permits what the simplest reading of it does.
-#include "security/rights.hpp"
+#include "security/access/rights.hpp"
 
 #include "fuzz/fuzz.hpp"
 #include "fuzz/naive_rights.hpp"

@@ -2,13 +2,13 @@
 // Rosters and the lines of key files. An input that is not a whole line is the content of a roster, which is signed
 // here, so that what is behind the signature is reached.
 
-#include "security/roster.hpp"
+#include "security/fleet/roster.hpp"
 
 #include "fuzz/fuzz.hpp"
 #include "protocol/grammar.hpp"
-#include "security/fleet.hpp"
-#include "security/fleet_authority.hpp"
-#include "security/identity.hpp"
+#include "security/fleet/fleet.hpp"
+#include "security/fleet/fleet_authority.hpp"
+#include "security/keys/identity.hpp"
 
 #include <algorithm>
 #include <array>

@@ -16,10 +16,10 @@
 // For every input: car1 opens no line that car2 has not sealed for it, and none more often; nothing is answered that no
 // member has sealed; what is kept is limited; without activity nothing is kept.
 #include "fuzz/fuzz.hpp"
-#include "security/datagram_sessions.hpp"
-#include "security/fleet_authority.hpp"
-#include "security/group_receiver.hpp"
-#include "security/group_sender.hpp"
+#include "security/datagrams/datagram_sessions.hpp"
+#include "security/datagrams/group_receiver.hpp"
+#include "security/datagrams/group_sender.hpp"
+#include "security/fleet/fleet_authority.hpp"
 
 #include <algorithm>
 #include <chrono>

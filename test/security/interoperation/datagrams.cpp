@@ -10,9 +10,9 @@
 //   seal LINE                           for the group
 //   open DATAGRAM                       from the group
 #include "protocol/request_line.hpp"
-#include "security/datagram_sessions.hpp"
-#include "security/group_receiver.hpp"
-#include "security/group_sender.hpp"
+#include "security/datagrams/datagram_sessions.hpp"
+#include "security/datagrams/group_receiver.hpp"
+#include "security/datagrams/group_sender.hpp"
 #include "security/hex.hpp"
 
 #include <algorithm>

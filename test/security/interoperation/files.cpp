@@ -6,11 +6,11 @@
 
 #include <cles/json_writer.hpp>
 
-#include "security/fleet_authority.hpp"
-#include "security/group_keys.hpp"
+#include "security/fleet/fleet_authority.hpp"
+#include "security/fleet/group_keys.hpp"
+#include "security/fleet/key_directory.hpp"
 #include "security/hex.hpp"
-#include "security/key_directory.hpp"
-#include "security/signed_text.hpp"
+#include "security/keys/signed_text.hpp"
 
 #include <exception>
 #include <iostream>

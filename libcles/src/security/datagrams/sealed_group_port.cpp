@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "security/datagrams/sealed_group_port.hpp"
+
+#include <cles/json_reader.hpp>
+
+#include "json/json_members.hpp"
+#include "protocol/request_line.hpp"
+
+#include <utility>
+
+namespace cles::security {
+namespace {
+
+constexpr std::size_t max_unknown = 256; // members
+constexpr std::size_t max_endpoints = 16;
+constexpr std::size_t depth = 8; // of an announcement
+
+bytes_view as_bytes(std::string_view text) noexcept {
+    return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()};
+}
+
+std::string_view as_text(bytes_view bytes) noexcept {
+    return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+// Of an announcement; empty for other lines.
+std::vector<std::string> endpoints_in(std::string_view line) {
+    std::vector<std::string> found;
+    protocol::request_line said;
+    if (!protocol::parse_group_message(line, said) || !said.is_update() || said.noun.path != "cles") {
+        return found;
+    }
+    json_reader r{said.body, depth};
+    core::read_members(r, [&](std::string_view key) {
+        return key != "endpoints" ? r.skip() : core::read_texts(r, [&](std::string_view text) {
+            if (found.size() < max_endpoints) {
+                found.emplace_back(text);
+            }
+        });
+    });
+    return found;
+}
+
+/// Of one datagram, which it outlives.
+class group_admission final : public core::datagram_admission {
+  public:
+    group_admission(sealed_datagrams& by, const group_receiver::ticket& ticket) noexcept : by_(by), ticket_(ticket) {}
+    bool accept(bool is_signed) override {
+        return by_.accept(ticket_,
+                          is_signed ? group_receiver::ordered_by::signed_seq : group_receiver::ordered_by::counter);
+    }
+
+  private:
+    sealed_datagrams& by_;
+    const group_receiver::ticket& ticket_;
+};
+
+} // namespace
+
+sealed_group_port::sealed_group_port(std::shared_ptr<sealed_datagrams> by, std::shared_ptr<core::group_port> port,
+                                     unanswered report)
+    : all_(std::move(by)), port_(std::move(port)), report_(std::move(report)), number_(all_->add(*this)) {}
+
+sealed_group_port::~sealed_group_port() { sealed_group_port::close(); }
+
+void sealed_group_port::start(core::group_listener& owner) {
+    owner_ = &owner;
+    port_->start(*this);
+    port_->receive_own();
+}
+
+void sealed_group_port::close() {
+    owner_ = nullptr;
+    all_->remove(number_);
+    port_->close();
+}
+
+// -- sending -------------------------------------------------------------------------------------------------------
+
+core::datagrams_done sealed_group_port::send(core::datagram_list all) {
+    sealed_.clear();
+    sizes_.clear();
+    core::datagrams_done lost; // lines that cannot be sealed
+    for (auto rest = all; !rest.empty(); rest.drop_first()) {
+        auto line = rest.first();
+        line.remove_suffix(line.ends_with('\n') ? 1 : 0);
+        const auto datagram = all_->seal_for_group(line);
+        sealed_.append(as_text(datagram));
+        sizes_.push_back(static_cast<std::uint16_t>(datagram.size()));
+    }
+    if (sealed_.empty()) { // this node is not in the roster
+        for (; !all.empty(); all.drop_first()) {
+            ++lost.count;
+            lost.bytes += all.first().size();
+        }
+        return lost;
+    }
+    const auto sent = port_->send({sealed_, sizes_});
+    core::datagrams_done done{.count = sent.count};
+    for (auto left = sent.count; left != 0; --left) {
+        done.bytes += all.first().size();
+        all.drop_first();
+    }
+    return done;
+}
+
+void sealed_group_port::on_writable() {
+    if (owner_ != nullptr) {
+        owner_->on_writable();
+    }
+}
+
+// -- receiving -----------------------------------------------------------------------------------------------------
+
+void sealed_group_port::on_datagram(const core::group_datagram& datagram) {
+    if (owner_ == nullptr) {
+        return;
+    }
+    if (!is_sealed(as_bytes(datagram.text))) {
+        all_->count_unsealed();
+        return;
+    }
+    if (datagram.to_group) {
+        on_group(datagram);
+    } else {
+        all_->receive(path_of(datagram.from), as_bytes(datagram.text));
+    }
+}
+
+void sealed_group_port::on_group(const core::group_datagram& datagram) {
+    const auto found = all_->open_group(path_of(datagram.from), as_bytes(datagram.text));
+    if (found.what == group_receiver::verdict::unknown_salt) {
+        note_unknown(read_head(as_bytes(datagram.text))->sender, found.line);
+        return;
+    }
+    const auto* const sender = found.what == group_receiver::verdict::opened
+                                   ? all_->members().in_force().find(found.accepted_by.member)
+                                   : nullptr;
+    if (sender == nullptr) {
+        return;
+    }
+    received_.insert(found.accepted_by.member);
+    // Both outlive the call, in which another roster may come into force, or another datagram be opened.
+    const std::string name = sender->name;
+    auto line = std::exchange(line_, {});
+    line.assign(found.line);
+    protocol::request_line said;
+    const bool good = protocol::parse_group_message(line, said);
+    group_admission admission{*all_, found.accepted_by};
+    owner_->on_datagram({.from = datagram.from,
+                         .text = line,
+                         .request = good ? &said : nullptr,
+                         .member = name,
+                         .epoch = found.epoch,
+                         .admission = &admission});
+    line_ = std::move(line);
+}
+
+// -- members with unknown salts ------------------------------------------------------------------------------------
+
+void sealed_group_port::note_unknown(std::uint32_t member, std::string_view line) {
+    if (auto endpoints = endpoints_in(line); !endpoints.empty() || unknown_.contains(member)) {
+        if (unknown_.size() >= max_unknown && !unknown_.contains(member)) {
+            unknown_.erase(unknown_.begin());
+        }
+        if (!endpoints.empty()) {
+            unknown_.insert_or_assign(member, std::move(endpoints));
+        }
+    } else if (unknown_.size() < max_unknown) {
+        unknown_.try_emplace(member);
+    }
+}
+
+// It is asked to announce itself: what it has announced under this salt so far was dropped. So was what this node has
+// asked the group since its start, if the peer did not know its salt either.
+void sealed_group_port::on_established(const datagram_source& with, std::uint32_t) {
+    const auto* const peer = all_->members().in_force().find(with.member);
+    const bool was_unknown = unknown_.erase(with.member) != 0;
+    if ((was_unknown || !received_.contains(with.member)) && peer != nullptr) {
+        static_cast<void>(send(std::string_view{"BIND " + peer->name + ":cles\n"}));
+    }
+}
+
+void sealed_group_port::on_gave_up(const datagram_source& with, bool) {
+    if (const auto gone = unknown_.extract(with.member); !gone.empty() && report_) {
+        report_(with.member, gone.mapped());
+    }
+}
+
+void sealed_group_port::send_sealed(const datagram_path& to, bytes_view datagram) {
+    if (to.is_v4()) {
+        port_->send_to({.address = to.v4_address(), .port = to.port}, as_text(datagram));
+    }
+}
+
+} // namespace cles::security
