@@ -46,7 +46,7 @@ BOOST_AUTO_TEST_CASE(the_first_line_that_matches_counts) {
     BOOST_TEST(matching_line(rules, "sat2", verb::push, "car1:target") == 4U);
     BOOST_TEST(matching_line(rules, "sat2", verb::pull, "car1:target") == 0U);
     BOOST_TEST(matching_line(rules, "car2", verb::push, "car1:target") == 0U);
-    // `offers` is about the target, whoever asks.
+    // `offers` is about the target; who asks does not matter.
     BOOST_TEST(matching_line(rules, "sat2", verb::pull, "car1:log/a") == 5U);
     BOOST_TEST(matching_line(rules, "car2", verb::pull, "sat1:log/a") == 0U);
     // `may` is not about requests of this node.

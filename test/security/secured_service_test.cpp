@@ -143,7 +143,7 @@ BOOST_AUTO_TEST_CASE(they_change_without_a_restart) {
     BOOST_TEST(ask(io, car2, "PUSH car1:note {\"value\":\"hi\"}") == "{}");
     fleet.authority.set_rights("car2", {});
     offer(car1);
-    cles::test::run_until(io, [&] { return ask(io, car2, "PULL car1:speed") == speed; }); // car2 hears of it, too
+    cles::test::run_until(io, [&] { return ask(io, car2, "PULL car1:speed") == speed; }); // car2 is told of it, too
 }
 
 BOOST_AUTO_TEST_CASE(local_rules_narrow_them_within_a_second) {
