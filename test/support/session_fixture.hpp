@@ -5,6 +5,7 @@
 
 #include "node/flush_scheduler.hpp"
 #include "node/node_state.hpp"
+#include "node/secured/secured_protocol.hpp"
 #include "node/session/call.hpp"
 #include "node/session/session.hpp"
 #include "support/manual_clock.hpp"
@@ -34,6 +35,7 @@ class test_node {
                                                                      .bounds = bounds,
                                                                      .authorise = std::move(rules),
                                                                      .security = std::move(security),
+                                                                     .secured = &core::make_secured_protocol,
                                                                      .log = std::move(log),
                                                                      .complete = std::move(complete)},
                                                   clock, [this] { ++wakes; })) {}
@@ -42,6 +44,11 @@ class test_node {
     void pass(std::chrono::milliseconds by) {
         clock.advance(by);
         host->deadlines.expire(clock.now());
+    }
+
+    /// What it says as a secured node. \pre it has security
+    [[nodiscard]] core::secured_protocol& secured() const {
+        return static_cast<core::secured_protocol&>(*host->secured);
     }
 
     using plain = std::function<void(const request&, json_writer&)>;

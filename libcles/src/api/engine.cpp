@@ -26,23 +26,25 @@ namespace cles::detail {
 namespace {
 
 core::local_node_options options_of(service_options&& all, asio_port::asio_environment& by) {
-    const auto epoch = by.random();
-    return {.node = {.name = std::move(all.name),
-                     .pool = std::move(all.pool),
-                     .epoch = epoch,
-                     .bounds = all.limits,
-                     .authorise = std::move(all.authorise),
-                     .security = all.security ? all.security->equip(by, epoch) : nullptr,
-                     .log = std::move(all.log),
-                     .metrics = std::move(all.metrics),
-                     .load = std::move(all.load)},
-            .peers = std::move(all.peers),
-            .insecure = all.insecure,
-            .networks = std::move(all.networks),
-            .multicast = std::move(all.multicast),
-            .gossip = std::move(all.gossip),
-            .on_name_taken = std::move(all.on_name_taken),
-            .routing = all.routing};
+    core::local_node_options result{.node = {.name = std::move(all.name),
+                                             .pool = std::move(all.pool),
+                                             .epoch = by.random(),
+                                             .bounds = all.limits,
+                                             .authorise = std::move(all.authorise),
+                                             .log = std::move(all.log),
+                                             .metrics = std::move(all.metrics),
+                                             .load = std::move(all.load)},
+                                    .peers = std::move(all.peers),
+                                    .insecure = all.insecure,
+                                    .networks = std::move(all.networks),
+                                    .multicast = std::move(all.multicast),
+                                    .gossip = std::move(all.gossip),
+                                    .on_name_taken = std::move(all.on_name_taken),
+                                    .routing = all.routing};
+    if (all.security) {
+        all.security->equip(by, result.node);
+    }
+    return result;
 }
 
 /// What a responder holds: the call, and the service that received it. When the last copy is destroyed, the call has

@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cstdint>
-#include <memory>
-
 namespace cles::asio_port {
 class asio_environment;
 }
 
 namespace cles::core {
-class node_security;
+struct node_options;
 }
 
 namespace cles::detail {
@@ -23,9 +20,9 @@ class security_part {
     security_part& operator=(const security_part&) = delete;
     virtual ~security_part() = default;
 
-    /// Adds its transports to the service's environment. Called once. \throws cles::error
-    virtual std::shared_ptr<core::node_security> equip(asio_port::asio_environment& environment,
-                                                       std::uint32_t epoch) = 0;
+    /// Adds its transports to the service's environment, and itself to the settings of the node. Called once.
+    /// \throws cles::error
+    virtual void equip(asio_port::asio_environment& environment, core::node_options& node) = 0;
 };
 
 } // namespace cles::detail

@@ -4,6 +4,8 @@
 
 #include "api/security_part.hpp"
 #include "asio/asio_environment.hpp"
+#include "node/node_state.hpp"
+#include "node/secured/secured_protocol.hpp"
 #include "security/secured_node.hpp"
 #include "tls/sealed_udp.hpp"
 #include "tls/tls_transport.hpp"
@@ -26,22 +28,23 @@ class service_security final : public detail::security_part {
         local_users_.insert_or_assign(static_cast<std::uint32_t>(::geteuid()), node_->name());
     }
 
-    std::shared_ptr<core::node_security> equip(asio_port::asio_environment& environment, std::uint32_t epoch) override {
+    void equip(asio_port::asio_environment& environment, core::node_options& node) override {
         if (equipped_) {
             throw error(errc::invalid_option, "the security of a service cannot be used for a second one");
         }
         equipped_ = true;
         environment.add_transport(
             "tls", tls::make_tls_transport({.fleet = node_->members(),
-                                            .epoch = protocol::epoch_text(epoch),
+                                            .epoch = protocol::epoch_text(node.epoch),
                                             .report = [weak = std::weak_ptr{node_}](std::string_view why) {
-                                                if (const auto node = weak.lock()) {
-                                                    node->log_refused_link(why);
+                                                if (const auto alive = weak.lock()) {
+                                                    alive->log_refused_link(why);
                                                 }
                                             }}));
         environment.add_transport("udp", tls::make_sealed_udp(node_->members(), node_->datagrams()));
         environment.add_transport("unix", transport::make_unix(local_users_));
-        return node_;
+        node.security = node_;
+        node.secured = &core::make_secured_protocol;
     }
 
   private:

@@ -116,7 +116,13 @@ local_node::local_node(std::shared_ptr<core::environment> by, local_node_options
     discovery_ = std::make_unique<core::discovery>(*this, environment_->random());
 }
 
-local_node::~local_node() { node_->deadlines.set_observer({}); } // others may share the state
+// Others may share the state.
+local_node::~local_node() {
+    node_->deadlines.set_observer({});
+    if (node_->secured) {
+        node_->secured->stop();
+    }
+}
 
 void local_node::start(const std::vector<std::string>& listen_at) {
     environment_->start_timer([weak = weak_from_this()] {
@@ -128,9 +134,8 @@ void local_node::start(const std::vector<std::string>& listen_at) {
     if (routing_wanted_ != nullptr) {
         routing_ = routing_wanted_->make(*this);
     }
-    if (node_->security) {
-        security_.emplace(*this);
-        signer_.emplace(*this);
+    if (node_->secured) {
+        node_->secured->start(*this);
     }
     for (const auto& where : listen_at) {
         listen(where);
@@ -264,8 +269,8 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     const auto id = draw_id();
     const auto started = now();
     const auto deadline = saturating_add(started, time_limit(options.deadline_, how));
-    if (signer_) {
-        operation = signer_->watch(
+    if (node_->secured) {
+        operation = node_->secured->watch(
             {.how = how, .noun = noun, .body = body, .options = options, .deadline = deadline, .ticket = id},
             std::move(operation));
     }
@@ -316,7 +321,7 @@ void local_node::cancel(std::uint64_t ticket) {
     if (graceful_shutdown_ && graceful_shutdown_->ticket() == ticket) {
         node_->completions.fail(graceful_shutdown_->give_up(), errc::cancelled,
                                 "the wait for the service to close was cancelled");
-    } else if (!cancel_sent(ticket) && !(signer_ && signer_->cancel(ticket))) {
+    } else if (!cancel_sent(ticket) && !(node_->secured && node_->secured->cancel(ticket))) {
         node_->published.cancel(ticket);
     }
 }
@@ -395,8 +400,9 @@ void local_node::stop() {
     const auto keep = shared_from_this();
     send_updates(node_->unsent, node_->published, now());
     stopped_ = true;
-    security_.reset();
-    signer_.reset();
+    if (node_->secured) {
+        node_->secured->stop();
+    }
     listeners_.close();
     environment_->stop_timer();
     if (routing_) {

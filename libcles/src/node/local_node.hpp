@@ -9,12 +9,10 @@
 #include "node/base/deadlines.hpp"
 #include "node/base/ip_network.hpp"
 #include "node/flush_scheduler.hpp"
-#include "node/local_security.hpp"
 #include "node/membership/discovery.hpp"
 #include "node/node_state.hpp"
 #include "node/publish/feed_links.hpp"
 #include "node/publish/multicast_group.hpp"
-#include "node/request_signer.hpp"
 #include "node/routing/peer_channels.hpp"
 #include "node/routing/router.hpp"
 #include "node/session/connections.hpp"
@@ -92,8 +90,6 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     [[nodiscard]] core::discovery& discovery() noexcept { return *discovery_; }
     /// Null if multicast is off.
     [[nodiscard]] multicast_group* group() noexcept { return group_.get(); }
-    /// Signs the requests of this node; null if it is not secured, or has stopped.
-    [[nodiscard]] request_signer* signer() noexcept { return signer_ ? &*signer_ : nullptr; }
     /// Cancels a request that was sent. Returns false if there is none with that id.
     bool cancel_sent(std::uint64_t id) { return peer_channels_.cancel(id) || connections_.cancel(id); }
     void on_discovery_grace_over();
@@ -162,8 +158,6 @@ class local_node : public std::enable_shared_from_this<local_node>, private flus
     const detail::routing_part* routing_wanted_;
     std::shared_ptr<router> routing_; // null: off
     core::flush_scheduler flush_scheduler_{*this, *node_};
-    std::optional<local_security> security_;             // nothing: the node is not secured
-    std::optional<request_signer> signer_;               // likewise
     std::optional<graceful_shutdown> graceful_shutdown_; // set once a graceful shutdown has started
     bool stopped_ = false;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/node_state.hpp"
 
-#include "node/session/request_challenges.hpp"
+#include "node/security_protocol.hpp"
 
 #include <utility>
 
@@ -14,10 +14,9 @@ node_state::node_state(node_options setup, const core::clock& source, const std:
       started(source.now()), completions(std::move(setup.complete)), memory(bounds.memory),
       kept_values(std::make_shared<memory_account>(memory, memory_account::share::half)),
       kept_requests(std::make_shared<memory_account>(memory)), peers(name, setup.epoch, deadlines, bounds.peers),
-      confirmed(bounds.peers), unsent(wake),
+      unsent(wake),
       published({deadlines, counts, bounds.binding_bytes, kept_values}, bounds, completions, name, epoch, unsent),
-      unsent_relayed(wake), remembered{.limit = bounds.remembered},
-      challenges(security ? std::make_unique<request_challenges>(*this) : nullptr) {
+      unsent_relayed(wake), remembered{.limit = bounds.remembered}, secured(security ? setup.secured(*this) : nullptr) {
     published.sign_for(tasks, security.get());
     peers.begin(setup.pool, started);
 }

@@ -10,7 +10,6 @@
 #include "node/base/deadlines.hpp"
 #include "node/base/memory_budget.hpp"
 #include "node/base/metrics.hpp"
-#include "node/membership/confirmed_epochs.hpp"
 #include "node/membership/membership.hpp"
 #include "node/publish/publications.hpp"
 #include "node/session/datagram_rules.hpp"
@@ -28,7 +27,9 @@ namespace cles::core {
 
 class gossip;
 class node_security;
-class request_challenges;
+class security_protocol;
+
+struct node_state;
 
 /// The settings of a node.
 struct node_options {
@@ -39,6 +40,8 @@ struct node_options {
     cles::limits bounds{};
     authoriser authorise{};
     std::shared_ptr<node_security> security{}; ///< null: the node is not secured
+    /// Creates what a secured node says; null only without `security`.
+    std::unique_ptr<security_protocol> (*secured)(node_state& host) = nullptr;
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
     std::function<node_load()> load{};           ///< load of the program; empty: its running handlers
@@ -75,7 +78,6 @@ struct node_state {
     task_registry tasks;
     deadline_queue deadlines;
     membership peers;
-    confirmed_epochs confirmed;         ///< if it is secured
     gossip* gossip_responder = nullptr; ///< answers gossip requests; null if this node does not gossip
     counters counts;
     latency_histogram handler_time; ///< of all handlers that reply later, and of a sample of the others
@@ -85,9 +87,9 @@ struct node_state {
     unsent_topics unsent_relayed; ///< of other nodes, forwarded by this one
     dedup_memory remembered;
     reflection_limit reflection;
-    const std::unique_ptr<request_challenges> challenges; ///< null: the node is not secured
-    std::uint64_t next_id = 1;                            ///< of the requests that this node sends
-    router* active_router = nullptr; ///< serves requests for `any`, `all` and other nodes; null: none
+    const std::unique_ptr<security_protocol> secured; ///< null: the node is not secured
+    std::uint64_t next_id = 1;                        ///< of the requests that this node sends
+    router* active_router = nullptr;                  ///< serves requests for `any`, `all` and other nodes; null: none
 
     // These do not let exceptions of the user's functions out.
     [[nodiscard]] node_load load_now() const noexcept;

@@ -3,7 +3,6 @@
 
 #include "json/json_members.hpp"
 #include "node/session/task_execution.hpp"
-#include "port/node_security.hpp"
 #include "protocol/grammar.hpp"
 #include "protocol/request_line.hpp"
 
@@ -13,8 +12,7 @@
 namespace cles::core {
 namespace {
 
-constexpr std::size_t depth = 8;               // allows for additions of later versions
-constexpr std::size_t bytes_of_signature = 91; // with its adverb and the space after it
+constexpr std::size_t depth = 8; // allows for additions of later versions
 
 bool read_endpoints(json_reader& r, std::vector<std::string>& out) {
     out.clear();
@@ -130,7 +128,9 @@ bool read_body(json_reader& r, announcement& out) {
     return good && r.at_end();
 }
 
-void append_body(std::string& out, const announcement& said, std::size_t endpoints) {
+} // namespace
+
+void append_announcement_body(std::string& out, const announcement& said, std::size_t endpoints) {
     json_writer w{out};
     w.begin_object();
     write_member(w, "node", said.node);
@@ -158,8 +158,6 @@ void append_body(std::string& out, const announcement& said, std::size_t endpoin
     write_signed_member(w, said.signed_tasks);
     w.end_object();
 }
-
-} // namespace
 
 void write_signed_member(json_writer& w, const std::vector<std::string>& tasks) {
     if (!tasks.empty()) {
@@ -218,35 +216,13 @@ void append_announcement(std::string& out, const announcement& said, std::uint64
     const auto start = out.size();
     for (auto endpoints = std::min(said.endpoints.size(), max_endpoints);; --endpoints) {
         protocol::append_update_head(out, said.node, "cles", seq, epoch);
-        append_body(out, said, endpoints);
+        append_announcement_body(out, said, endpoints);
         out.push_back('\n');
         if (out.size() - start <= protocol::datagram_bytes || endpoints == 0) {
             return;
         }
         out.resize(start);
     }
-}
-
-std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::uint64_t seq,
-                                                             std::string_view epoch, const node_security& security) {
-    return sign_announcement(said, "cles", seq, epoch, security);
-}
-
-std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::string_view path,
-                                                             std::uint64_t seq, std::string_view epoch,
-                                                             const node_security& security) {
-    auto made = std::make_shared<signed_announcement>();
-    for (auto endpoints = std::min(said.endpoints.size(), max_endpoints);; --endpoints) {
-        made->body.clear();
-        append_body(made->body, said, endpoints);
-        std::string line;
-        protocol::append_update_head(line, said.node, path, seq, epoch);
-        if (line.size() + bytes_of_signature + made->body.size() < protocol::datagram_bytes || endpoints == 0) {
-            break;
-        }
-    }
-    made->sig = security.sign_update(path, seq, epoch, made->body);
-    return made;
 }
 
 void append_announcement(std::string& out, std::string_view node, const signed_announcement& said, std::uint64_t seq,

@@ -23,8 +23,6 @@
 
 namespace cles::core {
 
-class node_security;
-
 inline constexpr std::chrono::milliseconds min_interval{250};
 inline constexpr std::chrono::milliseconds max_interval{60'000};
 inline constexpr std::chrono::milliseconds usual_interval{1'000};
@@ -72,13 +70,8 @@ bool read_announcement_member(json_reader& r, std::string_view key, announcement
 /// Appends the line with its LF, at most 1200 bytes: endpoints that do not fit are omitted, the last first.
 void append_announcement(std::string& out, const announcement& said, std::uint64_t seq, std::string_view epoch);
 
-/// Signs it. What it omits is the same as in the line.
-std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::uint64_t seq,
-                                                             std::string_view epoch, const node_security& security);
-/// The same for the reply to a question for the epoch: signed as an update of `path`.
-std::shared_ptr<const signed_announcement> sign_announcement(const announcement& said, std::string_view path,
-                                                             std::uint64_t seq, std::string_view epoch,
-                                                             const node_security& security);
+/// Appends its body with at most so many endpoints.
+void append_announcement_body(std::string& out, const announcement& said, std::size_t endpoints);
 /// Appends the line of a signed announcement with its LF.
 void append_announcement(std::string& out, std::string_view node, const signed_announcement& said, std::uint64_t seq,
                          std::string_view epoch);

@@ -7,8 +7,8 @@
 #include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/membership/name_conflict.hpp"
-#include "node/membership/roster_exchange.hpp"
 #include "node/routing/peer_channels.hpp"
+#include "node/security_protocol.hpp"
 #include "node/session/reserved_tasks.hpp"
 #include "port/node_security.hpp"
 
@@ -230,13 +230,14 @@ void discovery::announce_to_group(announcement& said) {
 // The same by all interfaces and by gossip. By gossip alone, it is signed again only when there is something new in it.
 void discovery::announce_signed(announcement& said) {
     auto& node = host_.node();
-    said.endpoints = endpoints_of_interfaces();
+    said.endpoints =
+        node.secured->endpoints(group_ != nullptr ? group_->ports() : std::vector<group_port*>{}, gossip_ != nullptr);
     if (group_ != nullptr) {
         said.sources = sources_in_group();
     }
     if (group_ != nullptr || node.peers.has_news(said)) {
         ++seq_;
-        said.original = sign_announcement(said, seq_, node.epoch, *node.security);
+        node.secured->sign(said, seq_);
     } else {
         said.original = node.peers.own()->announced.original;
     }
@@ -293,68 +294,6 @@ std::vector<std::string> discovery::endpoints_for_group(bool loopback) const {
     return result;
 }
 
-// The same for all receivers, since they are signed: with the addresses of the interfaces instead of an unspecified
-// one, and without Unix sockets, which mean nothing to other hosts.
-std::vector<std::string> discovery::endpoints_of_interfaces() const {
-    std::vector<std::string> result;
-    const auto add = [&](const url& where) {
-        if (auto text = to_string(where); std::ranges::find(result, text) == result.end()) {
-            result.push_back(std::move(text));
-        }
-    };
-    std::optional<std::vector<std::string>> hosts; // looked up once, and only if they are needed
-    for (const auto& endpoint : host_.node().endpoints) {
-        auto where = parse_url(endpoint);
-        if (where.scheme == "inproc" || where.scheme == "unix") {
-            continue;
-        }
-        if (where.host != "0.0.0.0" && where.host != "::") {
-            add(where);
-            continue;
-        }
-        if (where.host == "::") { // IPv6 only, and the addresses are IPv4
-            continue;
-        }
-        if (!hosts) {
-            hosts = own_hosts();
-        }
-        for (const auto& host : *hosts) {
-            where.host = host;
-            add(where);
-        }
-    }
-    return result;
-}
-
-// The addresses by which others may reach this node: those that it uses in the group, and with gossip all.
-std::vector<std::string> discovery::own_hosts() const {
-    std::vector<std::string> result;
-    const auto add = [&](const group_source& source) {
-        if (auto text = host_text(source); std::ranges::find(result, text) == result.end()) {
-            result.push_back(std::move(text));
-        }
-    };
-    for (const auto* port : group_ != nullptr ? group_->ports() : std::vector<group_port*>{}) {
-        add(port->source());
-    }
-    if (gossip_) {
-        try {
-            const auto all = host_.environment().interfaces();
-            for (const bool loopback : {false, true}) {
-                for (const auto& each : all) {
-                    if (each.running && each.address != 0 && each.loopback == loopback &&
-                        !(loopback && !result.empty())) {
-                        add({.address = each.address});
-                    }
-                }
-            }
-        } catch (const boost::system::system_error& e) {
-            host_.post_log(log_level::warning, std::string{"cannot list the interfaces of this host: "} + e.what());
-        }
-    }
-    return result;
-}
-
 std::size_t discovery::others() const { return host_.node().peers.size(); }
 
 void discovery::on_solicitation(bool by_name, time_point now) {
@@ -386,7 +325,9 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
     switch (host_.node().peers.apply_announcement(said, *update.epoch, *update.seq, from, now)) {
     case membership::verdict::taken:
         ++counts.announcements_received;
-        ask_for_roster(said.node, said.roster, now);
+        if (const auto& secured = host_.node().secured) {
+            secured->on_stated_roster(said.node, said.roster, now);
+        }
         break;
     case membership::verdict::duplicate: ++counts.group_repeated; break;
     case membership::verdict::old: ++counts.announcements_dropped; break;
@@ -397,35 +338,6 @@ void discovery::on_announcement(const group_source& from, const protocol::reques
         break;
     case membership::verdict::own:
     case membership::verdict::unknown: break;
-    }
-}
-
-// At an address that the node itself has announced.
-void discovery::ask_for_roster(std::string_view node, std::uint32_t version, time_point now) {
-    const auto& host = host_.shared_node();
-    if (host->security && host->security->wants_roster(node, version, now)) {
-        const auto noun = std::string{node} + ":cles/roster";
-        auto& channels = host_.peer_channels();
-        const auto at = channels.is_by_datagram(node) ? channels.tls_address_of(node) : std::string{};
-        channels.send(node, at, {.verb = verb::pull, .noun = noun},
-                      now + std::chrono::milliseconds{protocol::default_deadline_ms},
-                      make_roster_reply(host, std::string{node}), {});
-    }
-}
-
-void discovery::visit(std::string_view node, const std::string& url) {
-    const auto noun = std::string{node} + ":cles/roster";
-    const auto release = [url](local_node& host, const peer_answer&) {
-        host.post_while_running([url](local_node& alive) { alive.peer_channels().release(url); });
-    };
-    host_.peer_channels().send(node, url, {.verb = verb::pull, .noun = noun},
-                               host_.now() + std::chrono::milliseconds{protocol::default_deadline_ms},
-                               detail::pending_ptr{new peer_reply{host_.weak_from_this(), release}}, {});
-}
-
-void discovery::visit_by_tls(std::string_view node) {
-    if (const auto where = host_.peer_channels().tls_address_of(node); !where.empty()) {
-        visit(node, where);
     }
 }
 

@@ -160,12 +160,6 @@ class discovery final : private announcement_listener, private membership::watch
     [[nodiscard]] bool expects_more() const noexcept { return !discovery_grace_.over(); }
     /// Whether a node that is known, but at no usable address, may still be received by another of its interfaces.
     [[nodiscard]] bool expects_more_of(std::string_view node) const noexcept;
-    /// Asks that node for its roster, if it is wanted.
-    void ask_for_roster(std::string_view node, std::uint32_t version, time_point now);
-    /// Opens a link to a node that may be found there, and closes it when it is idle.
-    void visit(std::string_view node, const std::string& url);
-    /// The same at an address for TLS, if one is known.
-    void visit_by_tls(std::string_view node);
     /// Announces this node soon, since something has changed.
     void expedite_announcement();
     /// Receives the changes of `membership`; a test may intercept them.
@@ -186,9 +180,7 @@ class discovery final : private announcement_listener, private membership::watch
     void announce_to_group(announcement& said);
     void announce_signed(announcement& said);
     [[nodiscard]] std::vector<group_source> sources_in_group() const;
-    [[nodiscard]] std::vector<std::string> own_hosts() const;
     [[nodiscard]] std::vector<std::string> endpoints_for_group(bool loopback) const;
-    [[nodiscard]] std::vector<std::string> endpoints_of_interfaces() const;
     [[nodiscard]] std::vector<std::string> endpoints_for_gossip() const;
 
     local_node& host_;

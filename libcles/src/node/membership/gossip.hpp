@@ -22,6 +22,7 @@
 
 namespace cles::core {
 
+class node_security;
 class local_node;
 
 /// Decides which nodes are asked for their tables, and when (docs/protocol.md, "Gossip"): the successor by name, so

@@ -45,7 +45,9 @@ class gossip_driver final : private gossip::client, public gossip {
     }
 
     void on_stated_roster(std::string_view node, std::uint32_t version) override {
-        host_.discovery().ask_for_roster(node, version, host_.now());
+        if (const auto& secured = host_.node().secured) {
+            secured->on_stated_roster(node, version, host_.now());
+        }
     }
 
     /// The operation of a request, whose reply is passed to `taken`. This lives as long as the node.

@@ -5,8 +5,8 @@
 
 #include "node/base/deadlines.hpp"
 #include "node/local_node.hpp"
-#include "node/publish/signed_updates.hpp"
 #include "node/routing/peer_channels.hpp"
+#include "node/security_protocol.hpp"
 #include "node/session/outbound.hpp"
 #include "node/session/request_checks.hpp"
 #include "protocol/reply_line.hpp"
@@ -90,12 +90,13 @@ detail::pending_ptr feed_links::on_reply(const core::feed_machine& feed, reply_f
 // counts.
 bool feed_links::is_value_trusted(core::feed_machine& feed) const {
     const auto c = feed.entry().on.lock();
-    if (!host_.node().security || !c || feed.target() == "all" || feed.target() == "self" ||
-        c->peer().transport == "inproc" || c->peer().name == feed.target()) {
+    const auto& secured = host_.node().secured;
+    if (!secured || !c || feed.target() == "all" || feed.target() == "self" || c->peer().transport == "inproc" ||
+        c->peer().name == feed.target()) {
         return true;
     }
     const auto task = std::string_view{feed.path()}.substr(0, feed.path().find('/'));
-    return !must_be_signed(host_.node(), feed.target(), task).value_or(true);
+    return !secured->must_be_signed(feed.target(), task).value_or(true);
 }
 
 void feed_links::on_bind_reply(core::feed_machine& feed, const reply& received, std::optional<time_point> asked,

@@ -4,7 +4,7 @@
 #include <cles/json_reader.hpp>
 
 #include "node/membership/membership.hpp"
-#include "node/publish/signed_updates.hpp"
+#include "node/security_protocol.hpp"
 #include "node/session/request_checks.hpp"
 #include "port/node_security.hpp"
 #include "protocol/request_line.hpp"
@@ -222,7 +222,7 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
         ++counts.updates_dropped;
         return true;
     }
-    const auto check = node_->security ? check_signature(*node_, update, false) : update_check::unsigned_one;
+    const auto check = node_->secured ? node_->secured->check(update, false) : update_check::unsigned_one;
     if (check == update_check::refused) {
         ++counts.updates_unsigned;
         return true;

@@ -288,14 +288,13 @@ std::vector<detail::pending_ptr> publications::take_waiters() {
     return taken;
 }
 
-std::vector<std::string> publications::tasks() const {
-    std::vector<std::string> names;
+std::set<std::string> publications::tasks() const {
+    std::set<std::string> names;
     for (const auto& [task, nouns] : nouns_) {
         if (nouns->published) {
-            names.push_back(task);
+            names.insert(task);
         }
     }
-    std::sort(names.begin(), names.end());
     return names;
 }
 

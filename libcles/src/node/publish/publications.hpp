@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -144,7 +145,7 @@ class publications final : public topic_source {
     [[nodiscard]] std::vector<detail::pending_ptr> take_waiters();
 
     /// The names of the tasks that have been published.
-    [[nodiscard]] std::vector<std::string> tasks() const;
+    [[nodiscard]] std::set<std::string> tasks() const;
 
   private:
     topic& open(std::string_view path, bool to_publish);

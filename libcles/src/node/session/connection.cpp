@@ -138,8 +138,8 @@ void connection::on_restart() {
 // Over TLS, both ends get the newer roster, which may be why the peer does not answer.
 void connection::on_unanswered(bool lost) {
     const auto keep = shared_from_this();
-    if (from_ == origin::dialled) {
-        host_->discovery().visit_by_tls(peer().name);
+    if (const auto& secured = host_->node().secured; secured && from_ == origin::dialled) {
+        secured->on_unanswered(peer().name);
     }
     if (lost) {
         abandon(peer().name + " does not answer at " + peer().address +

@@ -100,7 +100,7 @@ datagram_requests::datagram_requests(node_state& host, line_sink& out, reply_wri
 
 bool datagram_requests::admit(const protocol::request_line& r) {
     // A copy of a signed PULL must neither run again nor get another challenge.
-    const auto* const task = node_.challenges ? node_.tasks.find(r.verb, r.noun.task) : nullptr;
+    const auto* const task = node_.secured ? node_.tasks.find(r.verb, r.noun.task) : nullptr;
     const bool is_signed = task != nullptr && task->info.must_be_signed;
     const bool needs_id = r.verb != verb::bind && (r.verb != verb::pull || is_signed);
     if (r.id == 0) {

@@ -2,7 +2,7 @@
 #include "node/session/inbound.hpp"
 
 #include "node/routing/router.hpp"
-#include "node/session/request_challenges.hpp"
+#include "node/security_protocol.hpp"
 #include "node/session/request_checks.hpp"
 #include "node/session/reserved_tasks.hpp"
 
@@ -96,8 +96,8 @@ void inbound::break_off() {
 
 void inbound::lose() {
     lost_ = true;
-    if (node_->challenges) {
-        node_->challenges->forget(peer_);
+    if (node_->secured) {
+        node_->secured->forget(peer_);
     }
     auto calls = std::exchange(calls_, {});
     const auto anonymous = ordered_.clear();

@@ -6,11 +6,10 @@
 #include <cles/version.hpp>
 
 #include "json/json_members.hpp"
-#include "node/membership/epoch_confirmation.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/membership/peer_table.hpp"
 #include "node/membership/reachable_endpoints.hpp"
-#include "node/membership/roster_exchange.hpp"
+#include "node/security_protocol.hpp"
 #include "port/node_security.hpp"
 
 #include <array>
@@ -183,10 +182,8 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
         } else {
             replies.fail(r, errc::bad_request, host.name + ": the body is not a table of nodes");
         }
-    } else if (host.security && parameters.size() == 1 && parameters[0] == "roster") {
-        serve_roster(host, replies, r);
-    } else if (host.security && parameters.size() == 2 && parameters[0] == "announced") {
-        serve_announced(host, replies, r);
+    } else if (host.secured && host.secured->serve_reserved(replies, r)) {
+        return;
     } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {
         replies.fail(r, errc::bad_request, host.name + ": cancel needs an id from 1 to 2^63-1");
     } else {

@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/session/session.hpp"
 
-#include "node/membership/roster_exchange.hpp"
-#include "node/publish/signed_updates.hpp"
 #include "node/session/request_checks.hpp"
-#include "node/session/unconfirmed_updates.hpp"
 #include "protocol/line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -36,7 +33,17 @@ bool is_leave_notice(const protocol::request_line& r) noexcept {
 } // namespace
 
 session::session(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer)
-    : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {}
+    : node_(std::move(host)), out_(out), peer_(peer), inbound_(node_, out, updates, peer), outbound_(*node_, out) {
+    if (node_->secured) {
+        secured_ = node_->secured->on_link(node_, out_, outbound_, peer_, [this](std::string_view line) {
+            protocol::request_line again;
+            protocol::malformed_request ignored; // it was valid on arrival
+            if (!closed_ && protocol::parse_request(line, again, ignored)) {
+                on_update(subscriptions_.find(line, again));
+            }
+        });
+    }
+}
 
 void session::on_line(std::string_view line, time_point now) {
     line = protocol::trim(line);
@@ -77,9 +84,7 @@ void session::on_line(std::string_view line, time_point now) {
         on_update(subscriptions_.find(line, request));
     } else if (!is_datagram() && is_leave_notice(request)) {
         on_leaving();
-    } else if (node_->security && is_hello(request)) {
-        on_hello(request, now);
-    } else {
+    } else if (!secured_ || !secured_->serve(request, now)) {
         inbound_.on_request(line, request, now);
     }
 }
@@ -114,14 +119,7 @@ void session::on_reply(std::string_view line) {
 
 void session::on_update(const subscriptions::match& found) {
     const auto& update = *found.update;
-    // What comes from this process was checked before.
-    if (node_->security && found.whose != nullptr && peer_.transport != "inproc" &&
-        check_signature(*node_, update, peer_.name == update.noun.target) == update_check::refused) {
-        ++node_->counts.updates_unsigned;
-        return;
-    }
-    if (node_->security && found.whose != nullptr && !is_confirmed(update)) {
-        hold(update);
+    if (secured_ && found.whose != nullptr && !secured_->admits(update)) {
         return;
     }
     if (found.whose == nullptr || protocol::begins_with_error(update.body) || !subscriptions_.deliver(found)) {
@@ -129,25 +127,6 @@ void session::on_update(const subscriptions::match& found) {
     } else {
         ++node_->counts.updates_received;
     }
-}
-
-// The peer has stated its own epoch when it proved its name. What it passes on may be of an earlier incarnation.
-bool session::is_confirmed(const protocol::request_line& update) const noexcept {
-    return update.noun.target == peer_.name || peer_.transport == "inproc" || peer_.name == node_->name ||
-           node_->confirmed.contain(update.noun.target, *update.epoch);
-}
-
-void session::hold(const protocol::request_line& update) {
-    if (!unconfirmed_) {
-        unconfirmed_ = std::make_shared<unconfirmed_updates>(*node_, outbound_, [this](std::string_view line) {
-            protocol::request_line again;
-            protocol::malformed_request ignored; // it was valid on arrival
-            if (!closed_ && protocol::parse_request(line, again, ignored)) {
-                on_update(subscriptions_.find(line, again));
-            }
-        });
-    }
-    unconfirmed_->hold(update, node_->time.now());
 }
 
 void session::on_leaving() {
@@ -159,22 +138,9 @@ void session::on_leaving() {
                       .retry_ms = 1000}));
 }
 
-void session::on_hello(const protocol::request_line& r, time_point now) {
-    ++node_->counts.housekeeping;
-    if (wants_stated_roster(*node_, peer_, r, now)) {
-        const auto id = node_->next_id++;
-        outbound_.send({.verb = verb::pull, .noun = "self:cles/roster", .id = id},
-                       now + std::chrono::milliseconds{protocol::default_deadline_ms}, now,
-                       make_roster_reply(node_, peer_.name));
-    }
-}
-
 void session::send_hello() {
-    if (!closed_) {
-        const auto body = hello_body(*node_);
-        protocol::append_request(out_.output(),
-                                 {.verb = verb::push, .noun = "self:cles/hello", .wants_reply = false, .body = body});
-        out_.wake();
+    if (secured_ && !closed_) {
+        secured_->send_hello();
     }
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "node/publish/subscription.hpp"
+#include "node/security_protocol.hpp"
 #include "node/session/inbound.hpp"
 #include "node/session/outbound.hpp"
 
@@ -10,8 +11,6 @@
 #include <string_view>
 
 namespace cles::core {
-
-class unconfirmed_updates;
 
 /// The protocol on one link, whatever its transport: requests and replies in both directions. Lines and time are the
 /// input; the output goes to the line sink.
@@ -52,10 +51,7 @@ class session {
     void note_refusal(std::string_view line);
     void lose_requests(std::string_view why);
     void on_leaving();
-    void on_hello(const protocol::request_line& r, time_point now);
     void on_update(const subscriptions::match& found);
-    [[nodiscard]] bool is_confirmed(const protocol::request_line& update) const noexcept;
-    void hold(const protocol::request_line& update);
 
     std::shared_ptr<node_state> node_;
     line_sink& out_;
@@ -63,9 +59,9 @@ class session {
     inbound inbound_;
     outbound outbound_;
     subscriptions subscriptions_;
-    std::shared_ptr<unconfirmed_updates> unconfirmed_; // null: there were none
-    bool may_be_refused_ = false;                      // by the first line
-    std::string refusal_;                              // the line that refused the link, if it remains the only one
+    std::unique_ptr<link_security> secured_; // null: the node is not secured
+    bool may_be_refused_ = false;            // by the first line
+    std::string refusal_;                    // the line that refused the link, if it remains the only one
     bool closed_ = false;
 };
 

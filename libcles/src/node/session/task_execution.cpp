@@ -3,9 +3,9 @@
 
 #include <cles/json_reader.hpp>
 
+#include "node/security_protocol.hpp"
 #include "node/session/call.hpp"
 #include "node/session/handler_failure.hpp"
-#include "node/session/request_challenges.hpp"
 #include "node/session/request_checks.hpp"
 
 #include <algorithm>
@@ -161,12 +161,12 @@ std::optional<protocol::failure> task_execution::capacity_refusal(const memory_a
 }
 
 std::optional<protocol::failure> task_execution::signature_refusal() {
-    if (!node_->challenges) {
+    if (!node_->secured) {
         return protocol::failure{.code = errc::denied,
                                  .message = node_->name + ": '" + std::string{line_.noun.task} +
                                             "' requires signed requests, and this node has no security"};
     }
-    return node_->challenges->refusal(*data_.peer, line_, due_, now_);
+    return node_->secured->refusal(*data_.peer, line_, due_, now_);
 }
 
 void task_execution::write(json_writer& w) {

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/announcement.hpp"
 #include "node/publish/multicast_group.hpp"
+#include "node/secured/own_announcement.hpp"
 #include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"
@@ -130,7 +131,7 @@ BOOST_AUTO_TEST_CASE(a_binding_needs_the_right) {
 
 BOOST_AUTO_TEST_CASE(an_announcement_is_signed_with_the_version_of_the_roster) {
     const auto made = cles::core::sign_announcement(
-        {.node = "car1", .endpoints = {"tls://10.0.0.2:25370"}, .roster = 7}, 17, "5f3a09c1", *security);
+        {.node = "car1", .endpoints = {"tls://10.0.0.2:25370"}, .roster = 7}, "cles", 17, "5f3a09c1", *security);
     std::string line;
     cles::core::append_announcement(line, "car1", *made, 17, "5f3a09c1");
     BOOST_TEST(line.ends_with("\n"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/membership/roster_exchange.hpp"
+#include "node/secured/roster_exchange.hpp"
 
 #include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/membership/epoch_confirmation.hpp"
+#include "node/secured/epoch_confirmation.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"
 

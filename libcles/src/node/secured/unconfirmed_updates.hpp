@@ -3,6 +3,7 @@
 
 #include "node/base/deadlines.hpp"
 #include "node/node_state.hpp"
+#include "node/secured/confirmed_epochs.hpp"
 #include "node/session/outbound.hpp"
 #include "protocol/request_line.hpp"
 
@@ -29,8 +30,8 @@ class unconfirmed_updates final : public std::enable_shared_from_this<unconfirme
     using deliver_function = std::function<void(std::string_view line)>;
 
     /// What it refers to must outlive this; `deliver` is not called from inside `hold`.
-    unconfirmed_updates(node_state& host, outbound& asking, deliver_function deliver)
-        : node_(host), outbound_(asking), deliver_(std::move(deliver)) {}
+    unconfirmed_updates(node_state& host, confirmed_epochs& confirmed, outbound& asking, deliver_function deliver)
+        : node_(host), confirmed_(confirmed), outbound_(asking), deliver_(std::move(deliver)) {}
     unconfirmed_updates(const unconfirmed_updates&) = delete;
     unconfirmed_updates& operator=(const unconfirmed_updates&) = delete;
     ~unconfirmed_updates() = default;
@@ -55,6 +56,7 @@ class unconfirmed_updates final : public std::enable_shared_from_this<unconfirme
     [[nodiscard]] bool deliver_confirmed();
 
     node_state& node_;
+    confirmed_epochs& confirmed_;
     outbound& outbound_;
     deliver_function deliver_;
     std::list<held_update> held_;

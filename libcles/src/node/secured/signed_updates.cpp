@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/publish/signed_updates.hpp"
+#include "node/secured/signed_updates.hpp"
 
 #include "node/node_state.hpp"
 #include "port/node_security.hpp"

@@ -2,7 +2,7 @@
 #include <cles/error.hpp>
 
 #include "node/publish/multicast_group.hpp"
-#include "node/publish/signed_updates.hpp"
+#include "node/secured/signed_updates.hpp"
 #include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"
@@ -52,7 +52,7 @@ struct fixture {
     fixture() {
         group.feeds().add(feed, node.clock.now());
         static_cast<void>(port.take());
-        node.host->confirmed.confirm("car2", 0x5f3a09c2, node.clock.now());
+        node.secured().confirmed().confirm("car2", 0x5f3a09c2, node.clock.now());
     }
     ~fixture() { group.stop(); }
     fixture(const fixture&) = delete;

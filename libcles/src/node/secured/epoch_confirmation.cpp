@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/membership/epoch_confirmation.hpp"
+#include "node/secured/epoch_confirmation.hpp"
 
 #include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
 
 #include "json/json_members.hpp"
-#include "node/membership/announcement.hpp"
 #include "node/node_state.hpp"
+#include "node/secured/own_announcement.hpp"
 #include "port/node_security.hpp"
 
 #include <algorithm>

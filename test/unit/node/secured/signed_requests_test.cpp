@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/session/request_challenges.hpp"
+#include "node/secured/request_challenges.hpp"
 #include "support/routing_fixture.hpp"
 #include "support/scripted_security.hpp"
 
@@ -86,7 +86,7 @@ BOOST_AUTO_TEST_CASE(a_signed_one_runs_once) {
     BOOST_TEST(again.error == "denied");
     BOOST_TEST(again.challenge.empty());
     BOOST_TEST(runs == 1);
-    BOOST_TEST(node.host->challenges->size() == 0U);
+    BOOST_TEST(node.secured().challenges().size() == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(every_verb_but_bind_must_be_signed) {
@@ -145,7 +145,7 @@ BOOST_AUTO_TEST_CASE(another_attempt_replaces_it) {
     const auto old = ask(first);
     const auto newer = ask(first);
     BOOST_TEST(old.challenge != newer.challenge);
-    BOOST_TEST(node.host->challenges->size() == 1U);
+    BOOST_TEST(node.secured().challenges().size() == 1U);
     BOOST_TEST(ask(second(signature(old.challenge))).error == "denied");
     const auto newest = ask(first);
     BOOST_TEST(ask(second(signature(newest.challenge))).error.empty());
@@ -161,9 +161,9 @@ BOOST_AUTO_TEST_CASE(it_belongs_to_its_link) {
 BOOST_AUTO_TEST_CASE(it_is_forgotten_with_its_link) {
     cles::test::test_link other{node, "car2"};
     other.ask(first);
-    BOOST_TEST(node.host->challenges->size() == 1U);
+    BOOST_TEST(node.secured().challenges().size() == 1U);
     other.reset();
-    BOOST_TEST(node.host->challenges->size() == 0U);
+    BOOST_TEST(node.secured().challenges().size() == 0U);
 }
 
 BOOST_AUTO_TEST_CASE(it_belongs_to_the_stated_requester) {
@@ -190,7 +190,7 @@ BOOST_AUTO_TEST_CASE(a_link_has_a_limited_number) {
         const auto told = ask(of(i));
         oldest = i == 0 ? told.challenge : oldest;
     }
-    BOOST_TEST(node.host->challenges->size() == most);
+    BOOST_TEST(node.secured().challenges().size() == most);
     const auto sig = signature(oldest, "", "car2", verb::pull, "strike/0");
     BOOST_TEST(ask("PULL car1:strike/0 id=7 sig=" + sig).error == "denied");
 }
@@ -205,10 +205,10 @@ BOOST_AUTO_TEST_CASE(so_has_the_node) {
         }
         links.back()->ask("PULL car1:strike/" + std::to_string(i) + " id=7");
     }
-    BOOST_TEST(node.host->challenges->size() == most);
+    BOOST_TEST(node.secured().challenges().size() == most);
     node.pass(6s);
     ask(first);
-    BOOST_TEST(node.host->challenges->size() == 1U); // the expired ones have gone
+    BOOST_TEST(node.secured().challenges().size() == 1U); // the expired ones have gone
 }
 
 BOOST_AUTO_TEST_CASE(a_busy_node_does_not_use_it_up) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/session/unconfirmed_updates.hpp"
+#include "node/secured/unconfirmed_updates.hpp"
 
-#include "node/membership/epoch_confirmation.hpp"
+#include "node/secured/epoch_confirmation.hpp"
 #include "port/node_security.hpp"
 
 #include <algorithm>
@@ -53,13 +53,13 @@ void unconfirmed_updates::hold(const protocol::request_line& update, time_point 
 
 // Now, or as soon as that node may be asked again.
 void unconfirmed_updates::ask(const std::string& publisher, time_point now) {
-    if (const auto next = node_.confirmed.next_question(publisher); next > now) {
+    if (const auto next = confirmed_.next_question(publisher); next > now) {
         if (!armed() || next < due()) {
             node_.deadlines.arm(*this, next);
         }
         return;
     }
-    node_.confirmed.on_asked(publisher, now);
+    confirmed_.on_asked(publisher, now);
     asked_.insert(publisher);
     for (auto& each : held_) {
         each.asked = each.asked || each.publisher == publisher;
@@ -76,7 +76,7 @@ void unconfirmed_updates::on_answer(const std::string& publisher, std::optional<
     const auto now = node_.time.now();
     asked_.erase(publisher);
     if (epoch) {
-        node_.confirmed.confirm(publisher, *epoch, now);
+        confirmed_.confirm(publisher, *epoch, now);
     }
     std::erase_if(held_, [&](const held_update& each) {
         if (!each.asked || each.publisher != publisher || epoch == each.epoch) {
@@ -111,7 +111,7 @@ bool unconfirmed_updates::deliver_confirmed() {
     std::list<held_update> ready;
     for (auto at = held_.begin(); at != held_.end();) {
         const auto next = std::next(at);
-        if (node_.confirmed.contain(at->publisher, at->epoch)) {
+        if (confirmed_.contain(at->publisher, at->epoch)) {
             bytes_ -= at->line.size();
             ready.splice(ready.end(), held_, at);
         }

@@ -1,22 +1,15 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "node/security_protocol.hpp"
 #include "protocol/request_line.hpp"
 
-#include <cstdint>
 #include <optional>
 #include <string_view>
 
 namespace cles::core {
 
 struct node_state;
-
-/// What a subscriber may do with an update (docs/security.md, "Signed updates").
-enum class update_check : std::uint8_t {
-    unsigned_one, ///< it need not be signed
-    signed_one,   ///< its publisher has signed it
-    refused,      ///< it is not signed as its publisher announces
-};
 
 /// Whether updates of that task must be signed; nothing if the publisher's announcement is not known.
 [[nodiscard]] std::optional<bool> must_be_signed(const node_state& n, std::string_view publisher,

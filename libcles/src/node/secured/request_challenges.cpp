@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/session/request_challenges.hpp"
+#include "node/secured/request_challenges.hpp"
 
 #include "node/node_state.hpp"
 #include "node/session/request_checks.hpp"

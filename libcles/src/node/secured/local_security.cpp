@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/local_security.hpp"
+#include "node/secured/local_security.hpp"
 
 #include "node/local_node.hpp"
+#include "node/secured/roster_exchange.hpp"
 #include "protocol/request_line.hpp"
 
 #include <chrono>
@@ -35,16 +36,45 @@ void local_security::apply_change() {
 }
 
 void local_security::on_stated_roster(std::string_view name, std::uint32_t version) {
-    host_.discovery().ask_for_roster(name, version, host_.now());
+    ask_for_roster(name, version, host_.now());
 }
 
 void local_security::on_unanswered(std::string_view name, const std::vector<std::string>& endpoints) {
     for (const auto& where : endpoints) {
         if (where.starts_with("tls:")) { // both ends have the newer roster once the link is open
-            host_.discovery().visit(name, where);
+            visit(name, where);
             return;
         }
     }
+}
+
+// At an address that the node itself has announced.
+void local_security::ask_for_roster(std::string_view node, std::uint32_t version, time_point now) {
+    const auto& host = host_.shared_node();
+    if (host->security->wants_roster(node, version, now)) {
+        const auto noun = std::string{node} + ":cles/roster";
+        auto& channels = host_.peer_channels();
+        const auto at = channels.is_by_datagram(node) ? channels.tls_address_of(node) : std::string{};
+        channels.send(node, at, {.verb = verb::pull, .noun = noun},
+                      now + std::chrono::milliseconds{protocol::default_deadline_ms},
+                      make_roster_reply(host, std::string{node}), {});
+    }
+}
+
+void local_security::visit(std::string_view node) {
+    if (const auto where = host_.peer_channels().tls_address_of(node); !where.empty()) {
+        visit(node, where);
+    }
+}
+
+void local_security::visit(std::string_view node, const std::string& url) {
+    const auto noun = std::string{node} + ":cles/roster";
+    const auto release = [url](local_node& host, const peer_answer&) {
+        host.post_while_running([url](local_node& alive) { alive.peer_channels().release(url); });
+    };
+    host_.peer_channels().send(node, url, {.verb = verb::pull, .noun = noun},
+                               host_.now() + std::chrono::milliseconds{protocol::default_deadline_ms},
+                               detail::pending_ptr{new peer_reply{host_.weak_from_this(), release}}, {});
 }
 
 void local_security::on_due(time_point at) {

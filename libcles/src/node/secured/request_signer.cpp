@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/request_signer.hpp"
+#include "node/secured/request_signer.hpp"
 
 #include "json/json_members.hpp"
 #include "node/local_node.hpp"
@@ -21,6 +21,7 @@ namespace {
 /// What is needed to send a request once more.
 struct repeatable_request {
     std::weak_ptr<local_node> host;
+    std::weak_ptr<request_signer> signer; // nothing: the node has stopped
     verb how = verb::pull;
     std::string target;
     std::string path;
@@ -85,18 +86,17 @@ void send_signed(local_node& host, request_signer& by, const repeatable_request&
 /// Ends the entry of a request in the signer.
 class noted_ticket {
   public:
-    noted_ticket(std::weak_ptr<local_node> host, std::uint64_t ticket) : host_(std::move(host)), ticket_(ticket) {}
+    noted_ticket(std::weak_ptr<request_signer> by, std::uint64_t ticket) : by_(std::move(by)), ticket_(ticket) {}
     noted_ticket(const noted_ticket&) = delete;
     noted_ticket& operator=(const noted_ticket&) = delete;
     ~noted_ticket() {
-        const auto host = host_.lock();
-        if (auto* const signer = host ? host->signer() : nullptr) {
+        if (const auto signer = by_.lock()) {
             signer->forget(ticket_);
         }
     }
 
   private:
-    std::weak_ptr<local_node> host_;
+    std::weak_ptr<request_signer> by_;
     std::uint64_t ticket_;
 };
 
@@ -136,8 +136,8 @@ class attempt_of_request : public detail::pending {
 /// Whatever its outcome is, there is no third one.
 class second_attempt final : public attempt_of_request {
   public:
-    second_attempt(std::weak_ptr<local_node> host, std::uint64_t ticket, detail::pending_ptr operation)
-        : attempt_of_request(std::move(operation)), ticket_(std::move(host), ticket) {}
+    second_attempt(const repeatable_request& r, detail::pending_ptr operation)
+        : attempt_of_request(std::move(operation)), ticket_(r.signer, r.ticket) {}
 
   private:
     noted_ticket ticket_;
@@ -146,7 +146,7 @@ class second_attempt final : public attempt_of_request {
 /// The reply to a request for `all` while nodes in it are asked once more, with the signature.
 class gathered_reply {
   public:
-    gathered_reply(const std::weak_ptr<local_node>& host, std::uint64_t ticket) : host_(host), ticket_(host, ticket) {}
+    explicit gathered_reply(const repeatable_request& r) : host_(r.host), ticket_(r.signer, r.ticket) {}
     gathered_reply(const gathered_reply&) = delete;
     gathered_reply& operator=(const gathered_reply&) = delete;
 
@@ -278,8 +278,8 @@ class first_attempt final : public attempt_of_request {
   private:
     bool repeat(std::string_view answer) {
         const auto host = request_.host.lock();
-        auto* const signer = host ? host->signer() : nullptr;
-        if (signer == nullptr) {
+        const auto signer = request_.signer.lock();
+        if (!host || !signer) {
             return false;
         }
         std::string sig;
@@ -288,18 +288,18 @@ class first_attempt final : public attempt_of_request {
             return false;
         }
         send_signed(*host, *signer, request_, *node, sig,
-                    detail::pending_ptr{new second_attempt(host, request_.ticket, std::move(operation_))},
+                    detail::pending_ptr{new second_attempt(request_, std::move(operation_))},
                     std::move(request_.progress));
         return true;
     }
 
     bool gather(std::string_view json) {
         const auto host = request_.host.lock();
-        auto* const signer = host ? host->signer() : nullptr;
-        if (signer == nullptr || json.find(R"("challenge":)") == std::string_view::npos) {
+        const auto signer = request_.signer.lock();
+        if (!host || !signer || json.find(R"("challenge":)") == std::string_view::npos) {
             return false;
         }
-        auto whole = std::make_shared<gathered_reply>(host, request_.ticket);
+        auto whole = std::make_shared<gathered_reply>(request_);
         if (!whole->read(json)) {
             return false;
         }
@@ -326,11 +326,12 @@ class first_attempt final : public attempt_of_request {
 
 } // namespace
 
-detail::pending_ptr request_signer::watch(const outgoing& r, detail::pending_ptr operation) {
+detail::pending_ptr request_signer::watch(const outgoing_call& r, detail::pending_ptr operation) {
     if (r.noun.task == "cles") { // never signed
         return operation;
     }
     return detail::pending_ptr{new first_attempt({.host = host_.weak_from_this(),
+                                                  .signer = weak_from_this(),
                                                   .how = r.how,
                                                   .target = std::string{r.noun.target},
                                                   .path = std::string{r.noun.path},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/membership/roster_exchange.hpp"
+#include "node/secured/roster_exchange.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"
 

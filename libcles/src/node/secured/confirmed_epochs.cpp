@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/membership/confirmed_epochs.hpp"
+#include "node/secured/confirmed_epochs.hpp"
 
 #include <algorithm>
 

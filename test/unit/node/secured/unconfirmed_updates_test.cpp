@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: BSL-1.0
 // Forwarded updates in a secured fleet (docs/security.md, "Announcements"). car2 forwards those of car3.
-#include "node/session/unconfirmed_updates.hpp"
+#include "node/secured/unconfirmed_updates.hpp"
 #include "support/group_recorder.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"

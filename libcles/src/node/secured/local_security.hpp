@@ -13,8 +13,8 @@ namespace cles::core {
 
 class local_node;
 
-/// Connects a node with its security: has the links and bindings closed that are no longer permitted, asks for newer
-/// rosters, and calls it when it is due.
+/// Connects a running node with its security: has the links and bindings closed that are no longer permitted, asks
+/// other nodes for newer rosters, and calls it when it is due.
 class local_security final : private security_observer, private deadline {
   public:
     /// \pre the node is secured \throws cles::error if the node's name is not that of its key
@@ -22,6 +22,11 @@ class local_security final : private security_observer, private deadline {
     local_security(const local_security&) = delete;
     local_security& operator=(const local_security&) = delete;
     ~local_security();
+
+    /// Asks that node for its roster, if it is wanted.
+    void ask_for_roster(std::string_view node, std::uint32_t version, time_point now);
+    /// Opens a link to that node at its address for TLS, if one is known, and closes it when it is idle.
+    void visit(std::string_view node);
 
   private:
     // security_observer
@@ -34,6 +39,7 @@ class local_security final : private security_observer, private deadline {
     void on_deadline(time_point now) override;
 
     void apply_change();
+    void visit(std::string_view node, const std::string& url);
 
     local_node& host_;
     bool removed_ = false; ///< as logged

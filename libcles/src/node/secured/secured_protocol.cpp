@@ -1,0 +1,91 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/secured/secured_protocol.hpp"
+
+#include "node/local_node.hpp"
+#include "node/secured/epoch_confirmation.hpp"
+#include "node/secured/own_announcement.hpp"
+#include "node/secured/roster_exchange.hpp"
+#include "node/secured/secured_link.hpp"
+#include "node/secured/signed_updates.hpp"
+#include "port/node_security.hpp"
+
+#include <utility>
+
+namespace cles::core {
+
+secured_protocol::secured_protocol(node_state& host) : node_(host), confirmed_(host.bounds.peers), challenges_(host) {}
+
+void secured_protocol::start(local_node& host) {
+    security_.emplace(host);
+    signer_ = std::make_shared<request_signer>(host);
+    host_ = &host;
+}
+
+void secured_protocol::stop() noexcept {
+    host_ = nullptr;
+    security_.reset();
+    signer_.reset();
+}
+
+std::unique_ptr<link_security> secured_protocol::on_link(const std::shared_ptr<node_state>& host, line_sink& out,
+                                                         outbound& asking, const identity& peer,
+                                                         std::function<void(std::string_view line)> deliver) {
+    return std::make_unique<secured_link>(host, confirmed_, out, asking, peer, std::move(deliver));
+}
+
+void secured_protocol::on_unanswered(std::string_view peer) {
+    if (security_) {
+        security_->visit(peer);
+    }
+}
+
+detail::pending_ptr secured_protocol::watch(const outgoing_call& request, detail::pending_ptr operation) {
+    return signer_ ? signer_->watch(request, std::move(operation)) : std::move(operation);
+}
+
+bool secured_protocol::cancel(std::uint64_t ticket) { return signer_ && signer_->cancel(ticket); }
+
+std::optional<protocol::failure> secured_protocol::refusal(const identity& link, const protocol::request_line& request,
+                                                           time_point due, time_point now) {
+    return challenges_.refusal(link, request, due, now);
+}
+
+bool secured_protocol::serve_reserved(reply_writer& replies, const protocol::request_line& r) {
+    const auto& parameters = r.noun.parameters;
+    if (parameters.size() == 1 && parameters[0] == "roster") {
+        serve_roster(node_, replies, r);
+    } else if (parameters.size() == 2 && parameters[0] == "announced") {
+        serve_announced(node_, replies, r);
+    } else {
+        return false;
+    }
+    return true;
+}
+
+std::optional<bool> secured_protocol::must_be_signed(std::string_view publisher, std::string_view task) const {
+    return core::must_be_signed(node_, publisher, task);
+}
+
+update_check secured_protocol::check(const protocol::request_line& update, bool direct) const {
+    return check_signature(node_, update, direct);
+}
+
+void secured_protocol::sign(announcement& said, std::uint64_t seq) const {
+    said.original = sign_announcement(said, "cles", seq, node_.epoch, *node_.security);
+}
+
+std::vector<std::string> secured_protocol::endpoints(const std::vector<group_port*>& in_group, bool all) {
+    return host_ != nullptr ? endpoints_of_interfaces(*host_, in_group, all) : std::vector<std::string>{};
+}
+
+void secured_protocol::on_stated_roster(std::string_view node, std::uint32_t version, time_point now) {
+    if (security_) {
+        security_->ask_for_roster(node, version, now);
+    }
+}
+
+std::unique_ptr<security_protocol> make_secured_protocol(node_state& host) {
+    return std::make_unique<secured_protocol>(host);
+}
+
+} // namespace cles::core
