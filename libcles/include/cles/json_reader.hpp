@@ -60,7 +60,7 @@ class json_reader {
     void inside_member(std::string_view name);
     void inside_element(std::size_t index);
     /// The failure, as in "localization.lat: expected a number, got a string (at byte 12)".
-    [[nodiscard]] std::string error() const;
+    [[nodiscard, gnu::cold]] std::string error() const;
 
   private:
     void skip_space() noexcept {
@@ -74,10 +74,10 @@ class json_reader {
         skip_space();
         return at_ < text_.size() ? text_[at_] : '\0';
     }
-    bool expected(std::string_view what);
+    [[gnu::cold]] bool expected(std::string_view what);
     bool require(kind wanted);
     bool enter();
-    bool fail_too_deep();
+    [[gnu::cold]] bool fail_too_deep();
     bool next(char close);
     bool literal(std::string_view word);
     bool scan_number(std::string_view& out, bool& integral);

@@ -100,6 +100,6 @@ bool parse_noun(std::string_view text, noun_view& out, std::string& why);
 std::string_view canonical_path(const noun_view& noun, std::string& scratch);
 
 /// Text from a peer, quoted and shortened for a message.
-std::string quoted(std::string_view text);
+[[gnu::cold]] std::string quoted(std::string_view text);
 
 } // namespace cles::protocol

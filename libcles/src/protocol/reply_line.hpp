@@ -48,7 +48,7 @@ struct failure {
 };
 
 /// Parses a failure's members; an unknown code counts as `failed`. False: it is not valid JSON.
-bool parse_failure(std::string_view body, failure& out);
+[[gnu::cold]] bool parse_failure(std::string_view body, failure& out);
 
 /// Appends a failure's body; a forwarded one unchanged. `ran` is written if it is true, `retry_ms` if it is set, and
 /// always with `busy`.
@@ -58,7 +58,7 @@ void append_failure(std::string& out, const failure& f);
 void append_reply_head(std::string& out, std::uint64_t id);
 
 /// "seq=17 epoch=5f3a09c1", which precedes the value in a reply to BIND; empty for none.
-std::string mark_text(const std::optional<update_mark>& mark);
+[[gnu::cold]] std::string mark_text(const std::optional<update_mark>& mark);
 
 /// Appends "id=7 progress=0.4 ".
 void append_progress_head(std::string& out, std::uint64_t id, double fraction);

@@ -96,7 +96,7 @@ bool parse_group_message(std::string_view datagram, request_line& out);
 bool is_known_adverb(std::string_view key, verb v) noexcept;
 
 /// What the parts before the body contain for a reply to a malformed line.
-malformed_request salvage(std::string_view line);
+[[gnu::cold]] malformed_request salvage(std::string_view line);
 
 /// A request to send, whose text the sender owns. Zero or empty means: not written.
 struct outgoing_request {
@@ -122,7 +122,7 @@ struct outgoing_request {
 };
 
 /// Copies the text of a request to `memory`, which must stay where it is. Returns the request with that text.
-outgoing_request copy_text(const outgoing_request& request, std::string& memory);
+[[gnu::cold]] outgoing_request copy_text(const outgoing_request& request, std::string& memory);
 
 /// Appends the request and its LF.
 void append_request(std::string& out, const outgoing_request& request);

@@ -98,13 +98,13 @@ core::group_source source_of(const udp::endpoint& end) {
 class group_receiver : public std::enable_shared_from_this<group_receiver> {
   public:
     /// Joins the group. \throws boost::system::system_error
-    group_receiver(const asio::any_io_executor& executor, const core::network_interface& by,
-                   const udp::endpoint& group);
+    [[gnu::cold]] group_receiver(const asio::any_io_executor& executor, const core::network_interface& by,
+                                 const udp::endpoint& group);
 
     /// Starts to deliver to this listener too, up to a number of datagrams per turn; nothing is allocated for one
     /// except what parsing it keeps. The listener must live until it is removed. It need not receive what it sends
     /// itself from `source`; while it is the only one, the system drops that.
-    void add(core::group_listener& listener, const core::group_source& source);
+    [[gnu::cold]] void add(core::group_listener& listener, const core::group_source& source);
     /// Nothing more is delivered to it; may be called during delivery. With the last listener, the socket is closed.
     void remove(const core::group_listener& listener);
 
@@ -302,8 +302,8 @@ class group_receivers final : public asio::execution_context::service {
 
 } // namespace
 
-std::shared_ptr<group_receiver> receiver_of(const asio::any_io_executor& executor, const core::network_interface& by,
-                                            const udp::endpoint& group) {
+[[gnu::cold]] std::shared_ptr<group_receiver>
+receiver_of(const asio::any_io_executor& executor, const core::network_interface& by, const udp::endpoint& group) {
     auto& context = asio::query(executor, asio::execution::context);
     return asio::use_service<group_receivers>(context).find(executor, by, group);
 }

@@ -33,8 +33,8 @@ class group_port final : public core::group_port, public std::enable_shared_from
     using udp = boost::asio::ip::udp;
 
     /// Joins the group. \throws boost::system::system_error
-    group_port(const boost::asio::any_io_executor& executor, const core::network_interface& by,
-               const multicast_options& where);
+    [[gnu::cold]] group_port(const boost::asio::any_io_executor& executor, const core::network_interface& by,
+                             const multicast_options& where);
 
     void start(core::group_listener& owner) override;
     core::datagrams_done send(core::datagram_list all) override;
@@ -48,7 +48,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
 
   private:
     void send_rest();
-    void wait_until_writable();
+    [[gnu::cold]] void wait_until_writable();
     void wait_for_own();
     void deliver_own();
 

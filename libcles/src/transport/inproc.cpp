@@ -62,7 +62,7 @@ class mailbox {
 /// executor.
 class inproc_link final : public link, public std::enable_shared_from_this<inproc_link> {
   public:
-    inproc_link(const asio::any_io_executor& executor, std::string address, const limits& bounds);
+    [[gnu::cold]] inproc_link(const asio::any_io_executor& executor, std::string address, const limits& bounds);
     inproc_link(const inproc_link&) = delete;
     inproc_link& operator=(const inproc_link&) = delete;
     ~inproc_link() override;
@@ -77,8 +77,8 @@ class inproc_link final : public link, public std::enable_shared_from_this<inpro
     [[nodiscard]] std::uint64_t sent() const noexcept override { return flushed_ - excess_in_transit(); }
     [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
     void pause(bool stop) override;
-    void finish() override;
-    void close() override;
+    [[gnu::cold]] void finish() override;
+    [[gnu::cold]] void close() override;
     [[nodiscard]] const identity& peer() const noexcept override { return peer_; }
 
   private:
@@ -96,8 +96,8 @@ class inproc_link final : public link, public std::enable_shared_from_this<inpro
     bool next_text();
     void release(std::size_t bytes);
     void discard_input();
-    void wait_for_peer_close();
-    void lose_later();
+    [[gnu::cold]] void wait_for_peer_close();
+    [[gnu::cold]] void lose_later();
     void lose();
     [[nodiscard]] bool drained() const noexcept { return read_at_ >= text_.size() && inbox_.empty(); }
     // This much may be in transit before it counts as unsent, like data in the buffers of a socket.
@@ -179,7 +179,7 @@ void inproc_link::flush() {
     }
     if (peer_closed_) { // reported later: the owner may be in the middle of something
         output_.clear();
-        lose_later();
+        [[gnu::cold]] lose_later();
         return;
     }
     in_transit_ += output_.size();
@@ -336,7 +336,7 @@ void inproc_link::finish() {
     discard_input();
     post_to_peer([](inproc_link& other) { other.on_other_finished(); });
     if (ended_ || peer_closed_) {
-        lose_later();
+        [[gnu::cold]] lose_later();
     } else if (excess_in_transit() == 0) {
         wait_for_peer_close();
     }
@@ -354,7 +354,7 @@ void inproc_link::wait_for_peer_close() {
 void inproc_link::on_other_finished() {
     ended_ = true;
     if (state_ == state::finishing) {
-        lose_later();
+        [[gnu::cold]] lose_later();
     } else {
         hand_over();
     }
@@ -380,7 +380,7 @@ void inproc_link::lose() {
         return;
     }
     const auto owner = owner_;
-    close();
+    [[gnu::cold]] close();
     if (owner) {
         owner->on_lost(asio::error::eof);
     }
@@ -441,7 +441,7 @@ class inproc_acceptor final : public acceptor, public std::enable_shared_from_th
     [[nodiscard]] url local() const override { return where_; }
     void start(std::function<void(link_ptr)> on_link) override { on_link_ = std::move(on_link); }
     // From now on, the executor's context may be destroyed.
-    void close() override {
+    [[gnu::cold]] void close() override {
         all_inproc_listeners().remove(where_.host, this);
         mailbox_.shut();
         on_link_ = nullptr;
@@ -475,8 +475,8 @@ class inproc_transport final : public link_transport {
   public:
     [[nodiscard]] bool is_exposed(const url&) const override { return false; }
 
-    std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
-                                     const limits& bounds) override {
+    [[gnu::cold]] std::unique_ptr<acceptor> listen(const asio::any_io_executor& executor, const url& where,
+                                                   const limits& bounds) override {
         auto listener = std::make_shared<inproc_acceptor>(executor, where, bounds);
         if (!all_inproc_listeners().add(where.host, listener)) {
             throw boost::system::system_error{asio::error::address_in_use};

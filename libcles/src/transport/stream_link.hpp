@@ -30,11 +30,12 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
   public:
     using socket_type = boost::asio::generic::stream_protocol::socket;
 
-    stream_link(socket_type socket, identity peer, const limits& bounds, std::unique_ptr<stream_codec> codec = nullptr);
+    [[gnu::cold]] stream_link(socket_type socket, identity peer, const limits& bounds,
+                              std::unique_ptr<stream_codec> codec = nullptr);
 
     /// Opens a link that has a codec. `opened` is called when it is open or has failed, unless it is closed before, and
     /// never from inside this call.
-    void open(std::function<void(boost::system::error_code)> opened = nullptr);
+    [[gnu::cold]] void open(std::function<void(boost::system::error_code)> opened = nullptr);
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }
     std::string& urgent_output() override { return urgent_; }
@@ -70,21 +71,21 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     void release_input();
     void put_urgent_first();
     void clear_output();
-    void lose_later(boost::system::error_code why);
+    [[gnu::cold]] void lose_later(boost::system::error_code why);
     void flush_encoded();
     [[nodiscard]] std::size_t send_encoded(boost::system::error_code& code);
     void write_rest();
     void async_send(std::string_view bytes);
     void let_urgent_pass();
     void on_written(boost::system::error_code code, std::size_t count);
-    void shut_down_output();
-    void discard();
-    void watch_for_hangup();
+    [[gnu::cold]] void shut_down_output();
+    [[gnu::cold]] void discard();
+    [[gnu::cold]] void watch_for_hangup();
     void on_error_condition();
     void lose(boost::system::error_code why);
     // With a codec:
     void continue_opening();
-    void on_opened();
+    [[gnu::cold]] void on_opened();
     void fail(boost::system::error_code why);
 
     socket_type socket_;

@@ -26,7 +26,7 @@ class udp_port;
 /// A link over datagrams: one peer of a socket, which it may share with other links. Each line is a datagram.
 class udp_link final : public link, public std::enable_shared_from_this<udp_link> {
   public:
-    udp_link(std::shared_ptr<udp_port> socket, datagram_origin peer, identity who);
+    [[gnu::cold]] udp_link(std::shared_ptr<udp_port> socket, datagram_origin peer, identity who);
     udp_link(const udp_link&) = delete;
     udp_link& operator=(const udp_link&) = delete;
     ~udp_link() override;
@@ -94,12 +94,12 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
   public:
     using udp = boost::asio::ip::udp;
 
-    explicit udp_port(udp::socket socket, std::unique_ptr<datagram_codec> codec = nullptr);
+    [[gnu::cold]] explicit udp_port(udp::socket socket, std::unique_ptr<datagram_codec> codec = nullptr);
 
     /// Listens: from now on, each new source becomes a link.
     void start(std::function<void(link_ptr)> on_link) override;
     /// The only link of a connected socket.
-    link_ptr connect_link(const udp::endpoint& peer, identity who, std::uint32_t member = 0);
+    [[gnu::cold]] link_ptr connect_link(const udp::endpoint& peer, identity who, std::uint32_t member = 0);
     /// Accepts no new sources.
     void close() override;
     [[nodiscard]] url local() const override;
@@ -109,8 +109,8 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     /// Sends whole lines, each with its LF as one datagram, as long as the socket has space. One that cannot be sent
     /// counts as lost in the network.
     core::datagrams_done send(const udp_link& to, std::string_view lines);
-    void wait_until_writable(std::weak_ptr<udp_link> link);
-    void forget(const udp_link& link);
+    [[gnu::cold]] void wait_until_writable(std::weak_ptr<udp_link> link);
+    [[gnu::cold]] void forget(const udp_link& link);
     void check_peer(const udp_link& link, time_point since);
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
 
@@ -118,7 +118,8 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     void hand_over();
     void hand_over(const receive_batch::datagram& one);
     [[nodiscard]] udp_link* find(const udp::endpoint& sender, std::uint32_t member);
-    std::shared_ptr<udp_link> accept(const udp::endpoint& sender, std::uint32_t member, std::uint32_t epoch);
+    [[gnu::cold]] std::shared_ptr<udp_link> accept(const udp::endpoint& sender, std::uint32_t member,
+                                                   std::uint32_t epoch);
     core::datagrams_done send_sealed(const udp_link& to, std::string_view lines);
     [[nodiscard]] const udp::endpoint* address_of(const udp::endpoint& to) const noexcept {
         return connected_ ? nullptr : &to;
@@ -130,7 +131,7 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     void on_opened(const datagram_origin& from, std::uint32_t epoch, std::string_view line) override;
     void on_established(const datagram_origin& with, std::uint32_t epoch) override;
     void on_unanswered(const datagram_origin& with, bool lost) override;
-    void on_removed(std::uint32_t member) override;
+    [[gnu::cold]] void on_removed(std::uint32_t member) override;
     [[nodiscard]] bool holds(const datagram_origin& which) const override { return links_.contains(which); }
 
     udp::socket socket_;

@@ -117,13 +117,13 @@ class completion_queue {
     void call(std::function<void()> function) { put(completion{completion::callback{std::move(function)}}); }
 
     // The library's own operations complete inside these calls; a user's are put.
-    void fail(detail::pending_ptr operation, boost::system::error_code code, std::string_view why,
-              completion::progress_function progress = {});
+    [[gnu::cold]] void fail(detail::pending_ptr operation, boost::system::error_code code, std::string_view why,
+                            completion::progress_function progress = {});
     /// Fails it with the peer's failure; `answer` is its text.
-    void refuse(detail::pending_ptr operation, const protocol::failure& why, std::string_view answer,
-                completion::progress_function progress = {});
+    [[gnu::cold]] void refuse(detail::pending_ptr operation, const protocol::failure& why, std::string_view answer,
+                              completion::progress_function progress = {});
     void succeed(detail::pending_ptr operation, std::string_view json);
-    void fail(pending_event_ptr operation, boost::system::error_code code, std::string_view why);
+    [[gnu::cold]] void fail(pending_event_ptr operation, boost::system::error_code code, std::string_view why);
     /// \pre the event's body is valid JSON
     void deliver(pending_event_ptr operation, const detail::raw_event& event);
 

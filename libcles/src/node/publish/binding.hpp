@@ -94,7 +94,7 @@ class link_bindings {
     /// Binds, or changes the terms of a binding.
     void bind(topic& t, binding::terms wanted);
     /// Does nothing if it is not bound.
-    void unbind(std::string_view path);
+    [[gnu::cold]] void unbind(std::string_view path);
     void clear();
     /// Sends pending updates: the link is writable again.
     void drain(time_point now);

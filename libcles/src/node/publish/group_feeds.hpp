@@ -52,11 +52,11 @@ class group_feeds {
     /// The feed must live until it is removed.
     void add(group_feed& feed, time_point now);
     /// Does nothing if it is not there (any more).
-    void remove(group_feed& feed);
+    [[gnu::cold]] void remove(group_feed& feed);
     /// Removes and returns all feeds.
-    [[nodiscard]] std::vector<group_feed*> remove_all();
+    [[nodiscard, gnu::cold]] std::vector<group_feed*> remove_all();
     /// The node has restarted and knows no bindings: feeds bound to it, or to `all`, are soon bound again.
-    void on_new_incarnation(std::string_view node, time_point now);
+    [[gnu::cold]] void on_new_incarnation(std::string_view node, time_point now);
     /// Whether a feed is bound to the update's noun.
     [[nodiscard]] bool wants(const protocol::request_line& update) const;
     /// The node's next update counts as its first.
@@ -76,8 +76,8 @@ class group_feeds {
         std::size_t feeds = 0;
     };
 
-    void send_bind(bound& b, time_point now);
-    void unbind(const group_feed& last);
+    [[gnu::cold]] void send_bind(bound& b, time_point now);
+    [[gnu::cold]] void unbind(const group_feed& last);
     [[nodiscard]] bool has(std::string_view path, const group_feed* feed) const;
 
     node_state& node_;

@@ -78,8 +78,8 @@ struct task_nouns {
 /// nobody is bound to, least recently used first.
 class publications final : public topic_source {
   public:
-    publications(topic_context shared, const cles::limits& bounds, completion_queue& completions, std::string publisher,
-                 std::string epoch, unsent_topics& unsent);
+    [[gnu::cold]] publications(topic_context shared, const cles::limits& bounds, completion_queue& completions,
+                               std::string publisher, std::string epoch, unsent_topics& unsent);
 
     /// From now on, updates of tasks that are registered as signed are; without `security`, they are refused with
     /// `denied`. Both must outlive this.
@@ -99,7 +99,7 @@ class publications final : public topic_source {
                          std::uint64_t ticket = 0);
     /// Cancels an update that waits: it is not published, and its operation fails with `cancelled`. False if
     /// none with this ticket waits.
-    bool cancel(std::uint64_t ticket);
+    [[gnu::cold]] bool cancel(std::uint64_t ticket);
 
     /// Notified of each new topic, before anything is published there.
     class observer {
@@ -120,12 +120,12 @@ class publications final : public topic_source {
     /// The topic, or null.
     [[nodiscard]] topic* find(std::string_view path) noexcept override;
     /// Whether anything of the task has been published or bound.
-    [[nodiscard]] bool knows(std::string_view task) const noexcept;
+    [[nodiscard, gnu::cold]] bool knows(std::string_view task) const noexcept;
     /// The topic, for a BIND; created if necessary. No other retires for it, since anyone may bind anything. \throws
     /// cles::error with `busy` if the task has too many nouns
-    topic& open(std::string_view path);
+    [[gnu::cold]] topic& open(std::string_view path);
     /// Whether `open` finds or can create it.
-    [[nodiscard]] bool can_open(std::string_view path) noexcept;
+    [[nodiscard, gnu::cold]] bool can_open(std::string_view path) noexcept;
     /// Whether it can be published, as far as the limit on nouns goes.
     [[nodiscard]] bool can_publish(std::string_view path) noexcept;
     /// Forgets the last value, and the noun too if nobody is bound to it. False if there is no value.
@@ -142,18 +142,18 @@ class publications final : public topic_source {
     void admit(topic& t) override;
 
     /// Removes and returns the operations of all updates that wait for capacity.
-    [[nodiscard]] std::vector<detail::pending_ptr> take_waiters();
+    [[nodiscard, gnu::cold]] std::vector<detail::pending_ptr> take_waiters();
 
     /// The names of the tasks that have been published.
-    [[nodiscard]] std::set<std::string> tasks() const;
+    [[nodiscard, gnu::cold]] std::set<std::string> tasks() const;
 
   private:
-    topic& open(std::string_view path, bool to_publish);
+    [[gnu::cold]] topic& open(std::string_view path, bool to_publish);
     [[nodiscard]] static topic* oldest_idle(task_nouns& of) noexcept;
     void retire(topic& t);
-    void remove(topic& t);
+    [[gnu::cold]] void remove(topic& t);
     static void mark_used(topic& t) noexcept;
-    void take_memory(topic& t);
+    [[gnu::cold]] void take_memory(topic& t);
     /// What slow subscribers have not taken is kept, whatever memory it needs.
     void publish_lossless(std::string_view path, std::string_view body);
     void end(topic& t, std::size_t body_at);

@@ -120,12 +120,12 @@ class subscription {
 class subscriptions {
   public:
     /// Returns false if the noun is, or may be, bound on this link already, and that binding cannot be shared.
-    bool add(subscription& s);
-    [[nodiscard]] bool admits(const subscription& s) const;
-    void remove(const subscription& s);
+    [[gnu::cold]] bool add(subscription& s);
+    [[nodiscard, gnu::cold]] bool admits(const subscription& s) const;
+    [[gnu::cold]] void remove(const subscription& s);
     /// Whether another subscription is bound whose binding this one may share.
     [[nodiscard]] bool has_bound_for(const subscription& s) const;
-    [[nodiscard]] bool has(std::string_view target, std::string_view path) const;
+    [[nodiscard, gnu::cold]] bool has(std::string_view target, std::string_view path) const;
     /// The subscription that an update is for, or null.
     [[nodiscard]] subscription* find(std::string_view publisher, std::string_view path) const;
 
@@ -146,7 +146,7 @@ class subscriptions {
 
   private:
     void forget_last() noexcept;
-    [[nodiscard]] std::span<subscription* const> all_of(std::string_view path) const;
+    [[nodiscard, gnu::cold]] std::span<subscription* const> all_of(std::string_view path) const;
 
     // Usually one node publishes a path on a link, so a short list is faster than a second key.
     string_map<std::vector<subscription*>> by_path_;

@@ -35,7 +35,7 @@ class update_log {
     /// Starts a line: append it to the string, without its LF, then call `commit` or `roll_back`.
     std::string& begin();
     void commit();
-    void roll_back();
+    [[gnu::cold]] void roll_back();
     /// What has been appended since `begin`.
     [[nodiscard]] std::string_view pending() const noexcept;
 
@@ -116,7 +116,7 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     [[nodiscard]] std::string_view pending() const noexcept { return log_.pending(); }
     /// Completes the line, which becomes the last update.
     void commit(std::size_t body_at);
-    void roll_back();
+    [[gnu::cold]] void roll_back();
     /// Accounts for the memory of its updates, the one being written included. False if there is not enough.
     [[nodiscard]] bool account_memory() noexcept { return held_.try_resize(log_.memory()); }
     /// Drops what waits for slow subscribers, except the last update and the one being written.
@@ -125,7 +125,7 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     void retire();
 
     /// Binds a subscriber, or changes the terms of its binding.
-    void bind(subscriber& target, binding::terms wanted);
+    [[gnu::cold]] void bind(subscriber& target, binding::terms wanted);
     /// Returns false if it was not bound.
     bool unbind(subscriber& target);
     [[nodiscard]] binding* find(const subscriber& target) noexcept;

@@ -30,7 +30,7 @@ class connection final : public link_events,
     enum class origin : std::uint8_t { accepted, local, dialled, refused };
 
     /// `number` is unique within the service.
-    connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number);
+    [[gnu::cold]] connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number);
     ~connection() override;
 
     void start();
@@ -49,8 +49,8 @@ class connection final : public link_events,
     /// Closes the link at once; `on_lost` is not called.
     void abandon(std::string_view why);
     /// Sends a BIND for `feed`, which receives the updates from then on.
-    void bind(feed_machine& feed, protocol::outgoing_request request, time_point deadline,
-              detail::pending_ptr operation);
+    [[gnu::cold]] void bind(feed_machine& feed, protocol::outgoing_request request, time_point deadline,
+                            detail::pending_ptr operation);
     void unbind(feed_machine& feed);
     /// Whether the peer's reply to BIND names the update that it holds; empty until the peer has been asked.
     [[nodiscard]] std::optional<bool> marks() const noexcept { return marks_; }
@@ -62,10 +62,10 @@ class connection final : public link_events,
     void on_cut(std::string_view rest) override;
     void on_batch() override;
     void on_end() override;
-    void on_lost(boost::system::error_code why) override;
+    [[gnu::cold]] void on_lost(boost::system::error_code why) override;
     void on_writable() override;
-    void on_restart() override;
-    void on_unanswered(bool lost) override;
+    [[gnu::cold]] void on_restart() override;
+    [[gnu::cold]] void on_unanswered(bool lost) override;
 
     // flushable
     void flush() override;
@@ -107,11 +107,11 @@ class connection final : public link_events,
     bool accept_input(std::string_view text);
     void rethrow_handler_exception();
     // link_monitor::owner
-    void on_silence() override;
+    [[gnu::cold]] void on_silence() override;
     void on_probe() override;
     void evict() override;
 
-    void on_stall(time_point now);
+    [[gnu::cold]] void on_stall(time_point now);
     void schedule_buffer_release();
     void on_idle(time_point now);
     void send_output();
@@ -119,7 +119,7 @@ class connection final : public link_events,
     void serve_more();
     void update_backpressure();
     void close_after_flush(std::string_view why);
-    void end(std::string_view why);
+    [[gnu::cold]] void end(std::string_view why);
     void lose_feeds(std::string_view why);
 
     std::shared_ptr<local_node> host_;

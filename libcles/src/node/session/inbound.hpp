@@ -39,11 +39,11 @@ class inbound final : private task_sink {
     /// finishes.
     void end();
     /// The link is lost.
-    void lose();
+    [[gnu::cold]] void lose();
     /// From now on, new and waiting requests are answered with `busy`. Running ones still complete.
     void refuse_new_requests() noexcept { refuses_new_requests_ = true; }
     /// Answers running requests with `unavailable` and stops their handlers; answers waiting ones with `busy`.
-    void abort_running();
+    [[gnu::cold]] void abort_running();
 
     /// A call for a request that is answered later. Null if there are too many; the request has then been refused.
     std::shared_ptr<call> make_call(const protocol::request_line& request, time_point due, time_point now);
@@ -67,7 +67,7 @@ class inbound final : private task_sink {
     static constexpr std::size_t max_frame = 64; // around a reply: "id=7 " and the closing characters
 
     void serve(const protocol::request_line& request, time_point arrived, time_point now);
-    void serve_cancel(const protocol::request_line& request, std::uint64_t id);
+    [[gnu::cold]] void serve_cancel(const protocol::request_line& request, std::uint64_t id);
     void serve_locally(const protocol::request_line& request, time_point due, time_point now);
     void keep(const protocol::request_line& request, const std::shared_ptr<call>& c);
     void forget(const call& c);
@@ -77,7 +77,7 @@ class inbound final : private task_sink {
         return where.id == 0 && where.wanted && ordered_.must_wait();
     }
     void refuse_in_turn(reply_target where, const protocol::failure& why);
-    void withdraw(std::uint64_t id);
+    [[gnu::cold]] void withdraw(std::uint64_t id);
     /// The peer has broken the protocol: it gets what has been written, and then the link ends.
     void break_off();
     void finish_if_done();

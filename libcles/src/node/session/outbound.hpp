@@ -52,21 +52,21 @@ class outbound {
               progress_function progress = {});
     /// Cancels a request at the peer; its operation fails with `cancelled`, without waiting for the peer. Returns false
     /// if it has ended.
-    bool cancel(std::uint64_t id);
+    [[gnu::cold]] bool cancel(std::uint64_t id);
     /// Discards a request and its operation, without notifying anyone.
     void drop(std::uint64_t id);
     void on_reply(const protocol::reply_line& reply);
     /// A reply over the line limit.
     void on_overlong(const protocol::reply_line& reply);
     /// The peer has restarted. Requests that it may have run fail, except PULL and BIND, which are sent again.
-    void on_restart(time_point now);
+    [[gnu::cold]] void on_restart(time_point now);
     /// Fails all pending requests with the peer's refusal of the link as a whole: it has started none of them.
-    void refuse(const std::string& answer);
+    [[gnu::cold]] void refuse(const std::string& answer);
     /// Fails all pending requests.
-    void lose(errc why, std::string_view message);
+    [[gnu::cold]] void lose(errc why, std::string_view message);
     /// Fails all pending requests because the node stops. No operation completes inside the call, not even the
     /// library's own.
-    void stop();
+    [[gnu::cold]] void stop();
     [[nodiscard]] std::size_t in_flight() const noexcept { return waiting_.size(); }
 
   private:
@@ -89,11 +89,11 @@ class outbound {
     [[nodiscard]] std::size_t longest() const noexcept;
     [[nodiscard]] bool has_memory_for(const protocol::outgoing_request& request);
     void on_due(entry& e, time_point now);
-    void resend(entry& e, time_point now);
+    [[gnu::cold]] void resend(entry& e, time_point now);
     void rearm(std::unique_ptr<entry> e, time_point due);
     std::unique_ptr<entry> take(std::uint64_t id);
     void recycle(std::unique_ptr<entry> e);
-    void fail(std::uint64_t id, errc why, std::string_view message);
+    [[gnu::cold]] void fail(std::uint64_t id, errc why, std::string_view message);
 
     node_state& node_;
     line_sink& out_;

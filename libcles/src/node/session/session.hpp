@@ -50,7 +50,7 @@ class session {
     void on_reply(std::string_view line);
     void note_refusal(std::string_view line);
     void lose_requests(std::string_view why);
-    void on_leaving();
+    [[gnu::cold]] void on_leaving();
     void on_update(const subscriptions::match& found);
 
     std::shared_ptr<node_state> node_;

@@ -40,7 +40,7 @@ class task_registry {
   public:
     /// \throws cles::error: `invalid_name`, `already_registered`, and `too_large` if the names of signed tasks exceed
     /// `max_signed_names`
-    void add(cles::verb verb, std::string_view task, handler entry);
+    [[gnu::cold]] void add(cles::verb verb, std::string_view task, handler entry);
 
     /// The handler, or null.
     [[nodiscard]] const handler* find(cles::verb verb, std::string_view task) const noexcept;
@@ -58,7 +58,7 @@ class task_registry {
     [[nodiscard]] const std::map<std::string, handlers, std::less<>>& tasks() const noexcept { return tasks_; }
 
   private:
-    void add_signed(std::string_view task);
+    [[gnu::cold]] void add_signed(std::string_view task);
 
     std::map<std::string, handlers, std::less<>> tasks_;
     std::vector<std::string> signed_;
@@ -129,7 +129,7 @@ class task_execution {
   private:
     [[nodiscard]] std::optional<protocol::failure> refusal(const memory_account* memory);
     [[nodiscard]] std::optional<protocol::failure> capacity_refusal(const memory_account* memory);
-    [[nodiscard]] std::optional<protocol::failure> signature_refusal();
+    [[nodiscard, gnu::cold]] std::optional<protocol::failure> signature_refusal();
     void start(task_sink& to, const std::shared_ptr<memory_account>& memory);
     [[nodiscard]] std::string_view publish_path() { return protocol::canonical_path(line_.noun, path_); }
 
