@@ -91,7 +91,12 @@ SANS_IO = {"json", "protocol", "port", "node", "security"}
 WITHOUT_IO = {
     "libcles/src/node/base/ip_network.cpp": {"arpa/inet.h"},  # inet_pton and inet_ntop read and write text
     "libcles/src/security/datagrams/fork_count.cpp": {"pthread.h"},  # pthread_atfork: keys must not be used on in a child process
-    # Key files; each is checked after it has been opened.
+    "libcles/src/security/core_dumps.cpp": {"sys/prctl.h", "sys/resource.h"},  # limits of the process
+    # Files of keys and plugins; each is checked after it has been opened.
+    "libcles/src/security/fleet/checked_file.cpp": {"fcntl.h", "sys/stat.h", "sys/xattr.h", "unistd.h"},
+    "libcles/src/security/fleet/descriptor.cpp": {"unistd.h"},
+    "libcles/src/security/fleet/file_protection.cpp": {"sys/stat.h", "unistd.h"},
+    "libcles/src/security/fleet/private_group.cpp": {"sys/stat.h"},
     "libcles/src/security/fleet/protected_folder.cpp": {"fcntl.h", "sys/file.h", "sys/stat.h", "unistd.h"},
     "libcles/src/security/keys/secret.cpp": {"mutex"},  # any thread may destroy a secret
 }

@@ -140,7 +140,7 @@ BOOST_AUTO_TEST_CASE(files_of_other_users_are_refused) {
         BOOST_REQUIRE(chown(path(name).c_str(), other_user, 0) == 0);
     }
     const auto wrong = [&](const std::string& where) {
-        return where + " belongs to the user 54321, not to root or root: chown root " + where;
+        return where + " belongs to the user 54321, not to root: chown root " + where;
     };
     BOOST_TEST(secret_refusal("key") == wrong(path("key")));
     BOOST_TEST(text_refusal("roster") == wrong(path("roster")));

@@ -5,6 +5,7 @@
 
 #include <cles/error.hpp>
 #include <cles/security.hpp>
+#include <cles/security/core_dumps.hpp>
 #include <cles/security/node_files.hpp>
 
 #include <stdexcept>
@@ -12,6 +13,7 @@
 namespace tool {
 
 void use_member_key(cles::service_options& options, const std::string& directory) {
+    cles::security::forbid_core_dumps();
     try {
         options.security = cles::secured(directory);
     } catch (const cles::error& e) { // of this host, not of a node

@@ -3,6 +3,7 @@
 
 #ifdef CLES_SECURITY
 
+#include <cles/security/core_dumps.hpp>
 #include <cles/security/node_files.hpp>
 
 #include <exception>
@@ -56,6 +57,7 @@ bool check_keys(const std::string& directory, findings& found) {
         return true;
     }
     check_locked_memory(found);
+    security::forbid_core_dumps();
     try {
         const auto node = security::describe_node(directory);
         check_membership(node, directory, found);

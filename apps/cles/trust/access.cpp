@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include <cles/json_writer.hpp>
 #include <cles/security/access.hpp>
+#include <cles/security/core_dumps.hpp>
 
 #include "commands.hpp"
 #include "options/arguments.hpp"
@@ -8,7 +9,6 @@
 #include "output/errors.hpp"
 #include "output/printer.hpp"
 #include "output/terminal.hpp"
-#include "trust/no_core_dumps.hpp"
 
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
@@ -103,7 +103,7 @@ void add_access(CLI::App& app, context& shared) {
         "  cles access sat1 push car1:target\n"
         "  cles access car2 bind self:localization --via relay -o json");
     command->callback([args, &shared] {
-        const no_core_dumps guard;
+        security::forbid_core_dumps();
         shared.exit_code = explain(*args);
     });
 }

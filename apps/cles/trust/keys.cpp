@@ -9,8 +9,8 @@
 #include "output/printer.hpp"
 #include "output/terminal.hpp"
 #include "trust/carried_file.hpp"
-#include "trust/no_core_dumps.hpp"
 #include "trust/rights_options.hpp"
+#include "trust/run_with_keys.hpp"
 #include "trust/trust_paths.hpp"
 
 #include <CLI/App.hpp>

@@ -29,6 +29,7 @@ struct plugin_config {
     std::string path;          ///< as written in the configuration
     std::string config = "{}"; ///< JSON, passed to the plugin unchanged
     bool required = true;      ///< the daemon does not start without it
+    std::string sha256{};      ///< of its file, in small hexadecimal digits; empty: any
     std::string
         trial_error{}; ///< why the plugin cannot be used (`try_plugins`); empty if it can, or has not been tried
 
@@ -64,7 +65,8 @@ struct config {
     std::chrono::microseconds drain{5'000'000};       ///< how long running jobs may take to end at a stop
 
     std::vector<plugin_config> plugins;
-    std::vector<std::string> plugin_path; ///< folders to search for plugins named without one
+    /// Folders to search for plugins named without one; with security, plugins may be in these only, and those of CLES.
+    std::vector<std::string> plugin_path;
 
     log_config log;
     cles::limits limits;

@@ -138,7 +138,8 @@ std::vector<plugin_config> plugins_of(const yaml_value& from) {
         }
         item.read_map({{"path", part(read.path, scalar(to_path))},
                        {"config", part(read.config, [](const yaml_value& v) { return v.json(); })},
-                       {"required", part(read.required, scalar(to_bool))}});
+                       {"required", part(read.required, scalar(to_bool))},
+                       {"sha256", part(read.sha256, scalar(to_sha256))}});
         if (read.path.empty()) {
             item.fail("has no 'path'");
         }
@@ -236,6 +237,7 @@ std::string text_of(const std::vector<plugin_config>& plugins) {
     for (const auto& p : plugins) {
         all +=
             "\n  - path: " + text_of(p.path) + "\n    config: " + p.config + "\n    required: " + text_of(p.required);
+        all += p.sha256.empty() ? "" : "\n    sha256: " + text_of(p.sha256);
     }
     return (all.empty() ? " []" : all) + "\n";
 }

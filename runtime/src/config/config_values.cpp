@@ -192,6 +192,24 @@ std::string to_interfaces(std::string_view text) {
     return std::move(where.interface);
 }
 
+std::string to_sha256(std::string_view text) {
+    constexpr std::size_t digits = 64;
+    constexpr std::string_view small = "0123456789abcdef";
+    constexpr std::string_view capital = "0123456789ABCDEF";
+    std::string read;
+    for (const char c : text) {
+        const auto value = std::min(small.find(c), capital.find(c));
+        if (value == std::string_view::npos) {
+            break;
+        }
+        read.push_back(small[value]);
+    }
+    if (text.size() != digits || read.size() != digits) {
+        refuse(text, "is not a SHA-256: write the 64 hexadecimal digits that sha256sum prints");
+    }
+    return read;
+}
+
 log_level to_log_level(std::string_view text) {
     const auto* const found = std::ranges::find(levels, text, &decltype(levels)::value_type::first);
     if (found == levels.end()) {

@@ -45,6 +45,9 @@ multicast_options to_multicast(std::string_view text);
 /// The names of network interfaces, separated by commas, or `auto`.
 std::string to_interfaces(std::string_view text);
 
+/// The SHA-256 of a file, as `sha256sum` prints it: 64 hexadecimal digits, returned in small letters.
+std::string to_sha256(std::string_view text);
+
 log_level to_log_level(std::string_view text);
 log_format to_log_format(std::string_view text);
 /// "debug", "json", or both, as "debug,json". \param current supplies what the text does not set

@@ -55,7 +55,8 @@ pool_options pool_options_of(const config& setup, const daemon_log& log) {
 
 plugin_host_options host_options_of(const config& setup, const daemon_log& log) {
     plugin_host_options options{.node = setup.node};
-    options.folders = plugin_search_path(setup);
+    options.rules = plugin_rules_of(setup);
+    options.folders = options.rules.folders;
     options.trial = 0ms; // they were tried before threads were started
     options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
         log.write(level, std::string{plugin} + ": " + std::string{text});
@@ -117,7 +118,7 @@ void daemon::load_plugins() {
             const plugin_start_guard guard{"clesd: " + setup_.location_of("plugins[" + std::to_string(i) + "].path") +
                                                ": " + path,
                                            exit_configuration_error, start_limit};
-            plugins_.load(path, wanted.config, tasks);
+            plugins_.load(path, wanted.config, tasks, wanted.sha256);
         } catch (const plugin_error& e) {
             const auto message = plugin_error_message(setup_, i, e);
             if (wanted.required) {

@@ -7,6 +7,7 @@
 
 #include <cles/error.hpp>
 #include <cles/security.hpp>
+#include <cles/security/core_dumps.hpp>
 #include <cles/security/node_files.hpp>
 
 #include <charconv>
@@ -45,6 +46,7 @@ std::shared_ptr<detail::security_part> security_of(const config& setup) {
     if (!setup.security.is_on()) {
         return nullptr;
     }
+    security::forbid_core_dumps();
     security_options options{.directory = setup.security.keys};
     for (const auto& [user, member] : setup.security.local_users) {
         const auto id = id_of_user(user);
@@ -68,6 +70,7 @@ std::shared_ptr<detail::security_part> security_of(const config& setup) {
 
 std::string name_of_key(const std::string& directory) {
     try {
+        security::forbid_core_dumps();
         return security::describe_node(directory).name;
     } catch (const std::exception&) { // reported when the security is made
         return {};

@@ -50,8 +50,8 @@ plugin_host::plugin_host(plugin_host_options options)
 
 plugin_host::~plugin_host() { stop(std::chrono::seconds{2}); }
 
-void plugin_host::load(const std::string& path, const std::string& config, registrar& into) {
-    const auto file = find_plugin(path, options_.folders);
+void plugin_host::load(const std::string& path, const std::string& config, registrar& into, const std::string& sha256) {
+    const plugin_file file{path, find_plugin(path, options_.folders), options_.rules, sha256};
     if (options_.trial.count() > 0) {
         try_plugin(path, file, options_.node, config, options_.trial);
     }

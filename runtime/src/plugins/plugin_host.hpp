@@ -5,6 +5,7 @@
 
 #include "jobs/stop_notifier.hpp"
 #include "plugins/loaded_plugin.hpp"
+#include "plugins/plugin_file.hpp"
 #include "plugins/plugin_library.hpp"
 
 #include <boost/describe/class.hpp>
@@ -26,6 +27,7 @@ struct plugin_host_options {
     /// How long a library may take to load in a child process that tries it first, so that a crash or a hang there does
     /// no harm. 0: it is not tried.
     std::chrono::milliseconds trial{10'000};
+    plugin_rules rules{}; ///< which files may be loaded
 };
 
 struct plugin_info {
@@ -62,9 +64,10 @@ class plugin_host {
     /// Stops the plugins if they have not been stopped, within two seconds.
     ~plugin_host();
 
-    /// Loads a plugin, passes it its settings (a JSON object), and registers its tasks.
+    /// Loads a plugin, passes it its settings (a JSON object), and registers its tasks. \param sha256 of its file, in
+    /// small hexadecimal digits; empty: any
     /// \throws plugin_error
-    void load(const std::string& path, const std::string& config, registrar& into);
+    void load(const std::string& path, const std::string& config, registrar& into, const std::string& sha256 = {});
 
     [[nodiscard]] const std::vector<plugin_info>& plugins() const noexcept { return plugins_; }
     [[nodiscard]] plugin_figures figures() const;

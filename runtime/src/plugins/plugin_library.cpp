@@ -131,15 +131,30 @@ void check_version(const std::string& path, const cles_plugin& described) {
     }
 }
 
+// What the loader says, with the path of the file where it knows it by another name.
+std::string loader_message(std::string why, const std::string& opened, const plugin_file& file) {
+    const auto& path = file.path().string();
+    for (auto at = why.find(opened); at != std::string::npos; at = why.find(opened, at + path.size())) {
+        why.replace(at, opened.size(), path);
+    }
+    if (file.is_checked() && why.find("cannot open shared object file") != std::string::npos) {
+        why += " (with 'security' or 'sha256', $ORIGIN in a plugin is not its folder)";
+    }
+    return why;
+}
+
 } // namespace
 
-std::shared_ptr<const boost::dll::shared_library> open_library(const std::string& path, const fs::path& file) {
+std::shared_ptr<const boost::dll::shared_library> open_library(const std::string& path, const plugin_file& file) {
+    const auto opened = file.loader_path(path);
+    file.keep_open();
     auto library = std::make_shared<boost::dll::shared_library>();
     std::error_code failed;
-    library->load(file, failed, boost::dll::load_mode::rtld_now);
+    library->load(opened, failed, boost::dll::load_mode::rtld_now);
     if (failed) {
         const char* why = ::dlerror();
-        throw plugin_error(path, std::string{"it cannot be loaded: "} + (why == nullptr ? "" : why));
+        throw plugin_error(path,
+                           "it cannot be loaded: " + loader_message(why == nullptr ? "" : why, opened.string(), file));
     }
     return library;
 }

@@ -4,13 +4,12 @@
 #include <cles/plugin_abi.h>
 
 #include "config/config.hpp"
+#include "plugins/plugin_error.hpp"
+#include "plugins/plugin_file.hpp"
 
 #include <filesystem>
 #include <memory>
-#include <optional>
-#include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 namespace boost::dll {
@@ -20,20 +19,6 @@ class shared_library;
 /// The library of a plugin: where it is, and what it says about itself.
 
 namespace cles::runtime {
-
-/// Why a plugin cannot be used. `what()` is one line that begins with the plugin's path as written in the
-/// configuration.
-class plugin_error : public std::runtime_error {
-  public:
-    /// \param setting the key of the setting that is invalid, if one is; empty for all of them together
-    plugin_error(const std::string& path, const std::string& why, std::optional<std::string> setting = std::nullopt)
-        : std::runtime_error(path + ": " + why), setting_(std::move(setting)) {}
-
-    [[nodiscard]] const std::optional<std::string>& setting() const noexcept { return setting_; }
-
-  private:
-    std::optional<std::string> setting_;
-};
 
 /// The file of a plugin: a path that names a folder is used as it is; a bare name is searched for in the folders, in
 /// order. \throws plugin_error if there is no such file, naming the folders
@@ -55,8 +40,7 @@ std::vector<std::filesystem::path> plugin_search_path(const config& setup);
 
 /// Loads a plugin's library, which runs its initialization. \param path as written in the configuration
 /// \throws plugin_error
-std::shared_ptr<const boost::dll::shared_library> open_library(const std::string& path,
-                                                               const std::filesystem::path& file);
+std::shared_ptr<const boost::dll::shared_library> open_library(const std::string& path, const plugin_file& file);
 
 /// Calls a plugin's entry point and checks the description that it returns. \throws plugin_error
 const cles_plugin& describe_plugin(const std::string& path, const boost::dll::shared_library& library);

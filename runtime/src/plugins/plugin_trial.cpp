@@ -85,8 +85,8 @@ void reset_process_state(pid_t parent, int output) {
 }
 
 // In the child. Ends it without exit handlers, which belong to the parent.
-[[noreturn]] void run_child(pid_t parent, const std::filesystem::path& file, const std::string& node,
-                            const std::string& config, int output, int report) {
+[[noreturn]] void run_child(pid_t parent, const plugin_file& file, const std::string& node, const std::string& config,
+                            int output, int report) {
     reset_process_state(parent, output);
     std::string step;
     const auto begin_step = [&](const char* next) {
@@ -247,8 +247,8 @@ pipe_ends make_pipe() {
 
 } // namespace
 
-void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
-                const std::string& config, std::chrono::milliseconds limit) {
+void try_plugin(const std::string& path, const plugin_file& file, const std::string& node, const std::string& config,
+                std::chrono::milliseconds limit) {
     const auto end = std::chrono::steady_clock::now() + limit;
     auto output_pipe = make_pipe();
     auto report_pipe = make_pipe();
@@ -289,18 +289,17 @@ void try_plugin(const std::string& path, const std::filesystem::path& file, cons
 }
 
 std::string plugin_error_message(const config& setup, std::size_t plugin, const plugin_error& why) {
-    const auto of = "plugins[" + std::to_string(plugin) + "]";
-    const auto& setting = why.setting();
-    const auto key = !setting ? of + ".path" : setting->empty() ? of + ".config" : of + ".config." + *setting;
-    return setup.location_of(key) + ": " + why.what();
+    return setup.location_of("plugins[" + std::to_string(plugin) + "]." + why.key()) + ": " + why.what();
 }
 
 void try_plugins(config& setup) {
+    const auto rules = plugin_rules_of(setup);
     for (std::size_t i = 0; i < setup.plugins.size(); ++i) {
         auto& wanted = setup.plugins[i];
         try {
             const auto path = resolve_plugin_path(setup, wanted);
-            try_plugin(path, find_plugin(path, plugin_search_path(setup)), setup.node, wanted.config, trial_limit);
+            const plugin_file file{path, find_plugin(path, rules.folders), rules, wanted.sha256};
+            try_plugin(path, file, setup.node, wanted.config, trial_limit);
         } catch (const plugin_error& e) {
             wanted.trial_error = plugin_error_message(setup, i, e);
             if (wanted.required) {

@@ -2,11 +2,11 @@
 #pragma once
 
 #include "config/config.hpp"
-#include "plugins/plugin_library.hpp"
+#include "plugins/plugin_error.hpp"
+#include "plugins/plugin_file.hpp"
 
 #include <chrono>
 #include <cstddef>
-#include <filesystem>
 #include <string>
 
 namespace cles::runtime {
@@ -22,11 +22,11 @@ namespace cles::runtime {
 /// \param path as written in the configuration \param file its file \param config its settings, a JSON object
 /// \throws plugin_error if it cannot be used; std::system_error if it cannot be tried, for example because the process
 /// ignores SIGCHLD
-void try_plugin(const std::string& path, const std::filesystem::path& file, const std::string& node,
-                const std::string& config, std::chrono::milliseconds limit);
+void try_plugin(const std::string& path, const plugin_file& file, const std::string& node, const std::string& config,
+                std::chrono::milliseconds limit);
 
-/// The message about a plugin that cannot be used: the location in the configuration, of its `path` or of the invalid
-/// setting, and the reason.
+/// The message about a plugin that cannot be used: the location in the configuration, of the key that is to blame, and
+/// the reason.
 std::string plugin_error_message(const config& setup, std::size_t plugin, const plugin_error& why);
 
 /// Tries all plugins, each in a child process, and stores why any cannot be used in its `trial_error`. To be called

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "security/fleet/protected_folder.hpp"
 
+#include "security/fleet/file_protection.hpp"
 #include "security/keys/keys.hpp"
 
 #include <algorithm>
@@ -12,7 +13,6 @@
 
 #include <dirent.h>
 #include <fcntl.h>
-#include <pwd.h>
 #include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -24,33 +24,6 @@ namespace {
     throw security_error{what + ": " + std::generic_category().message(code)};
 }
 
-// For commands that the message proposes.
-std::string shell_quoted(std::string_view text) {
-    constexpr std::string_view plain = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-./+@:,";
-    if (text.find_first_not_of(plain) == std::string_view::npos && !text.starts_with('-')) {
-        return std::string{text};
-    }
-    std::string quoted{"'"};
-    for (const auto c : text) {
-        if (c == '\'') {
-            quoted += "'\\''";
-        } else {
-            quoted.push_back(c);
-        }
-    }
-    return quoted + "'";
-}
-
-std::string user_name(uid_t user) {
-    passwd entry{};
-    passwd* found = nullptr;
-    std::array<char, 4096> buffer{};
-    if (getpwuid_r(user, &entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr) {
-        return found->pw_name;
-    }
-    return std::to_string(user);
-}
-
 struct stat status_of(const descriptor& file, const std::string& path) {
     struct stat status {};
     if (fstat(file.get(), &status) != 0) {
@@ -59,17 +32,9 @@ struct stat status_of(const descriptor& file, const std::string& path) {
     return status;
 }
 
-void check_owner(const struct stat& status, const std::string& path) {
-    const auto me = geteuid();
-    if (status.st_uid != me && status.st_uid != 0) {
-        throw security_error{path + " belongs to the user " + user_name(status.st_uid) + ", not to " + user_name(me) +
-                             " or root: chown " + user_name(me) + " " + shell_quoted(path)};
-    }
-}
-
-void check_not_writable(const struct stat& status, const std::string& path) {
-    if ((status.st_mode & (S_IWGRP | S_IWOTH)) != 0) {
-        throw security_error{path + " can be changed by other users: chmod go-w " + shell_quoted(path)};
+void require_none(const std::string& flaw) {
+    if (!flaw.empty()) {
+        throw security_error{flaw};
     }
 }
 
@@ -101,27 +66,14 @@ void write_all(const descriptor& file, bytes_view content, const std::string& pa
 
 } // namespace
 
-descriptor::descriptor(descriptor&& other) noexcept : fd_(std::exchange(other.fd_, -1)) {}
-
-descriptor& descriptor::operator=(descriptor&& other) noexcept {
-    descriptor closed{std::exchange(fd_, std::exchange(other.fd_, -1))};
-    return *this;
-}
-
-descriptor::~descriptor() {
-    if (is_open()) {
-        close(fd_);
-    }
-}
-
 protected_folder::protected_folder(std::string path)
     : path_(std::move(path)), folder_(open(path_.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
     if (!folder_.is_open()) {
         fail_with(errno, "cannot open the folder " + path_);
     }
     const auto status = status_of(folder_, path_);
-    check_owner(status, path_);
-    check_not_writable(status, path_);
+    require_none(owner_flaw(status, path_));
+    require_none(mode_flaw(status, path_));
 }
 
 protected_folder protected_folder::create(std::string path) {
@@ -158,11 +110,11 @@ protected_folder::opened protected_folder::open_file(const std::string& name, ac
     if (!S_ISREG(status.st_mode)) {
         throw security_error{path + " is not a regular file"};
     }
-    check_owner(status, path);
+    require_none(owner_flaw(status, path));
     if (who == access::secret && (status.st_mode & (S_IRWXG | S_IRWXO)) != 0) {
         throw security_error{path + " is accessible to other users: chmod 600 " + shell_quoted(path)};
     }
-    check_not_writable(status, path);
+    require_none(mode_flaw(status, path));
     const auto size = static_cast<std::size_t>(status.st_size);
     if (size > max_size) {
         throw security_error{path + " has " + std::to_string(size) + " bytes; at most " + std::to_string(max_size) +

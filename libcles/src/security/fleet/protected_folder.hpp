@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "security/fleet/descriptor.hpp"
 #include "security/keys/secret.hpp"
 
 #include <cstddef>
@@ -10,22 +11,6 @@
 #include <vector>
 
 namespace cles::security {
-
-/// An open file or folder.
-class descriptor {
-  public:
-    descriptor() = default;
-    explicit descriptor(int fd) noexcept : fd_(fd) {}
-    descriptor(descriptor&& other) noexcept;
-    descriptor& operator=(descriptor&& other) noexcept;
-    ~descriptor();
-
-    [[nodiscard]] int get() const noexcept { return fd_; }
-    [[nodiscard]] bool is_open() const noexcept { return fd_ >= 0; }
-
-  private:
-    int fd_ = -1;
-};
 
 /// A folder whose content only its owner and root can change. Names denote files directly in it; symbolic links and
 /// everything else that is not a regular file are refused. What is checked is the opened file, so that it cannot be
