@@ -46,6 +46,17 @@ void prepare_secure_heap() {
     static_cast<void>(prepared); // without it, the key is still wiped
 }
 
+// What OpenSSL makes of the bytes of a key is on its usual heap, and only a copy of that on the secure one. The first
+// is wiped here.
+key_ptr private_key_of(const security::signing_key& own) {
+    prepare_secure_heap();
+    const key_ptr made{::EVP_PKEY_new_raw_private_key(EVP_PKEY_ED25519, nullptr, own.seed().data(), own.seed().size())};
+    require(made != nullptr, "cannot use the key for TLS");
+    key_ptr kept{::EVP_PKEY_dup(made.get())};
+    require(kept != nullptr, "cannot use the key for TLS");
+    return kept;
+}
+
 certificate_ptr make_certificate(EVP_PKEY* key) {
     certificate_ptr made{::X509_new()};
     require(made != nullptr, "cannot make a certificate");
@@ -93,9 +104,7 @@ void tls_context::free_context::operator()(ssl_ctx_st* context) const noexcept {
 tls_context::tls_context(const security::signing_key& own) : context_(::SSL_CTX_new(::TLS_method())) {
     auto* context = context_.get();
     require(context != nullptr, "cannot prepare TLS");
-    prepare_secure_heap();
-    const key_ptr key{::EVP_PKEY_new_raw_private_key(EVP_PKEY_ED25519, nullptr, own.seed().data(), own.seed().size())};
-    require(key != nullptr, "cannot use the key for TLS");
+    const auto key = private_key_of(own);
     const auto certificate = make_certificate(key.get());
 
     std::string group{"X25519"}; // these macros take no constants
