@@ -183,6 +183,12 @@ class Doctor(unittest.TestCase):
         with open(config, "a", encoding="utf-8") as file:
             file.write("workers: none\n")
         self.failure(self.examine(CLES_CONFIG=config)[1], "config", rf"clesd: {config}:3: workers: ")
+        with open(config, "w", encoding="utf-8") as file:
+            file.write(f"plugins:\n  - path: ./mine.so\n    sha256: {'0' * 64}\n")
+        with open(os.path.join(self.folder.name, "mine.so"), "w", encoding="utf-8") as file:
+            file.write("anything")
+        os.chmod(file.name, 0o644)
+        self.failure(self.examine(CLES_CONFIG=config)[1], "config", rf"clesd: {config}:3: plugins\[0\]\.sha256: .*SHA-256")
         self.failure(self.examine(CLES_CONFIG=config + "x")[1], "config", rf"{config}x")
 
     @unittest.skipUnless(CLESD, "clesd was not built")

@@ -84,6 +84,7 @@ const mistake mistakes[] = {
     {"plugins: [{path: ''}]\n", "clesd.yaml:1: plugins[0].path: ", "is empty"},
     {"plugins:\n  - path: a.so\n    config: 7\n", "clesd.yaml:3: plugins[0].config: ", "has to be a map or a list"},
     {"plugins: [{path: a.so, required: often}]\n", "clesd.yaml:1: plugins[0].required: ", "neither true nor false"},
+    {"plugins: [{path: a.so, sha256: 12}]\n", "clesd.yaml:1: plugins[0].sha256: ", "is not a SHA-256"},
     {"plugin_path: {}\n", "clesd.yaml:1: plugin_path: ", "has to be a list"},
     {"log: loud\n", "clesd.yaml:1: log: ", "is not a log setting"},
     {"log: {level: loud}\n", "clesd.yaml:1: log.level: ", "is not one of debug"},

@@ -17,7 +17,8 @@ config all_set() {
                 "multicast: {port: 4000, required: false}\nseeds: [tcp://127.0.0.1:2]\n"
                 "peers: {a: tcp://127.0.0.1:3, b.c: udp://127.0.0.1:3}\nworkers: 3\nqueue: 9\nstuck_after: 1500ms\n"
                 "replacements: 0\ndrain: 2min\nplugin_path: [/a, 'b: c']\n"
-                "plugins: [{path: x.so, config: {a: [1, '2', null], b: \"q\\\"\"}, required: false}, y.so]\n"
+                "plugins: [{path: x.so, config: {a: [1, '2', null], b: \"q\\\"\"}, required: false}, y.so,\n"
+                "  {path: z.so, sha256: 0000000000000000000000000000000000000000000000000000000000000007}]\n"
                 "log: error,json\nbusy_poll: 50us\nreal_time: 7\nwake_within: 0us\nlimits: {depth: 8, lease: 5s}\n",
                 "clesd.yaml", c);
     return c;

@@ -122,6 +122,16 @@ BOOST_AUTO_TEST_CASE(multicast) {
     BOOST_TEST(refusal([] { to_multicast("eth0,10.0.0.1"); }).find("multicast group") != std::string::npos);
 }
 
+BOOST_AUTO_TEST_CASE(sha256) {
+    const std::string digits = "0123456789abcdef0123456789abcdef0123456789abcdef0123456789abcdef";
+    BOOST_TEST(to_sha256(digits) == digits);
+    BOOST_TEST(to_sha256("0123456789ABCDEF0123456789abcdef0123456789ABCDEF0123456789abcdef") == digits);
+    for (const auto& text : {std::string{}, digits.substr(1), digits + "0", digits.substr(1) + "g",
+                             "0x" + digits.substr(2), digits.substr(1) + " "}) {
+        BOOST_TEST(refusal([&] { to_sha256(text); }).find("is not a SHA-256") != std::string::npos, text);
+    }
+}
+
 BOOST_AUTO_TEST_CASE(log_settings) {
     const log_config before{.level = cles::log_level::warning, .format = log_format::json};
     BOOST_TEST((to_log_config("debug", before) == log_config{cles::log_level::debug, log_format::json}));
