@@ -6,6 +6,7 @@
 #include "security/fleet/private_group.hpp"
 #include "security/keys/keys.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdint>
@@ -141,7 +142,20 @@ class path_walk {
         way_.push_back({std::move(opened), path});
     }
 
-    void follow(const descriptor& link, const struct stat& status, const std::string& path) {
+    [[nodiscard]] descriptor open_next(const std::string& name, int flags) const {
+        return descriptor{openat(way_.back().opened.get(), name.c_str(), flags | O_NOFOLLOW | O_CLOEXEC)};
+    }
+
+    // What is neither a folder nor a file has to be a link.
+    void follow(const std::string& name, const std::string& path) {
+        const auto link = open_next(name, O_PATH);
+        if (!link.is_open()) {
+            fail_with(errno, "cannot open " + path);
+        }
+        const auto status = status_of(link, path);
+        if (!S_ISLNK(status.st_mode)) {
+            fail_with(ENOTDIR, "cannot open " + path);
+        }
         if (++links_ > max_links) {
             fail_with(ELOOP, "cannot open " + path);
         }
@@ -174,17 +188,14 @@ class path_walk {
             return;
         }
         const auto path = path_of(name);
-        descriptor next{openat(way_.back().opened.get(), name.c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC)};
-        if (!next.is_open()) {
-            fail_with(errno, "cannot open " + path);
-        }
-        const auto status = status_of(next, path);
-        if (S_ISLNK(status.st_mode)) {
-            follow(next, status, path);
-        } else if (S_ISDIR(status.st_mode)) {
+        auto next = open_next(name, O_PATH | O_DIRECTORY); // which mounts it, if need be
+        if (next.is_open()) {
+            const auto status = status_of(next, path);
             enter(std::move(next), status, path);
+        } else if (errno == ENOTDIR) {
+            follow(name, path);
         } else {
-            fail_with(ENOTDIR, "cannot open " + path);
+            fail_with(errno, "cannot open " + path);
         }
     }
 
@@ -196,13 +207,9 @@ class path_walk {
         }
         const auto path = path_of(name);
         // A FIFO without a writer would otherwise be waited for.
-        descriptor file{openat(way_.back().opened.get(), name.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC)};
+        auto file = open_next(name, O_RDONLY | O_NONBLOCK);
         if (!file.is_open() && errno == ELOOP) {
-            descriptor link{openat(way_.back().opened.get(), name.c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC)};
-            if (!link.is_open()) {
-                fail_with(errno, "cannot open " + path);
-            }
-            follow(link, status_of(link, path), path);
+            follow(name, path);
             return {};
         }
         if (!file.is_open()) {
