@@ -4,7 +4,9 @@
 #include <cles/service.hpp>
 
 #include "child.hpp"
+#include "client/member_key.hpp"
 #include "course.hpp"
+#include "laboratory_fleet.hpp"
 #include "simulation.hpp"
 #include "vehicle_node.hpp"
 #include "view.hpp"
@@ -17,7 +19,9 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <map>
+#include <memory>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -33,14 +37,50 @@ constexpr auto poll_interval = 20ms;
 constexpr auto discovery_time = 400ms;
 constexpr double process_timeout = 10; // s
 
+// In the folder of a fleet.
+std::string keys_of(const std::string& member, const std::string& fleet) {
+    return (std::filesystem::path{fleet} / member).string();
+}
+
+// Checks that everybody's keys are in the folder of the fleet.
+void check_keys(const drive_options& options, const std::string& fleet) {
+    std::vector<std::string> names{operator_name};
+    for (std::size_t i = 0; i < options.vehicles; ++i) {
+        names.push_back(name_of(i));
+    }
+    std::erase_if(names, [&fleet](const auto& name) { return std::filesystem::exists(keys_of(name, fleet)); });
+    if (names.empty()) {
+        return;
+    }
+    std::string missing;
+    for (const auto& name : names) {
+        missing.append(missing.empty() ? "" : ",").append(name);
+    }
+    throw cles::error(cles::errc::denied, fleet + " has no keys of " + missing +
+                                              ": name the folder of a fleet, which 'cles fleet init DIR --with " +
+                                              missing + "' creates");
+}
+
+cles::service_options options_of(const drive_options& options, const std::string& fleet) {
+    cles::service_options out;
+    if (!fleet.empty()) {
+        check_keys(options, fleet);
+        tool::use_member_key(out, keys_of(operator_name, fleet));
+    } else {
+        out.name = "platoon-" + std::to_string(::getpid());
+    }
+    out.insecure = options.insecure;
+    out.multicast = options.group;
+    return out;
+}
+
 class drive_supervisor {
   public:
     explicit drive_supervisor(const drive_options& options)
-        : options_(options), book_(options.setup.limits.lag),
-          service_(io_, {.name = "platoon-" + std::to_string(::getpid()),
-                         .insecure = options.insecure,
-                         .multicast = options.group}),
-          signals_(io_, SIGINT, SIGTERM), open_(options.incidents) {
+        : options_(options), signals_(io_, SIGINT, SIGTERM),
+          laboratory_(options.secured ? std::make_unique<laboratory_fleet>(options.vehicles) : nullptr),
+          keys_(laboratory_ ? laboratory_->folder() : options.keys), book_(options.setup.limits.lag),
+          service_(io_, options_of(options, keys_)), open_(options.incidents) {
         signals_.async_wait([this](boost::system::error_code failed, int) { interrupted_ = !failed; });
     }
 
@@ -164,6 +204,9 @@ class drive_supervisor {
                                                       std::to_string(options_.group.port)});
         if (options_.insecure) {
             words.emplace_back("--insecure");
+        }
+        if (!keys_.empty()) {
+            words.insert(words.end(), {"--keys", keys_of(name_of(i), keys_)});
         }
         children_.try_emplace(name_of(i), words);
     }
@@ -291,9 +334,11 @@ class drive_supervisor {
 
     const drive_options& options_;
     asio::io_context io_{1};
+    asio::signal_set signals_;                     ///< before there are files that have to be removed in the end
+    std::unique_ptr<laboratory_fleet> laboratory_; ///< if it was asked for
+    std::string keys_;                             ///< the folder of the fleet; empty: without security
     logbook book_;
     cles::service service_;
-    asio::signal_set signals_;
     std::vector<incident> open_;
     std::map<std::string, child> children_;
     std::vector<std::string> first_; ///< the vehicles at the start, the leader first

@@ -28,7 +28,9 @@ struct drive_options {
     std::vector<incident> incidents{};
     cles::multicast_options group{};
     bool insecure = false; ///< allow a group beyond this host, where nodes are not authenticated
-    bool quiet = false;    ///< show no progress
+    std::string keys{};   ///< the folder of a fleet, with the keys of `operator` and each vehicle in folders of its own
+    bool secured = false; ///< with the keys of a fleet that is created for this drive
+    bool quiet = false;   ///< show no progress
     bool in_place = false; ///< show a table that changes in place; otherwise a line each second
 };
 

@@ -2,7 +2,10 @@
 #include <cles/convert.hpp>
 #include <cles/error.hpp>
 
+#include "client/member_key.hpp"
 #include "drive.hpp"
+#include "options/keys_option.hpp"
+#include "output/errors.hpp"
 #include "simulate_command.hpp"
 #include "vehicle_node.hpp"
 
@@ -23,7 +26,8 @@ struct arguments {
     unsigned seeds = 1;
     std::string controller = "leader", group{}, record{}, vanish{};
     std::vector<std::string> vanishes{}, joins{}, leaves{};
-    bool json = false, view = false, lead = false, join = false, report = false, insecure = false;
+    bool json = false, view = false, lead = false, join = false, report = false, insecure = false, secured = false;
+    tool::keys_option keys{};
     std::string name{}, ahead{};
     double x = 0;
     std::size_t turn = 0, turns = 1;
@@ -44,9 +48,7 @@ struct arguments {
     }
 };
 
-struct usage_error : std::runtime_error {
-    using std::runtime_error::runtime_error;
-};
+using tool::usage_error;
 
 platoon::incident incident_of(platoon::incident::kind what, const std::string& text, std::size_t vehicles) {
     platoon::incident out{.what = what};
@@ -90,6 +92,8 @@ int run(const arguments& args) {
                                    .setup = args.setup(),
                                    .group = args.group_options(),
                                    .insecure = args.insecure,
+                                   .keys = args.secured ? "" : args.keys.given_directory(),
+                                   .secured = args.secured,
                                    .quiet = args.json,
                                    .in_place = !args.json && (args.view || ::isatty(STDOUT_FILENO) == 1)};
     const auto add = [&](platoon::incident::kind what, const std::vector<std::string>& texts) {
@@ -123,8 +127,12 @@ int vehicle(const arguments& args) {
                                      .delay = args.delay_ms / 1000,
                                      .seed = args.seed,
                                      .group = args.group_options(),
-                                     .insecure = args.insecure};
-    options.setup.name = args.name;
+                                     .insecure = args.insecure,
+                                     .keys = args.keys.given_directory()};
+    if (args.name.empty() && options.keys.empty()) {
+        throw usage_error("which vehicle is it? Give --name, or --keys with the key of a member of a fleet");
+    }
+    options.setup.name = args.name.empty() ? tool::name_of_member(options.keys) : args.name;
     options.setup.ahead = args.ahead;
     options.setup.start = {args.x, options.setup.plan.speed, 0};
     if (options.start_ns == 0) {
@@ -186,6 +194,10 @@ int main(int argc, char** argv) {
     on_road.add_option("--vanish", args.vanishes, "The process of vehicle I is killed at T")->type_name("I@T");
     on_road.add_option("--join", args.joins, "Vehicle I joins the end of the platoon at T")->type_name("I@T");
     on_road.add_option("--leave", args.leaves, "Vehicle I leaves at T")->type_name("I@T");
+    args.keys.add_optional_to(on_road, "A fleet's folder with the keys of operator, v0, v1 ...: all is sealed");
+    on_road
+        .add_flag("--secured", args.secured, "The same with a fleet for this drive alone, whose keys are then removed")
+        ->excludes("--keys");
     on_road.add_flag("--view", args.view, "Show a table that changes in place, even if stdout is not a terminal");
     for (auto* command : {&in_time, &on_road}) {
         command->add_option("--record", args.record, "Write a complete record, for plots")->type_name("FILE");
@@ -193,7 +205,8 @@ int main(int argc, char** argv) {
     }
     add_group(on_road, args);
     add_group(one, args);
-    one.add_option("--name", args.name, "The name of the vehicle")->required();
+    args.keys.add_optional_to(one, "The directory with the vehicle's key: all is sealed, and its states are signed");
+    one.add_option("--name", args.name, "The name of the vehicle (default: that of its key)");
     auto* const lead = one.add_flag("--lead", args.lead, "Lead the platoon");
     auto* const ahead = one.add_option("--ahead", args.ahead, "The vehicle to follow")->excludes(lead);
     one.add_flag("--join", args.join, "Join the platoon in the group (default)")->excludes(lead)->excludes(ahead);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "vehicle_node.hpp"
 
+#include "client/member_key.hpp"
 #include "simulation.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -59,12 +60,25 @@ std::string own_address(const std::string& interface_name) {
 }
 
 // Its address on each interface, so that nodes on that network can reach it.
-std::vector<std::string> listen_urls(const cles::multicast_options& group) {
+std::vector<std::string> listen_urls(const cles::multicast_options& group, const std::string& scheme) {
     std::vector<std::string> urls;
     for (const auto& interface : cles::interfaces_of(group)) {
-        urls.push_back("tcp://" + own_address(interface) + ":0");
+        urls.push_back(scheme + "://" + own_address(interface) + ":0");
     }
     return urls;
+}
+
+cles::service_options options_of(const vehicle_options& vehicle) {
+    const bool secured = !vehicle.keys.empty();
+    cles::service_options out;
+    if (secured) {
+        tool::use_member_key(out, vehicle.keys);
+    }
+    out.name = vehicle.setup.name;
+    out.listen = listen_urls(vehicle.group, secured ? "tls" : "tcp");
+    out.insecure = vehicle.insecure;
+    out.multicast = vehicle.group;
+    return out;
 }
 
 /// The last vehicle of a platoon: the one that no other follows; of several, the rearmost.
@@ -85,12 +99,11 @@ std::string last_vehicle(const std::map<std::string, state>& heard) {
 std::int64_t monotonic_ns() { return std::chrono::nanoseconds{steady::now().time_since_epoch()}.count(); }
 
 vehicle_node::vehicle_node(vehicle_options options)
-    : options_(std::move(options)), service_(io_, {.name = options_.setup.name,
-                                                   .listen = listen_urls(options_.group),
-                                                   .insecure = options_.insecure,
-                                                   .multicast = options_.group}),
-      signals_(io_, SIGTERM, SIGINT), radio_(options_.loss, options_.delay, options_.seed) {
+    : options_(std::move(options)), service_(io_, options_of(options_)), signals_(io_, SIGTERM, SIGINT),
+      radio_(options_.loss, options_.delay, options_.seed) {
     report_.vehicle = options_.setup.name;
+    service_.on_bind("state", {.description = "Its mode, position, speed and acceleration",
+                               .must_be_signed = !options_.keys.empty()});
     service_.on_push("join", [this](const join_request& who) { accept_follower(who); },
                      {.description = "Follow this vehicle, the last one", .parameters = {}});
     service_.on_push("leave",

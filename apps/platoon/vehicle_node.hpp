@@ -30,6 +30,7 @@ struct vehicle_options {
     std::uint64_t seed = 1;
     cles::multicast_options group{};
     bool insecure = false; ///< allow a group beyond this host, where nodes are not authenticated
+    std::string keys{};    ///< the directory with its key and the roster of its fleet; empty: without security
 };
 
 /// The body of PUSH `join`.
@@ -41,7 +42,8 @@ BOOST_DESCRIBE_STRUCT(join_request, (), (name))
 /// A vehicle on the road: a driver, and the service that connects it with the others. It is bound by multicast
 /// to the leader and to the one ahead, and publishes its own state `hz` times per second.
 ///
-/// Tasks: BIND `state`; PUSH `join` announces a follower, PUSH `leave` makes it leave.
+/// Tasks: BIND `state`, whose updates are signed if it has a key; PUSH `join` announces a follower, PUSH `leave` makes
+/// it leave.
 class vehicle_node {
   public:
     explicit vehicle_node(vehicle_options options);

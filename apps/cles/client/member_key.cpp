@@ -19,8 +19,10 @@ void use_member_key(cles::service_options& options, const std::string& directory
     } catch (const cles::error& e) { // of this host, not of a node
         throw std::runtime_error(e.message());
     }
-    options.name = cles::security::describe_node(directory).name;
+    options.name = name_of_member(directory);
 }
+
+std::string name_of_member(const std::string& directory) { return cles::security::describe_node(directory).name; }
 
 } // namespace tool
 
@@ -29,10 +31,17 @@ void use_member_key(cles::service_options& options, const std::string& directory
 #include "output/errors.hpp"
 
 namespace tool {
+namespace {
 
-void use_member_key(cles::service_options& /*options*/, const std::string& directory) {
-    throw usage_error("--keys " + directory + ": this cles was built without security");
+[[noreturn]] void refuse(const std::string& directory) {
+    throw usage_error("--keys " + directory + ": this program was built without security");
 }
+
+} // namespace
+
+void use_member_key(cles::service_options& /*options*/, const std::string& directory) { refuse(directory); }
+
+std::string name_of_member(const std::string& directory) { refuse(directory); }
 
 } // namespace tool
 

@@ -11,4 +11,8 @@ namespace tool {
 /// \throws std::runtime_error that says what is wrong in the directory, and what corrects it
 void use_member_key(cles::service_options& options, const std::string& directory);
 
+/// The name of the key in this directory.
+/// \throws std::runtime_error as above
+std::string name_of_member(const std::string& directory);
+
 } // namespace tool
