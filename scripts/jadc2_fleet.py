@@ -21,12 +21,26 @@ from deferred_signals import DeferredSignals, first_line  # noqa: E402
 PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "30"))
 CONFIG = """\
 node: {name}
-listen: ["tcp://{address}:{port}"]
+listen: ["{scheme}://{address}:{port}"]
 insecure: {insecure}
+security: {security}
 multicast: off
 drain: 500ms
 plugins: [{plugins}]
 """
+# What each role may request, and what others may request of it. The requests for `cles` are those by which nodes find each
+# other, and what they offer.
+FINDS = ["pull *:cles", "pull,push *:cles/peers"]
+SATELLITE = {"may": [], "offers": ["delegate,pull *:FMV_Processing", *FINDS]}
+RIGHTS = {
+    "sat1": SATELLITE,
+    "sat2": SATELLITE,
+    "strike1": {"may": [], "offers": ["delegate,pull *:strike", *FINDS]},
+    "recon": {"may": [], "offers": ["bind *:tracks", "push *:impact"]},
+    "recon-camera": {"may": ["delegate *:FMV_Processing", *FINDS], "offers": []},
+    "mission": {"may": ["bind recon:tracks", "push recon:impact", "delegate *:strike", *FINDS], "offers": []},
+    "operator": {"may": ["pull *:*", "pull *:*/**"], "offers": []},  # for questions about the outcome
+}
 
 
 class Trouble(Exception):
@@ -150,11 +164,12 @@ class Daemon(Process):
         config = os.path.join(fleet.folder, name + ".yaml")
         with open(config, "w", encoding="utf-8") as file:
             file.write(CONFIG.format(name=name, address=fleet.hosts.address(role, towards), port=port,
-                                     insecure=str(fleet.hosts.insecure).lower(), plugins=", ".join(plugins)) + more)
+                                     scheme=fleet.scheme, insecure=str(fleet.exposed).lower(),
+                                     security=fleet.keys(name) or "off", plugins=", ".join(plugins)) + more)
         self.fleet, self.role = fleet, role
         super().__init__(fleet, name, fleet.hosts.command(role, fleet.program("clesd"), "--config", config))
         line = first_line(self.process, PATIENCE)
-        found = re.search(r"listening on (tcp://\S+:(\d+))", line)
+        found = re.search(r"listening on (t(?:cp|ls)://\S+:(\d+))", line)
         if not found:
             self.close()
             raise Trouble(f"{name} did not start: {line}{self.said_wrong()}")
@@ -162,12 +177,17 @@ class Daemon(Process):
 
     def pull(self, noun):
         """Sends a PULL from the daemon's own host, so that no additional link is needed."""
-        done = subprocess.run(self.fleet.hosts.command(self.role, self.fleet.program("cles"), "pull", noun, "--at", self.url,
-                                                       "-o", "json"), stdin=subprocess.DEVNULL, capture_output=True, text=True,
-                              env={**clean_environment(), "CLES_MULTICAST": "off"}, timeout=PATIENCE, check=False)
+        done = self.ask("operator", "pull", noun, "-o", "json")
         if done.returncode != 0:
             raise Trouble(f"{self.name} did not reply to {noun}: {done.stderr}")
         return json.loads(done.stdout)
+
+    def ask(self, member, *words):
+        """Runs `cles` with these words on the daemon's own host, with that member's key if the fleet is secured."""
+        command = self.fleet.hosts.command(self.role, self.fleet.program("cles"), *words, "--at", self.url,
+                                           *self.fleet.keys_option(member))
+        return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE, check=False,
+                              env={**clean_environment(), "CLES_MULTICAST": "off"})
 
     def peers(self):
         return {peer["node"] for peer in self.pull("self:cles/peers")["peers"]}
@@ -248,12 +268,45 @@ class Teller(Process):
 
 
 class Fleet:
-    """All processes that were started; they end with this object."""
+    """All processes that were started; they end with this object, which also removes their files. If `rights` are given,
+    as in RIGHTS, all links are sealed, and each role has these rights."""
 
-    def __init__(self, programs, hosts=None, listener=None):
+    def __init__(self, programs, hosts=None, listener=None, rights=None):
         self.programs, self.hosts, self.listener = programs, hosts or Loopback(), listener
         self.folder = tempfile.mkdtemp(prefix="cles-jadc2-")
         self.started = []
+        self.secured = rights is not None
+        self.scheme = "tls" if self.secured else "tcp"
+        self.exposed = self.hosts.insecure and not self.secured
+        if self.secured:
+            try:
+                self._create_keys(rights)
+            except BaseException:
+                self.close()
+                raise
+
+    def _create_keys(self, rights):
+        def run(*words):
+            done = subprocess.run([self.program("cles"), *words], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                  timeout=PATIENCE, check=False, env=clean_environment())
+            if done.returncode != 0:
+                raise Trouble(f"cannot create the keys: {done.stderr.strip()}")
+
+        fleet = os.path.join(self.folder, "fleet")
+        run("fleet", "init", fleet, "--with", ",".join(rights))
+        for name, lists in rights.items():
+            options = [word for kind in ("may", "offers") for right in lists[kind] or ["none"]
+                       for word in ("--" + kind, right)]
+            run("fleet", "rights", name, *options, "--keys", fleet)
+        for name in rights:
+            run("keys", "join", os.path.join(fleet, "roster"), "--keys", self.keys(name))
+
+    def keys(self, member):
+        """The member's directory; empty without security."""
+        return os.path.join(self.folder, "fleet", member) if self.secured else ""
+
+    def keys_option(self, member):
+        return ["--keys", self.keys(member)] if self.secured else []
 
     def program(self, name):
         return os.path.join(self.programs, name)
@@ -266,27 +319,31 @@ class Fleet:
         return Daemon(self, role, name, plugins, "recon", port, more)
 
     def striker(self, name="strike1", plugins=None, port=0, more=""):
-        """Starts a strike aircraft that also accepts old tracks, so that a busy machine does not cause refusals."""
-        plugins = [f"{{path: {self.plugin('strike')}, config: {{oldest_s: 60}}}}"] if plugins is None else plugins
+        """Starts a strike aircraft that also accepts old tracks, so that a busy machine does not cause refusals. In a
+        secured fleet, orders must be signed."""
+        config = f"oldest_s: 60, must_be_signed: {str(self.secured).lower()}"
+        plugins = [f"{{path: {self.plugin('strike')}, config: {{{config}}}}}"] if plugins is None else plugins
         return Daemon(self, "strike", name, plugins, "mission", port, more)
 
     def recon(self, satellites, *arguments, listen=None):
         """Starts a reconnaissance aircraft; its attribute `url` is the address at which it listens."""
         asked = [word for satellite in satellites for word in ("--satellite", getattr(satellite, "url", satellite))]
-        at = listen or f"tcp://{self.hosts.address('recon', 'mission')}:0"
-        open_to_all = ["--insecure"] if self.hosts.insecure else []
-        recon = Teller(self, "recon", "--listen", at, *open_to_all, *asked, *arguments, listener=self.listener)
+        at = listen or f"{self.scheme}://{self.hosts.address('recon', 'mission')}:0"
+        open_to_all = ["--insecure"] if self.exposed else []
+        recon = Teller(self, "recon", "--listen", at, *open_to_all, *asked, *self.keys_option("recon"), *arguments,
+                       listener=self.listener)
         recon.url = recon.wait_for("listening")["text"].removeprefix("listening on ")
         return recon
 
-    def mission(self, recon, strikers, *arguments, stdin=subprocess.DEVNULL):
+    def mission(self, recon, strikers, *arguments, stdin=subprocess.DEVNULL, key="mission"):
+        """Starts a mission centre, with the key of `key` if the fleet is secured."""
         asked = [word for striker in strikers for word in ("--strike", getattr(striker, "url", striker))]
-        return Teller(self, "mission", "--recon", getattr(recon, "url", recon), *asked, *arguments, stdin=stdin,
-                      listener=self.listener)
+        return Teller(self, "mission", "--recon", getattr(recon, "url", recon), *asked, *self.keys_option(key), *arguments,
+                      stdin=stdin, listener=self.listener)
 
     def reaches(self, role, url):
         """Whether the role can connect to the URL."""
-        host, _, port = url.removeprefix("tcp://").rpartition(":")
+        host, _, port = url.partition("://")[2].rpartition(":")
         code = f"import socket; socket.create_connection(({host!r}, {port}), 2)"
         return subprocess.run(self.hosts.command(role, "python3", "-c", code), stdin=subprocess.DEVNULL,
                               capture_output=True, check=False).returncode == 0
@@ -295,6 +352,9 @@ class Fleet:
         return self
 
     def __exit__(self, *_):
+        self.close()
+
+    def close(self):
         for process in reversed(self.started):
             process.close()
         self.hosts.close()

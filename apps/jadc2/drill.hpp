@@ -10,6 +10,7 @@ struct drill_options {
     std::string at = "tcp://127.0.0.1:25374";
     std::uint64_t count = 1000;
     std::uint64_t every_us = 2000; ///< between orders
+    std::string keys{};            ///< the directory with the key of a member; empty: without security
 };
 
 /// Sends orders as the mission centre does, urgently, one at a time, that end before the release; prints quantiles of

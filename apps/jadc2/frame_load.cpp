@@ -6,6 +6,7 @@
 #include "events.hpp"
 #include "fmv/base64.hpp"
 #include "fmv/messages.hpp"
+#include "member_options.hpp"
 #include "scene.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -69,7 +70,7 @@ int run_load(const load_options& args) {
         pixels.push_back(fmv::to_base64(ground.frame(number)));
     }
     boost::asio::io_context io{1};
-    cles::service node{io, {.name = "load"}};
+    cles::service node{io, with_key(args.keys, {.name = "load"})};
     const auto begun = steady::now();
     work all{.args = args,
              .pixels = pixels,

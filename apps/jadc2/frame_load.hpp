@@ -11,6 +11,7 @@ struct load_options {
     std::uint64_t streams = 4; ///< each with one frame in flight at any time
     double duration_s = 5;     ///< 0: until it is stopped
     std::uint64_t seed = 1;
+    std::string keys{}; ///< the directory with the key of a member; empty: without security
 };
 
 /// Sends frames, which are encoded in advance, to a node as fast as it answers, until the time is over, or SIGINT or

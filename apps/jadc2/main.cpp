@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "client/member_key.hpp"
 #include "drill.hpp"
 #include "frame_load.hpp"
 #include "mission.hpp"
+#include "options/keys_option.hpp"
+#include "output/errors.hpp"
 #include "recon.hpp"
 
 #include <CLI/CLI.hpp>
@@ -17,6 +20,58 @@ int report_failure(const cles::error& why) {
     return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
 }
 
+constexpr auto keys_help =
+    "The directory with the node's key: all links are sealed, and its rights are those of its fleet";
+
+// With keys, plain TCP is refused.
+void seal_default(const CLI::App& command, const char* option, std::string& url) {
+    if (command.count(option) == 0) {
+        url.replace(0, url.find(':'), "tls");
+    }
+}
+
+// The node has the name of its key.
+void take_name(const CLI::App& command, const std::string& keys, std::string& name) {
+    const auto known = tool::name_of_member(keys);
+    if (command.count("--name") != 0 && name != known) {
+        throw tool::usage_error("--name " + name + " is not the name of the key in " + keys + ", which is " + known);
+    }
+    name = known;
+}
+
+int run_recon(const CLI::App& command, jadc2::recon_options args, const std::string& keys) {
+    if (!keys.empty()) {
+        args.keys = keys;
+        args.camera_keys = args.camera_keys.empty() ? keys + "-camera" : args.camera_keys;
+        take_name(command, keys, args.name);
+        seal_default(command, "--listen", args.listen);
+        seal_default(command, "--satellite", args.satellites.front());
+    } else if (!args.camera_keys.empty()) {
+        throw tool::usage_error("--camera-keys: needs --keys too");
+    }
+    return jadc2::recon{args}.run();
+}
+
+int run_mission(const CLI::App& command, jadc2::mission_options args, const std::string& keys) {
+    if (!keys.empty()) {
+        args.keys = keys;
+        take_name(command, keys, args.name);
+        seal_default(command, "--recon", args.recon);
+        seal_default(command, "--strike", args.strikers.front());
+    }
+    return jadc2::mission{args}.run();
+}
+
+// Of `drill` and `load`.
+template <class Options>
+Options sealed(const CLI::App& command, Options args, const std::string& keys) {
+    args.keys = keys;
+    if (!keys.empty()) {
+        seal_default(command, "--at", args.at);
+    }
+    return args;
+}
+
 CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
     auto* r =
         app.add_subcommand("recon", "The reconnaissance aircraft: films, delegates the processing, publishes tracks");
@@ -24,6 +79,9 @@ CLI::App* add_recon(CLI::App& app, jadc2::recon_options& args) {
     r->add_option("-l,--listen", args.listen, "Where it listens for the mission centre (tcp://127.0.0.1:25373)")
         ->type_name("URL");
     r->add_flag("--insecure", args.insecure, "Allow listening beyond this host, where anyone may send any request");
+    r->add_option("--camera-keys", args.camera_keys,
+                  "With --keys: the directory with the key of the node for satellites (that of --keys, with -camera)")
+        ->type_name("DIR");
     r->add_option("-s,--satellite", args.satellites, "A node that processes video (tcp://127.0.0.1:25370)")
         ->type_name("URL");
     r->add_option("--seed", args.seed, "Seed of the scene (1)");
@@ -78,22 +136,33 @@ int main(int argc, char** argv) {
     jadc2::drill_options drill;
     jadc2::load_options load;
     CLI::App app{"Joint command: a reconnaissance aircraft and a mission centre.", "cles-jadc2"};
-    app.footer(
-        "Exit codes: 0 ok, 2 usage, 3 no node or no task, 4 deadline or unknown result, 5 another error, 6 busy.");
     app.require_subcommand(1);
     const auto* as_recon = add_recon(app, recon);
     const auto* as_mission = add_mission(app, mission);
     const auto* as_drill = add_drill(app, drill);
-    add_load(app, load);
+    const auto* as_load = add_load(app, load);
+    tool::keys_option keys;
+    for (auto* command : app.get_subcommands({})) {
+        keys.add_optional_to(*command, keys_help);
+    }
+    app.footer("With --keys, default addresses begin with tls:// instead of tcp://.\n\nExit codes: 0 ok, 2 usage, 3 no "
+               "node or no task, 4 deadline or unknown result, 5 another error, 6 busy.");
     try {
         app.parse(argc, argv);
-        return as_recon->parsed()     ? jadc2::recon{recon}.run()
-               : as_mission->parsed() ? jadc2::mission{mission}.run()
-               : as_drill->parsed()   ? jadc2::drill(drill)
-                                      : jadc2::run_load(load);
+        const auto directory = keys.given_directory();
+        return as_recon->parsed()     ? run_recon(*as_recon, recon, directory)
+               : as_mission->parsed() ? run_mission(*as_mission, mission, directory)
+               : as_drill->parsed()   ? jadc2::drill(sealed(*as_drill, drill, directory))
+                                      : jadc2::run_load(sealed(*as_load, load, directory));
     } catch (const CLI::ParseError& error) { // or --help
         return app.exit(error) == 0 ? 0 : 2;
+    } catch (const tool::usage_error& e) {
+        std::fprintf(stderr, "cles-jadc2: %s\n", e.what());
+        return 2;
     } catch (const cles::error& e) {
         return report_failure(e);
+    } catch (const std::exception& e) { // of files with keys
+        std::fprintf(stderr, "cles-jadc2: %s\n", e.what());
+        return 5;
     }
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "mission.hpp"
 
+#include "member_options.hpp"
+
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -23,10 +25,11 @@ using std::chrono::milliseconds;
 } // namespace
 
 mission::mission(const mission_options& args)
-    : args_(args), events_(args.name, args.json), node_(io_, {.name = args.name,
-                                                              .peers = {{args.recon_name, args.recon}},
-                                                              .gossip = cles::gossip(args.strikers),
-                                                              .routing = cles::routing()}),
+    : args_(args), events_(args.name, args.json),
+      node_(io_, with_key(args.keys, {.name = args.name,
+                                      .peers = {{args.recon_name, args.recon}},
+                                      .gossip = cles::gossip(args.strikers),
+                                      .routing = cles::routing()})),
       run_(run_id()) {}
 
 int mission::run() {

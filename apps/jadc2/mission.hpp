@@ -30,6 +30,7 @@ struct mission_options {
     bool has_operator = false; ///< an operator at the terminal decides
     double duration_s = 0;     ///< after which it ends in any case; 0: no limit
     std::uint64_t deadline_ms = 3000;
+    std::string keys{}; ///< the directory with its key; empty: without security
     bool json = false;
 };
 

@@ -2,6 +2,7 @@
 #include "recon.hpp"
 
 #include "fmv/base64.hpp"
+#include "member_options.hpp"
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -57,8 +58,10 @@ double median_of(const std::vector<picture>& all, double picture::*member) {
 
 recon::recon(const recon_options& args)
     : args_(args), events_(args.name, args.json),
-      ground_(io_, {.name = args.name, .listen = {args.listen}, .insecure = args.insecure}),
-      space_(io_, {.name = args.name + "-camera", .gossip = cles::gossip(args.satellites), .routing = cles::routing()}),
+      ground_(io_, with_key(args.keys, {.name = args.name, .listen = {args.listen}, .insecure = args.insecure})),
+      space_(io_, with_key(args.camera_keys, {.name = args.name + "-camera",
+                                              .gossip = cles::gossip(args.satellites),
+                                              .routing = cles::routing()})),
       scene_(args.seed), run_(run_id()) {
     ground_.on_bind("tracks", {.description = "Objects that move on the ground, frame by frame"});
     ground_.on_push("impact", [this](const impact& at) { return assess(at); },

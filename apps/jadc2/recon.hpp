@@ -26,6 +26,8 @@ struct recon_options {
     double fps = 25;
     std::uint64_t frames = 0; ///< 0: until it is stopped
     std::uint64_t deadline_ms = 1000;
+    std::string keys{};        ///< the directory with its key; empty: without security
+    std::string camera_keys{}; ///< the same of the node for the satellites
     bool json = false;
 };
 

@@ -121,7 +121,9 @@ void register_tasks(cles::registrar& to, const settings& wanted) {
                 .inline_ok = true});
     to.on_delegate("strike",
                    [own](const cles::request& asked, const cles::responder& answer) { carry_out(asked, answer, *own); },
-                   {.description = "Strikes a target: where it was, when, and how it moves", .inline_ok = true});
+                   {.description = "Strikes a target: where it was, when, and how it moves",
+                    .inline_ok = true,
+                    .must_be_signed = wanted.must_be_signed.value_or(false)});
 }
 
 } // namespace strike

@@ -15,11 +15,12 @@ struct settings {
     std::optional<double> x{}, y{};         ///< where the aircraft is, in pixels of the ground; -100, 120 unless set
     std::optional<double> speed{};          ///< of what it releases, in pixels a second; 400 unless set
     std::optional<double> oldest_s{};       ///< a track that is older is refused; 2 unless set
+    std::optional<bool> must_be_signed{};   ///< orders run only with the requester's signature; false unless set
 
     /// \throws cles::setting_error
     void check() const;
 };
-BOOST_DESCRIBE_STRUCT(settings, (), (weapons, x, y, speed, oldest_s))
+BOOST_DESCRIBE_STRUCT(settings, (), (weapons, x, y, speed, oldest_s, must_be_signed))
 
 /// A strike aircraft's ability (paper, sections 2.2 and 4.3).
 ///
