@@ -30,9 +30,25 @@ BOOST_DESCRIBE_STRUCT(quantiles, (), (count, p50_us, p90_us, p99_us, max_us))
 constexpr std::uint64_t deadline_ms = 5000;
 constexpr std::uint64_t warm_up = 20; ///< orders: the first one opens the link
 
+struct named_node {
+    std::string node{};
+};
+BOOST_DESCRIBE_STRUCT(named_node, (), (node))
+
+// A request is signed only for a node that is named.
+boost::asio::awaitable<std::string> target_of(cles::service& from, const drill_options& args) {
+    if (args.keys.empty()) {
+        co_return "self";
+    }
+    const auto options = cles::call_options{}.at(args.at);
+    const auto there = co_await from.async_pull<named_node>("self:cles", options);
+    co_return there.node;
+}
+
 boost::asio::awaitable<void> give_orders(cles::service& from, const drill_options& args, std::vector<double>& took) {
     boost::asio::steady_timer pause{from.get_executor()};
     const auto options = cles::call_options{}.deadline(std::chrono::milliseconds{deadline_ms}).urgent().at(args.at);
+    const auto noun = co_await target_of(from, args) + ":strike";
     const auto run = "drill-" + run_id() + "-";
     auto next = steady::now();
     for (std::uint64_t i = 0; i < args.count + warm_up; ++i) {
@@ -45,7 +61,7 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
                                  .deadline_ms = deadline_ms,
                                  .drill = true};
         const auto begun = steady::now();
-        const auto outcome = co_await from.async_delegate<strike::outcome>("self:strike", what, options);
+        const auto outcome = co_await from.async_delegate<strike::outcome>(noun, what, options);
         if (i >= warm_up && outcome.order == what.id) {
             took.push_back(std::chrono::duration<double, std::micro>(steady::now() - begun).count());
         }

@@ -10,12 +10,16 @@
 #include <CLI/CLI.hpp>
 
 #include <cstdio>
+#include <filesystem>
+#include <string>
 
 namespace {
 
 int report_failure(const cles::error& why) {
     const auto code = why.code();
-    std::fprintf(stderr, "cles-jadc2: %s\n", why.what());
+    const bool keyless = code == cles::errc::unknown_scheme && why.message().find("'tls'") != std::string::npos;
+    std::fprintf(stderr, "cles-jadc2: %s%s\n", why.what(),
+                 keyless ? ": it needs the key of a member: give --keys DIR, or set CLES_KEYS" : "");
     const bool missing = code == cles::errc::no_target || code == cles::errc::no_task;
     return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
 }
@@ -42,7 +46,13 @@ void take_name(const CLI::App& command, const std::string& keys, std::string& na
 int run_recon(const CLI::App& command, jadc2::recon_options args, const std::string& keys) {
     if (!keys.empty()) {
         args.keys = keys;
-        args.camera_keys = args.camera_keys.empty() ? keys + "-camera" : args.camera_keys;
+        if (args.camera_keys.empty()) {
+            args.camera_keys = keys + "-camera";
+            if (!std::filesystem::exists(args.camera_keys)) {
+                throw tool::usage_error("the node for satellites has a key of its own, which is not in " +
+                                        args.camera_keys + ": name its directory with --camera-keys");
+            }
+        }
         take_name(command, keys, args.name);
         seal_default(command, "--listen", args.listen);
         seal_default(command, "--satellite", args.satellites.front());

@@ -204,7 +204,8 @@ std::string mission::explain(const cles::error& why) const {
         return why.what();
     }
     return node_.peers().empty() ? "no node answers at the given address (--strike): is clesd running there?"
-                                 : why.message() + ": is libcles-strike.so among the plugins of a node?";
+                                 : why.message() + ": is libcles-strike.so among the plugins of a node" +
+                                       (args_.keys.empty() ? "?" : ", and may " + args_.name + " request it?");
 }
 
 // At most once per second, so that it can be read.

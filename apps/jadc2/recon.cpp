@@ -200,7 +200,8 @@ std::string recon::explain(const cles::error& why) const {
         names += (names.empty() ? "" : ", ") + other.node + " (" + std::string{to_string(other.state)} + ")";
     }
     return names.empty() ? "no node answers at the given address (--satellite): is clesd running there?"
-                         : why.message() + ", of " + names + ": is libcles-fmv.so among the plugins of a node?";
+                         : why.message() + ", of " + names + ": is libcles-fmv.so among the plugins of a node" +
+                               (args_.keys.empty() ? "?" : ", and may " + space_.name() + " request it?");
 }
 
 assessment recon::assess(const impact& at) const {

@@ -75,6 +75,10 @@ class Missing(unittest.TestCase):
         plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{weapons: 0}}}}"
         self.check_refused([self.fleet.striker(plugins=[plugin])], "no weapon is left")
 
+    def test_orders_that_must_be_signed_where_nobody_has_a_key(self):
+        plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{must_be_signed: true}}}}"
+        self.check_refused([self.fleet.striker(plugins=[plugin])], "strike1: 'strike' requires signed requests, and this node has no security")
+
     def test_settings_of_a_plugin_that_cannot_be(self):
         plugin = f"{{path: {self.fleet.plugin('strike')}, config: {{weapons: 5000}}}}"
         with self.assertRaisesRegex(Trouble, "weapons: 1000 at most"):

@@ -93,6 +93,14 @@ BOOST_AUTO_TEST_CASE(what_cannot_be_is_refused) {
     BOOST_TEST(ask("PULL self:strike") == R"({"left":2,"orders":[]})");
 }
 
+BOOST_AUTO_TEST_CASE(orders_that_must_be_signed) {
+    cles::test::asked_node there; // which has no key
+    strike::register_tasks(there.node, {.must_be_signed = true});
+    BOOST_TEST(there.ask("DELEGATE self:strike " + cles::to_json(order("o1"))) ==
+               "denied: node: 'strike' requires signed requests, and this node has no security");
+    BOOST_TEST(there.ask("PULL self:strike") == R"({"left":4,"orders":[]})");
+}
+
 BOOST_AUTO_TEST_CASE(settings_that_cannot_be) {
     for (const auto& wrong :
          {strike::settings{.weapons = 1001}, strike::settings{.speed = 0}, strike::settings{.oldest_s = -1},

@@ -14,7 +14,7 @@ PATIENCE = float(os.environ.get("CLES_TEST_PATIENCE", "60"))
 
 
 def environment():
-    return {name: value for name, value in os.environ.items() if not name.startswith("CLES_M")}
+    return {name: value for name, value in os.environ.items() if not name.startswith(("CLES_M", "CLES_K"))}
 
 
 def free_group():
@@ -68,9 +68,9 @@ def wait_until(condition, what):
 
 
 class DriveTest(unittest.TestCase):
-    def drive(self, *arguments, code=0):
+    def drive(self, *arguments, code=0, group=None):
         """The object that it prints."""
-        ended, out, err = run("run", "--multicast", free_group(), "--json", *arguments)
+        ended, out, err = run("run", "--multicast", group or free_group(), "--json", *arguments)
         self.assertEqual(ended, code, err + out[:2000])
         found = json.loads(out)
         self.assertFalse(found["verdict"]["collision"], found["events"])

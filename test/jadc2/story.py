@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: BSL-1.0
+"""A whole run of joint command, from the first frame to two strikes, and what has to be true of it."""
+
+import signal
+import unittest
+
+from jadc2_fleet import PATIENCE
+
+STEPS = ["encode_ms", "fmv_way_ms", "fmv_queue_ms", "fmv_run_ms", "publish_ms", "tracks_way_ms", "decide_ms"]
+
+
+class StoryTest(unittest.TestCase):
+    def check_strike(self, strike):
+        told = strike["data"]
+        self.assertEqual((told["fate"], told["trouble"], told["struck_by"]), ("done", "", "strike1"))
+        self.assertEqual(told["processed_by"], "sat1")
+        for step in ("encode_ms", "fmv_way_ms", "fmv_run_ms", "strike_way_ms", "strike_run_ms"):
+            self.assertGreater(told[step], 0, step)
+        for step in ("fmv_queue_ms", "strike_queue_ms"):
+            self.assertGreaterEqual(told[step], 0, step)
+        self.assertAlmostEqual(sum(told[step] for step in STEPS), told["data_to_decision_ms"], 2)
+        self.assertGreater(told["data_to_answer_ms"], told["data_to_decision_ms"])
+        return told
+
+    def run_story(self, fleet):
+        satellite, striker = fleet.satellite(), fleet.striker()
+        # Frames must not fail on a busy machine. Under a sanitizer most would be skipped, and too few of them evaluated.
+        recon = fleet.recon([satellite], "--fps", "30" if PATIENCE <= 30 else "6", "--deadline", "20000")
+        mission = fleet.mission(recon, [striker], "--strikes", "2", "--duration", "60")
+        self.assertEqual(mission.end(), 0, mission.events)
+        strikes = [self.check_strike(strike) for strike in mission.all("strike")]
+        self.assertEqual(len(strikes), 2)
+        self.assertEqual(len(mission.all("assessed")), 2)
+        self.assertTrue(all(one["data"]["missed_by"] < 320 for one in mission.all("assessed")))
+
+        # The outcome of each job, at both of its ends.
+        self.assertEqual(mission.all("report")[0]["data"],
+                         {"given": 2, "done": 2, "refused": 0, "failed": 0, "unknown": 0, "open": 0})
+        self.assertEqual(striker.pull("strike1:strike")["orders"], sorted(told["order"] for told in strikes))
+        recon.stop(signal.SIGINT)
+        self.assertEqual(recon.end(), 0)
+        report = recon.all("report")[0]["data"]
+        frames = report["frames"]
+        self.assertEqual(frames["captured"], frames["done"] + frames["failed"] + frames["skipped"])
+        self.assertEqual(frames["nodes"], ["sat1"], frames)
+        self.assertLessEqual(set(frames["failures"]), {"no_target"}, recon.events)  # before it was found
+        self.assertEqual(satellite.pull("sat1:FMV_Processing")["frames"], frames["done"])
+        self.assertGreater(report["judged"], 0)
+        self.assertGreater(report["recall"], 0)
+
+        # No node knows others than those of its links.
+        self.assertEqual(satellite.peers(), set())
+        self.assertEqual(striker.peers(), set())
+        return satellite, recon, striker
