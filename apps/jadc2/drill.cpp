@@ -75,7 +75,7 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
 
 int drill(const drill_options& args) {
     boost::asio::io_context io{1};
-    cles::service node{io, with_key(args.keys, {.name = "drill"})};
+    cles::service node{io, options_of_member("drill", args.keys)};
     std::vector<double> took;
     std::exception_ptr failure;
     boost::asio::co_spawn(io, give_orders(node, args, took), [&](const std::exception_ptr& thrown) {

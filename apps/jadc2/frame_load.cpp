@@ -70,7 +70,7 @@ int run_load(const load_options& args) {
         pixels.push_back(fmv::to_base64(ground.frame(number)));
     }
     boost::asio::io_context io{1};
-    cles::service node{io, with_key(args.keys, {.name = "load"})};
+    cles::service node{io, options_of_member("load", args.keys)};
     const auto begun = steady::now();
     work all{.args = args,
              .pixels = pixels,

@@ -9,12 +9,15 @@
 
 namespace jadc2 {
 
-/// These options, with the key in that directory, and its name; unchanged if there is no directory.
-inline cles::service_options with_key(const std::string& keys, cles::service_options options) {
-    if (!keys.empty()) {
-        tool::use_member_key(options, keys);
+/// Options of a service with the key in that directory, and its name; without a directory, with this name.
+inline cles::service_options options_of_member(const std::string& name, const std::string& keys) {
+    cles::service_options out;
+    if (keys.empty()) {
+        out.name = name;
+    } else {
+        tool::use_member_key(out, keys);
     }
-    return options;
+    return out;
 }
 
 } // namespace jadc2

@@ -22,15 +22,18 @@ namespace {
 
 using std::chrono::milliseconds;
 
+cles::service_options options_of(const mission_options& args) {
+    auto out = options_of_member(args.name, args.keys);
+    out.peers = {{args.recon_name, args.recon}};
+    out.gossip = cles::gossip(args.strikers);
+    out.routing = cles::routing();
+    return out;
+}
+
 } // namespace
 
 mission::mission(const mission_options& args)
-    : args_(args), events_(args.name, args.json),
-      node_(io_, with_key(args.keys, {.name = args.name,
-                                      .peers = {{args.recon_name, args.recon}},
-                                      .gossip = cles::gossip(args.strikers),
-                                      .routing = cles::routing()})),
-      run_(run_id()) {}
+    : args_(args), events_(args.name, args.json), node_(io_, options_of(args)), run_(run_id()) {}
 
 int mission::run() {
     signals_.async_wait([this](boost::system::error_code code, int) {

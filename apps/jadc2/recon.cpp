@@ -28,6 +28,20 @@ double ms_since(steady::time_point begin) {
     return std::chrono::duration<double, std::milli>(steady::now() - begin).count();
 }
 
+cles::service_options options_for_ground(const recon_options& args) {
+    auto out = options_of_member(args.name, args.keys);
+    out.listen = {args.listen};
+    out.insecure = args.insecure;
+    return out;
+}
+
+cles::service_options options_for_space(const recon_options& args) {
+    auto out = options_of_member(args.name + "-camera", args.camera_keys);
+    out.gossip = cles::gossip(args.satellites);
+    out.routing = cles::routing();
+    return out;
+}
+
 struct medians {
     double encode_ms = 0, way_ms = 0, queue_ms = 0, run_ms = 0;
 };
@@ -57,12 +71,8 @@ double median_of(const std::vector<picture>& all, double picture::*member) {
 } // namespace
 
 recon::recon(const recon_options& args)
-    : args_(args), events_(args.name, args.json),
-      ground_(io_, with_key(args.keys, {.name = args.name, .listen = {args.listen}, .insecure = args.insecure})),
-      space_(io_, with_key(args.camera_keys, {.name = args.name + "-camera",
-                                              .gossip = cles::gossip(args.satellites),
-                                              .routing = cles::routing()})),
-      scene_(args.seed), run_(run_id()) {
+    : args_(args), events_(args.name, args.json), ground_(io_, options_for_ground(args)),
+      space_(io_, options_for_space(args)), scene_(args.seed), run_(run_id()) {
     ground_.on_bind("tracks", {.description = "Objects that move on the ground, frame by frame"});
     ground_.on_push("impact", [this](const impact& at) { return assess(at); },
                     {.description = "Where and when a weapon struck; the answer describes what is seen"});
