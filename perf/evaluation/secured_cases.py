@@ -18,6 +18,7 @@ import subprocess
 import sys
 
 from clean_environment import clean_environment
+from deferred_signals import DeferredSignals
 from interval import summary
 from linked_hosts import free_group
 from provenance import command, date, machine
@@ -31,11 +32,20 @@ ORDERS = {"plain": "without security", "sealed": "over sealed links", "signed": 
 
 
 def asked(options, program, *arguments, may_end_with=(0,)):
-    done = subprocess.run([os.path.join(options.programs, program), *map(str, arguments)], stdin=subprocess.DEVNULL,
-                          capture_output=True, text=True, check=False, env=clean_environment())
-    if done.returncode not in may_end_with:
-        raise SystemExit(f"secured_cases.py: {program} {arguments[0]} ended with {done.returncode}: {done.stderr.strip()}")
-    return json.loads(done.stdout)
+    process = None
+    try:
+        with DeferredSignals():
+            process = subprocess.Popen([os.path.join(options.programs, program), *map(str, arguments)], text=True,
+                                       stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                                       env=clean_environment())
+        said, complaint = process.communicate()
+    finally:
+        if process is not None and process.poll() is None:
+            process.terminate()  # then it removes its keys
+            process.communicate()
+    if process.returncode not in may_end_with:
+        raise SystemExit(f"secured_cases.py: {program} {arguments[0]} ended with {process.returncode}: {complaint.strip()}")
+    return json.loads(said)
 
 
 def driven(options, kind):

@@ -9,9 +9,11 @@ FOLDER holds the measurement, PROGRAMS the programs.
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 FOLDER, PROGRAMS = sys.argv[1], sys.argv[2]
@@ -35,6 +37,19 @@ class Cost(unittest.TestCase):
         for drills in result["drills"].values():
             self.assertEqual([drill["count"] for drill in drills], [50])
         self.assertTrue({"title", "command", "machine", "date", "quick"} <= result.keys())
+
+    def test_told_to_end_it_leaves_nothing(self):
+        with tempfile.TemporaryDirectory() as files, \
+                subprocess.Popen([sys.executable, "-B", f"{FOLDER}/secured_cases.py", "--programs", PROGRAMS],
+                                 stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                                 env={**os.environ, "TMPDIR": files}) as script:
+            until = time.monotonic() + 60
+            while not any(name.startswith("cles-platoon-") for name in os.listdir(files)):
+                self.assertLess(time.monotonic(), until, "no platoon was started")
+                time.sleep(0.05)
+            script.send_signal(signal.SIGTERM)
+            self.assertEqual(script.wait(60), 143)
+            self.assertEqual(os.listdir(files), [])
 
 
 if __name__ == "__main__":
