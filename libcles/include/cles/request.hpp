@@ -16,7 +16,6 @@
 #include <string_view>
 #include <type_traits>
 #include <utility>
-#include <vector>
 
 namespace cles {
 
@@ -34,33 +33,15 @@ struct request_data {
     time_point deadline{};
 };
 
-/// A copy of a request. Its memory is reused for the next request that is assigned.
-class owned_request {
-  public:
-    owned_request() = default;
-    owned_request(const owned_request&) = delete;
-    owned_request& operator=(const owned_request&) = delete;
-
-    /// \param peer a copy of the identity of the request's peer
-    void assign(const request& what, std::shared_ptr<const identity> peer);
-    /// Releases the peer, and the memory of a large request.
-    void clear();
-    /// Always the same object, for a `request` that refers to it.
-    [[nodiscard]] const request_data& data() const noexcept { return data_; }
-
-  private:
-    std::string text_; // all that the views refer to
-    std::vector<std::string_view> parameters_;
-    std::shared_ptr<const identity> peer_;
-    request_data data_;
-};
-
 /// Makes a copy that owns its text.
 std::shared_ptr<const request_data> own(const request_data& data);
 
 /// False if the text is not a number, or out of range. Defined for all types that `std::from_chars` reads.
 template <class T>
 bool read_number(std::string_view text, T& number) noexcept;
+
+[[noreturn]] void throw_bad_parameter(std::size_t index);
+[[noreturn]] void throw_bad_body(const std::string& why);
 
 } // namespace detail
 
@@ -105,7 +86,7 @@ class request {
             static_assert(!std::is_same_v<T, bool>, "a parameter is text or a number");
             T number{};
             if (!detail::read_number(text, number)) {
-                throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is not a valid number");
+                detail::throw_bad_parameter(index);
             }
             return number;
         } else {
@@ -121,7 +102,7 @@ class request {
         carrier value{};
         std::string why;
         if (!from_json(body(), value, &why)) {
-            throw error(errc::bad_request, "the body is invalid: " + why);
+            detail::throw_bad_body(why);
         }
         if constexpr (detail::comes_wrapped<T>) {
             return std::move(value.value);

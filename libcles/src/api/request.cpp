@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/owned_request.hpp>
 #include <cles/request.hpp>
 
 #include <charconv>
@@ -82,6 +83,12 @@ template bool read_number(std::string_view, unsigned long long&) noexcept;
 template bool read_number(std::string_view, float&) noexcept;
 template bool read_number(std::string_view, double&) noexcept;
 template bool read_number(std::string_view, long double&) noexcept;
+
+void throw_bad_parameter(std::size_t index) {
+    throw error(errc::bad_request, "parameter " + std::to_string(index + 1) + " is not a valid number");
+}
+
+void throw_bad_body(const std::string& why) { throw error(errc::bad_request, "the body is invalid: " + why); }
 
 } // namespace detail
 

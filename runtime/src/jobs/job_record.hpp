@@ -7,6 +7,7 @@
 #include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
 #include <cles/log.hpp>
+#include <cles/owned_request.hpp>
 #include <cles/registrar.hpp>
 #include <cles/request.hpp>
 #include <cles/responder.hpp>

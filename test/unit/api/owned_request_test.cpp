@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include <cles/owned_request.hpp>
 #include <cles/request.hpp>
 
 #include <boost/test/unit_test.hpp>
