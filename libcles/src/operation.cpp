@@ -6,7 +6,9 @@
 
 #include <boost/asio/dispatch.hpp>
 #include <boost/asio/execution/context.hpp>
+#include <boost/asio/execution/outstanding_work.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/prefer.hpp>
 #include <boost/asio/query.hpp>
 #include <boost/asio/system_executor.hpp>
 
@@ -31,15 +33,14 @@ std::exception_ptr failure_of(boost::system::error_code code, std::string_view m
 
 handler_executor::handler_executor(const asio::any_io_executor& own, const asio::any_io_executor& service) {
     if (own != service) {
-        work_.emplace(own);
         namespace execution = asio::execution;
+        executor_ = asio::prefer(own, execution::outstanding_work.tracked);
         elsewhere_ = &asio::query(own, execution::context) != &asio::query(asio::system_executor{}, execution::context);
     }
 }
 
 void handler_executor::dispatch(remote_call_ptr call) && {
-    dispatch_call(work_->get_executor(), std::move(call));
-    work_.reset();
+    dispatch_call(std::exchange(executor_, {}), std::move(call));
 }
 
 // --- Feeds ---

@@ -10,11 +10,9 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/associated_allocator.hpp>
 #include <boost/asio/associated_executor.hpp>
-#include <boost/asio/executor_work_guard.hpp>
 
 #include <exception>
 #include <memory>
-#include <optional>
 #include <string_view>
 #include <tuple>
 #include <type_traits>
@@ -40,7 +38,7 @@ class remote_call {
   protected:
     ~remote_call() = default;
 };
-using remote_call_ptr = std::unique_ptr<remote_call, discarding>;
+using remote_call_ptr = operation_ptr<remote_call>;
 
 void dispatch_call(const boost::asio::any_io_executor& executor, remote_call_ptr call);
 void post_call(const boost::asio::any_io_executor& executor, remote_call_ptr call);
@@ -54,15 +52,16 @@ class handler_executor {
     handler_executor(const boost::asio::any_io_executor& own, const boost::asio::any_io_executor& service);
 
     /// Whether it is the service's executor, on which completions run anyway.
-    [[nodiscard]] bool is_service() const noexcept { return !work_; }
+    [[nodiscard]] bool is_service() const noexcept { return !executor_; }
     /// Whether operations with this handler start, and are cancelled, on another executor than the service's. False for
     /// the system executor (also that of futures), because no operation starts on it.
     [[nodiscard]] bool elsewhere() const noexcept { return elsewhere_; }
     void dispatch(remote_call_ptr call) &&;
 
   private:
-    // Keeps the handler's execution context running until the handler is called.
-    std::optional<boost::asio::executor_work_guard<boost::asio::any_io_executor>> work_;
+    // Empty if it is the service's. Tracks work: it keeps the handler's execution context running until the handler is
+    // called.
+    boost::asio::any_io_executor executor_;
     bool elsewhere_ = false;
 };
 

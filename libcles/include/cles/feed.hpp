@@ -34,7 +34,7 @@ struct feed_item {
 
 namespace detail {
 
-using event_ptr = std::unique_ptr<pending_event, discarding>;
+using event_ptr = operation_ptr<pending_event>;
 
 /// The type-independent part of a feed; implemented by the service.
 class feed_control {
@@ -162,7 +162,7 @@ class binding : public pending {
   private:
     std::shared_ptr<feed_control> control_;
 };
-using binding_ptr = std::unique_ptr<binding, discarding>;
+using binding_ptr = operation_ptr<binding>;
 
 /// Completes `async_bind` with the feed.
 template <class T, bool Throws, class Handler>

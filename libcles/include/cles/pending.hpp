@@ -7,7 +7,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <string_view>
 
 /// The interface between completion handlers of any type, which are templates, and the service, which is not. Not for
@@ -50,14 +49,45 @@ class pending {
     ~pending() = default;
 };
 
-struct discarding {
-    template <class Operation>
-    void operator()(Operation* operation) const noexcept {
-        operation->discard();
+/// Owns an operation until it is completed; discards it otherwise. A `std::unique_ptr` would do, but takes every user
+/// of the library much longer to compile.
+template <class Operation>
+class operation_ptr {
+  public:
+    operation_ptr() = default;
+    operation_ptr(std::nullptr_t) noexcept {} // NOLINT(google-explicit-constructor): as a pointer
+    explicit operation_ptr(Operation* operation) noexcept : operation_(operation) {}
+    operation_ptr(operation_ptr&& other) noexcept : operation_(other.release()) {}
+    operation_ptr& operator=(operation_ptr&& other) noexcept {
+        reset(other.release());
+        return *this;
     }
-};
+    operation_ptr(const operation_ptr&) = delete;
+    operation_ptr& operator=(const operation_ptr&) = delete;
+    ~operation_ptr() { reset(); }
 
-/// Owns an operation until it is completed.
-using pending_ptr = std::unique_ptr<pending, discarding>;
+    [[nodiscard]] Operation* get() const noexcept { return operation_; }
+    [[nodiscard]] Operation* release() noexcept {
+        auto* operation = operation_;
+        operation_ = nullptr;
+        return operation;
+    }
+    Operation* operator->() const noexcept { return operation_; }
+    Operation& operator*() const noexcept { return *operation_; }
+    explicit operator bool() const noexcept { return operation_ != nullptr; }
+    bool operator==(std::nullptr_t) const noexcept { return operation_ == nullptr; }
+
+    void reset(Operation* next = nullptr) noexcept {
+        auto* const before = operation_;
+        operation_ = next;
+        if (before != nullptr) {
+            before->discard();
+        }
+    }
+
+  private:
+    Operation* operation_ = nullptr;
+};
+using pending_ptr = operation_ptr<pending>;
 
 } // namespace cles::detail

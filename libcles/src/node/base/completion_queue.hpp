@@ -21,7 +21,7 @@
 
 namespace cles::core {
 
-using pending_event_ptr = std::unique_ptr<detail::pending_event, detail::discarding>;
+using pending_event_ptr = detail::operation_ptr<detail::pending_event>;
 
 /// An event of a feed that owns its texts.
 struct kept_event {
