@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/chrono.hpp>
 #include <cles/convert.hpp>
 
-#include <chrono>
 #include <cstdint>
 #include <ratio>
 #include <type_traits>

@@ -2,8 +2,8 @@
 #pragma once
 
 #include <cles/boottime_clock.hpp>
+#include <cles/chrono.hpp>
 
-#include <chrono>
 #include <cstddef>
 
 namespace cles {

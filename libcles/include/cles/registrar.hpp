@@ -67,8 +67,15 @@ auto copyable(F f) {
     }
 }
 
+/// The handler of a registration.
+struct handler_functions {
+    plain_handler plain{};
+    async_handler async{};
+    bool coroutine = false;
+};
+
 template <class F>
-void set_handler(registration& to, F f) {
+void set_handler(handler_functions& to, F f) {
     using shape = handler_shape<F>;
     if constexpr (shape::is_coroutine) {
         constexpr bool included = requires { sizeof(coroutine_handler<F>); };
@@ -119,26 +126,24 @@ class registrar {
 
     template <class F>
     void on_pull(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::pull, task, std::move(handler), std::move(info));
+        add_handler(verb::pull, task, std::move(handler), info);
     }
     template <class F>
     void on_push(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::push, task, std::move(handler), std::move(info));
+        add_handler(verb::push, task, std::move(handler), info);
     }
     template <class F>
     void on_delegate(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::delegate, task, std::move(handler), std::move(info));
+        add_handler(verb::delegate, task, std::move(handler), info);
     }
     /// Runs when a node asks this one to publish (an UPDATE request); the body is published afterwards. Also opens the
     /// task for BIND.
     template <class F>
     void on_update(std::string_view task, F handler, task_info info = {}) {
-        add_handler(verb::update, task, std::move(handler), std::move(info));
+        add_handler(verb::update, task, std::move(handler), info);
     }
     /// Opens a task for BIND before its first update.
-    void on_bind(std::string_view task, task_info info = {}) {
-        add({.verb = verb::bind, .task = std::string{task}, .info = std::move(info)});
-    }
+    void on_bind(std::string_view task, task_info info = {});
     /// Opens a task for BIND. The plain function runs at each BIND and may refuse it by throwing, for example because
     /// of an unknown parameter. Its return value is ignored.
     template <class F>
@@ -148,16 +153,19 @@ class registrar {
             static_assert(!shape::takes_responder && !shape::is_coroutine,
                           "a BIND handler must be a plain function, because it decides at once");
         }
-        add_handler(verb::bind, task, std::move(handler), std::move(info));
+        add_handler(verb::bind, task, std::move(handler), info);
     }
 
   private:
+    /// Registers a task; takes `info` and `functions`.
+    void add_task(cles::verb verb, std::string_view task, task_info& info, detail::handler_functions& functions);
+
     template <class F>
-    void add_handler(cles::verb verb, std::string_view task, F handler, task_info info) {
+    void add_handler(cles::verb verb, std::string_view task, F handler, task_info& info) {
         if constexpr (detail::fits_handler<F>()) {
-            registration entry{.verb = verb, .task = std::string{task}, .info = std::move(info)};
-            detail::set_handler(entry, std::move(handler));
-            add(std::move(entry));
+            detail::handler_functions functions;
+            detail::set_handler(functions, std::move(handler));
+            add_task(verb, task, info, functions);
         }
     }
 };

@@ -2,13 +2,13 @@
 #pragma once
 
 #include <cles/call_options.hpp>
+#include <cles/chrono.hpp>
 #include <cles/convert.hpp>
 #include <cles/error.hpp>
 #include <cles/log.hpp>
 
 #include <boost/system/error_code.hpp>
 
-#include <chrono>
 #include <exception>
 #include <functional>
 #include <memory>

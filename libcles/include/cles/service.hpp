@@ -3,6 +3,7 @@
 
 #include <cles/call_options.hpp>
 #include <cles/cancellation.hpp>
+#include <cles/chrono.hpp>
 #include <cles/coroutine_handler.hpp>
 #include <cles/error.hpp>
 #include <cles/feed.hpp>
@@ -24,7 +25,6 @@
 #include <boost/asio/async_result.hpp>
 #include <boost/asio/execution_context.hpp>
 
-#include <chrono>
 #include <concepts>
 #include <cstdint>
 #include <functional>
@@ -95,7 +95,7 @@ class engine; // the implementation of the service
 template <class T>
 concept token = !std::derived_from<std::remove_cvref_t<T>, call_options>;
 
-inline const call_options no_options{};
+const call_options& no_options() noexcept;
 
 /// A body to send, or why it cannot be sent.
 struct outgoing_body {
@@ -106,34 +106,50 @@ struct outgoing_body {
 struct outgoing {
     cles::verb verb = verb::pull;
     std::string_view noun;
-    std::string_view body;
+    const outgoing_body& body;
 };
 
-// Cancellation handlers of operations.
+struct late_start; // an operation that starts later, on the service's executor
 
+/// Cancels an operation. Called by the slot of its handler.
 struct withdrawal {
-    std::weak_ptr<engine> service;
-    std::uint64_t ticket;
+    std::weak_ptr<engine> service{};    ///< of an operation that has started
+    std::uint64_t ticket = 0;           ///< its number
+    std::shared_ptr<late_start> late{}; ///< if it starts later
 
     void operator()() const;
 };
 
-/// For an operation that starts on the service's executor while its slot is emitted on another.
-struct remote_withdrawal {
-    std::weak_ptr<engine> service;
-    boost::asio::any_io_executor executor; ///< the service's, on which the other members are used
-    std::shared_ptr<std::uint64_t> ticket; ///< 0 until the operation has started
+/// The cancellation slot of a handler, of any type; the slot must outlive it.
+class slot_ref {
+  public:
+    template <class Slot>
+    explicit slot_ref(Slot& slot) noexcept : slot_(&slot), assign_(&assign_slot<Slot>) {}
+    void assign(withdrawal withdraw) const { assign_(slot_, std::move(withdraw)); }
 
-    void operator()() const;
+  private:
+    template <class Slot>
+    static void assign_slot(void* slot, withdrawal withdraw) {
+        connect_slot(*static_cast<Slot*>(slot), std::move(withdraw));
+    }
+
+    void* slot_;
+    void (*assign_)(void* slot, withdrawal withdraw);
+};
+extern template void slot_ref::assign_slot<boost::asio::cancellation_slot>(void* slot, withdrawal withdraw);
+
+/// An operation that is about to start. \tparam Pointer owns it
+template <class Pointer>
+struct starting {
+    Pointer operation;
+    bool elsewhere; ///< whether its handler has another executor than the service
+    slot_ref slot;
 };
 
-/// For an `async_bind`.
-struct bind_withdrawal {
-    std::shared_ptr<std::weak_ptr<feed_control>> feed; ///< empty until the operation has started
-    boost::asio::any_io_executor executor;             ///< the service's, if the slot is emitted on another
-
-    void operator()() const;
-};
+template <class Operation, class Slot>
+starting<pending_ptr> about_to_start(Operation* operation, Slot& slot) noexcept {
+    return {pending_ptr{operation}, operation->elsewhere(), slot_ref{slot}};
+}
 
 } // namespace detail
 
@@ -171,10 +187,10 @@ class service : public registrar {
     /// \throws cles::error: `invalid_name`, `invalid_url` (also of a network or multicast group), `unknown_scheme`,
     /// `insecure_listen`, `invalid_option` (limits, gossip), or the system's code if an address or interface is not
     /// available (the message names it)
-    service(boost::asio::any_io_executor executor, service_options options);
+    service(boost::asio::any_io_executor executor, const service_options& options);
     template <std::derived_from<boost::asio::execution_context> Context>
-    service(Context& context, service_options options)
-        : service(boost::asio::any_io_executor{context.get_executor()}, std::move(options)) {}
+    service(Context& context, const service_options& options)
+        : service(boost::asio::any_io_executor{context.get_executor()}, options) {}
     ~service() override;
 
     [[nodiscard]] const std::string& name() const noexcept;
@@ -205,13 +221,9 @@ class service : public registrar {
     auto async_close(std::chrono::milliseconds limit, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
             [this](auto handler, std::chrono::milliseconds at_most) {
-                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+                auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                if (hops(*operation)) {
-                    close_elsewhere(hopping(slot), at_most, detail::pending_ptr{operation});
-                } else {
-                    connect_cancellation(slot, close(*engine_, at_most, detail::pending_ptr{operation}));
-                }
+                start_close(detail::about_to_start(operation, slot), at_most);
             },
             token, limit);
     }
@@ -248,17 +260,10 @@ class service : public registrar {
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
         return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
-            [this](auto handler, std::string path, const detail::outgoing_body& json) {
-                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+            [this](auto handler, const std::string& path, const detail::outgoing_body& json) {
+                auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                if (json.wrong) {
-                    fail_later(detail::pending_ptr{operation}, json);
-                } else if (hops(*operation)) {
-                    publish_elsewhere(hopping(slot), path, json.text, detail::pending_ptr{operation});
-                } else {
-                    connect_cancellation(slot,
-                                         publish_or_wait(*engine_, path, json.text, detail::pending_ptr{operation}));
-                }
+                start_update(detail::about_to_start(operation, slot), path, json);
             },
             token, std::string{noun}, converted([&] { return to_json(value); }));
     }
@@ -277,7 +282,7 @@ class service : public registrar {
     /// PULL: gets data once.
     template <class T = json_text, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_pull(std::string_view noun, Token&& token = {}) {
-        return initiate<T>(verb::pull, noun, {}, std::cref(detail::no_options), std::forward<Token>(token));
+        return initiate<T>(verb::pull, noun, {}, std::cref(detail::no_options()), std::forward<Token>(token));
     }
     template <class T = json_text, class Token = boost::asio::use_awaitable_t<>>
     auto async_pull(std::string_view noun, const call_options& options, Token&& token = {}) {
@@ -287,7 +292,7 @@ class service : public registrar {
     /// PUSH: sends data; completes when its handler has run. Scalars are sent as {"value":x}.
     template <class T = json_text, class B, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_push(std::string_view noun, const B& body, Token&& token = {}) {
-        return initiate<T>(verb::push, noun, body_text(body), std::cref(detail::no_options),
+        return initiate<T>(verb::push, noun, body_text(body), std::cref(detail::no_options()),
                            std::forward<Token>(token));
     }
     template <class T = json_text, class B, class Token = boost::asio::use_awaitable_t<>>
@@ -298,7 +303,7 @@ class service : public registrar {
     /// DELEGATE: sends data, gets the result of a task; see `call_options::on_progress`.
     template <class T = json_text, class B, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_delegate(std::string_view noun, const B& body, Token&& token = {}) {
-        return initiate<T>(verb::delegate, noun, body_text(body), std::cref(detail::no_options),
+        return initiate<T>(verb::delegate, noun, body_text(body), std::cref(detail::no_options()),
                            std::forward<Token>(token));
     }
     template <class T = json_text, class B, class Token = boost::asio::use_awaitable_t<>>
@@ -385,15 +390,7 @@ class service : public registrar {
                          const call_options& chosen) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                if (content.wrong) {
-                    fail_later(detail::pending_ptr{operation}, content);
-                } else if (hops(*operation)) {
-                    send_elsewhere(hopping(slot), {verb, target.view(), content.text}, chosen,
-                                   detail::pending_ptr{operation});
-                } else {
-                    connect_cancellation(slot, send(*engine_, {verb, target.view(), content.text}, chosen,
-                                                    detail::pending_ptr{operation}));
-                }
+                start(detail::about_to_start(operation, slot), {verb, target.view(), content}, chosen);
             },
             token, detail::short_text{noun}, std::move(body), options);
     }
@@ -404,71 +401,36 @@ class service : public registrar {
             [this](auto handler, const std::string& text, const call_options& chosen) {
                 auto slot = boost::asio::get_associated_cancellation_slot(handler);
                 auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                if (hops(*operation)) {
-                    send_command_elsewhere(hopping(slot), text, chosen, detail::pending_ptr{operation});
-                } else {
-                    connect_cancellation(slot, send_command(*engine_, text, chosen, detail::pending_ptr{operation}));
-                }
+                start_command(detail::about_to_start(operation, slot), text, chosen);
             },
             token, std::string{command}, options);
-    }
-
-    /// Whether an operation has to be dispatched to the service's executor: because its handler has another one, or, if
-    /// the service has made a strand, because the caller is not on it.
-    template <class Operation>
-    [[nodiscard]] bool hops(const Operation& operation) const noexcept {
-        return operation.elsewhere() || (pooled_ && !on_strand());
-    }
-
-    template <class Slot>
-    void connect_cancellation(Slot slot, std::uint64_t ticket) {
-        if (ticket != 0) {
-            detail::connect_slot(slot, detail::withdrawal{engine_, ticket});
-        }
-    }
-
-    /// Connects the slot to an operation that starts on the service's executor, and may end before this returns.
-    template <class Slot>
-    detail::remote_withdrawal hopping(Slot slot) {
-        detail::remote_withdrawal withdraw{engine_, get_executor(), std::make_shared<std::uint64_t>(0)};
-        detail::connect_slot(slot, withdraw);
-        return withdraw;
     }
 
     template <class T, class Token, class Handler>
     void start_bind(Handler handler, const std::string& noun, const bind_options& options) {
         using operation_type = detail::bind_operation<T, detail::throws<std::remove_cvref_t<Token>>, Handler>;
-        const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+        auto slot = boost::asio::get_associated_cancellation_slot(handler);
         auto* operation =
             detail::make_operation<operation_type>(std::move(handler), get_executor(), options.diagnostics_);
-        const detail::bind_withdrawal withdraw{std::make_shared<std::weak_ptr<detail::feed_control>>(),
-                                               hops(*operation) ? get_executor() : boost::asio::any_io_executor{}};
-        detail::connect_slot(slot, withdraw);
-        start_bind(withdraw, detail::binding_ptr{operation}, noun, options);
+        start_bind({detail::binding_ptr{operation}, operation->elsewhere(), detail::slot_ref{slot}}, noun, options);
     }
 
-    void fail_later(detail::pending_ptr operation, const detail::outgoing_body& why);
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
-    // These return a ticket with which the operation can be cancelled; 0 if it has completed or its completion is
-    // queued.
-    static std::uint64_t send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
-                              detail::pending_ptr operation);
-    static std::uint64_t send_command(detail::engine& inside, std::string_view command, const call_options& options,
-                                      detail::pending_ptr operation);
-    static std::uint64_t publish_or_wait(detail::engine& inside, std::string_view noun, std::string_view json,
-                                         detail::pending_ptr operation);
-    static std::uint64_t close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation);
-    // The same, dispatched to the service's executor, where they set the ticket.
-    void send_elsewhere(const detail::remote_withdrawal& withdraw, const detail::outgoing& request,
-                        const call_options& options, detail::pending_ptr operation);
-    void send_command_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& command,
-                                const call_options& options, detail::pending_ptr operation);
-    void publish_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& noun, const std::string& json,
-                           detail::pending_ptr operation);
-    void close_elsewhere(const detail::remote_withdrawal& withdraw, std::chrono::milliseconds limit,
-                         detail::pending_ptr operation);
-    void start_bind(const detail::bind_withdrawal& withdraw, detail::binding_ptr operation, const std::string& noun,
-                    const bind_options& options);
+
+    using starting = detail::starting<detail::pending_ptr>;
+    // They start the operation on the service's executor, now or later, and connect its slot.
+    void start(starting what, const detail::outgoing& request, const call_options& options);
+    void start_command(starting what, const std::string& command, const call_options& options);
+    void start_update(starting what, const std::string& noun, const detail::outgoing_body& json);
+    void start_close(starting what, std::chrono::milliseconds limit);
+    void start_bind(detail::starting<detail::binding_ptr> what, const std::string& noun, const bind_options& options);
+    template <class Start>
+    void start_here(const detail::slot_ref& slot, const Start& start);
+    template <class Start>
+    void start_elsewhere(const detail::slot_ref& slot, Start start);
+    /// Whether an operation has to be dispatched to the service's executor: because its handler has another one, or, if
+    /// the service has made a strand, because the caller is not on it.
+    [[nodiscard]] bool hops(bool elsewhere) const noexcept { return elsewhere || (pooled_ && !on_strand()); }
     [[nodiscard]] bool on_strand() const noexcept;
 
     std::shared_ptr<detail::engine> engine_;

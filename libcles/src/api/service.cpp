@@ -66,41 +66,51 @@ const strand* strand_of(bool pooled, const asio::any_io_executor& executor) noex
 
 namespace detail {
 
+const call_options& no_options() noexcept {
+    static const call_options none{};
+    return none;
+}
+
+struct late_start {
+    asio::any_io_executor executor; ///< on which the other members are used; empty: on that of the caller
+    std::weak_ptr<engine> service;
+    std::uint64_t ticket = 0; ///< 0 until it has started
+    std::weak_ptr<feed_control> feed{};
+
+    explicit late_start(asio::any_io_executor on, std::weak_ptr<engine> of = {})
+        : executor(std::move(on)), service(std::move(of)) {}
+
+    void cancel() const {
+        if (const auto alive = service.lock(); alive && ticket != 0) {
+            alive->cancel(ticket);
+        }
+        if (const auto bound = feed.lock()) {
+            bound->cancel_start();
+        }
+    }
+};
+
 void withdrawal::operator()() const {
-    if (const auto alive = service.lock()) {
-        alive->cancel(ticket);
-    }
-}
-
-void remote_withdrawal::operator()() const {
-    asio::dispatch(executor, [weak = service, begun = ticket] {
-        if (const auto alive = weak.lock(); alive && *begun != 0) {
-            alive->cancel(*begun);
+    if (!late) {
+        if (const auto alive = service.lock()) {
+            alive->cancel(ticket);
         }
-    });
-}
-
-void bind_withdrawal::operator()() const {
-    const auto withdraw = [made = feed] {
-        if (const auto alive = made->lock()) {
-            alive->cancel_start();
-        }
-    };
-    if (executor) {
-        asio::dispatch(executor, withdraw);
+    } else if (late->executor) {
+        asio::dispatch(late->executor, [late = late] { late->cancel(); });
     } else {
-        withdraw();
+        late->cancel();
     }
 }
+
+template void slot_ref::assign_slot<asio::cancellation_slot>(void* slot, withdrawal withdraw);
 
 } // namespace detail
 
-service::service(asio::any_io_executor executor, service_options options)
+service::service(asio::any_io_executor executor, const service_options& options)
     : pooled_(executor.target<asio::thread_pool::executor_type>() != nullptr) {
-    const auto listen_at = std::move(options.listen);
-    engine_ = std::make_shared<detail::engine>(one_at_a_time(std::move(executor)), std::move(options));
+    engine_ = std::make_shared<detail::engine>(one_at_a_time(std::move(executor)), options);
     try {
-        begin_on(strand_of(pooled_, get_executor()), [&] { engine_->start(listen_at); });
+        begin_on(strand_of(pooled_, get_executor()), [&] { engine_->start(options.listen); });
     } catch (...) {
         engine_->stop();
         throw;
@@ -155,10 +165,6 @@ publisher service::make_publisher() {
     return run_on(strand_of(pooled_, get_executor()), [this] { return publisher{engine_->cross_thread_updates()}; });
 }
 
-void service::fail_later(detail::pending_ptr operation, const detail::outgoing_body& why) {
-    engine_->fail_later(std::move(operation), why.wrong, why.text);
-}
-
 void service::publish(std::string_view noun, const std::function<void(json_writer&)>& write) {
     run_on(strand_of(pooled_, get_executor()), [&, inside = engine_] { inside->publish(noun, write); });
 }
@@ -167,75 +173,96 @@ bool service::retire(std::string_view noun) {
     return run_on(strand_of(pooled_, get_executor()), [this, noun] { return engine_->node().published.retire(noun); });
 }
 
-std::uint64_t service::publish_or_wait(detail::engine& inside, std::string_view noun, std::string_view json,
-                                       detail::pending_ptr operation) {
-    return inside.publish_or_wait(noun, json, std::move(operation));
+template <class Start>
+void service::start_here(const detail::slot_ref& slot, const Start& start) {
+    // The ticket is 0 if the operation has completed, or its completion is queued.
+    if (const auto ticket = start(*engine_); ticket != 0) {
+        slot.assign({.service = engine_, .ticket = ticket});
+    }
 }
 
-std::uint64_t service::close(detail::engine& inside, std::chrono::milliseconds limit, detail::pending_ptr operation) {
-    return inside.close(limit, std::move(operation));
-}
-
-std::uint64_t service::send(detail::engine& inside, const detail::outgoing& request, const call_options& options,
-                            detail::pending_ptr operation) {
-    return inside.send(request.verb, request.noun, request.body, options, std::move(operation));
-}
-
-std::uint64_t service::send_command(detail::engine& inside, std::string_view command, const call_options& options,
-                                    detail::pending_ptr operation) {
-    return inside.send_command(command, options, std::move(operation));
-}
-
-void service::send_elsewhere(const detail::remote_withdrawal& withdraw, const detail::outgoing& request,
-                             const call_options& options, detail::pending_ptr operation) {
+template <class Start>
+void service::start_elsewhere(const detail::slot_ref& slot, Start start) {
+    // Connected first, because the operation may end before this returns.
+    const auto late = std::make_shared<detail::late_start>(get_executor(), engine_);
+    slot.assign({.late = late});
     asio::dispatch(get_executor(),
-                   [inside = engine_, ticket = withdraw.ticket, verb = request.verb, noun = std::string{request.noun},
-                    body = std::string{request.body}, options, operation = std::move(operation)]() mutable {
-                       *ticket = inside->send(verb, noun, body, options, std::move(operation));
-                   });
+                   [inside = engine_, late, start = std::move(start)]() mutable { late->ticket = start(*inside); });
 }
 
-void service::send_command_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& command,
-                                     const call_options& options, detail::pending_ptr operation) {
-    asio::dispatch(get_executor(), [inside = engine_, ticket = withdraw.ticket, command, options,
-                                    operation = std::move(operation)]() mutable {
-        *ticket = inside->send_command(command, options, std::move(operation));
-    });
+void service::start(starting what, const detail::outgoing& request, const call_options& options) {
+    if (request.body.wrong) {
+        engine_->fail_later(std::move(what.operation), request.body.wrong, request.body.text);
+    } else if (hops(what.elsewhere)) {
+        start_elsewhere(what.slot, [verb = request.verb, noun = std::string{request.noun}, body = request.body.text,
+                                    options, operation = std::move(what.operation)](detail::engine& inside) mutable {
+            return inside.send(verb, noun, body, options, std::move(operation));
+        });
+    } else {
+        start_here(what.slot, [&](detail::engine& inside) {
+            return inside.send(request.verb, request.noun, request.body.text, options, std::move(what.operation));
+        });
+    }
 }
 
-void service::publish_elsewhere(const detail::remote_withdrawal& withdraw, const std::string& noun,
-                                const std::string& json, detail::pending_ptr operation) {
-    asio::dispatch(get_executor(), [inside = engine_, ticket = withdraw.ticket, noun, json,
-                                    operation = std::move(operation)]() mutable {
-        *ticket = inside->publish_or_wait(noun, json, std::move(operation));
-    });
+void service::start_command(starting what, const std::string& command, const call_options& options) {
+    if (hops(what.elsewhere)) {
+        start_elsewhere(what.slot,
+                        [command, options, operation = std::move(what.operation)](detail::engine& inside) mutable {
+                            return inside.send_command(command, options, std::move(operation));
+                        });
+    } else {
+        start_here(what.slot, [&](detail::engine& inside) {
+            return inside.send_command(command, options, std::move(what.operation));
+        });
+    }
 }
 
-void service::close_elsewhere(const detail::remote_withdrawal& withdraw, std::chrono::milliseconds limit,
-                              detail::pending_ptr operation) {
-    asio::dispatch(get_executor(),
-                   [inside = engine_, ticket = withdraw.ticket, limit, operation = std::move(operation)]() mutable {
-                       *ticket = inside->close(limit, std::move(operation));
-                   });
+void service::start_update(starting what, const std::string& noun, const detail::outgoing_body& json) {
+    if (json.wrong) {
+        engine_->fail_later(std::move(what.operation), json.wrong, json.text);
+    } else if (hops(what.elsewhere)) {
+        start_elsewhere(
+            what.slot, [noun, text = json.text, operation = std::move(what.operation)](detail::engine& inside) mutable {
+                return inside.publish_or_wait(noun, text, std::move(operation));
+            });
+    } else {
+        start_here(what.slot, [&](detail::engine& inside) {
+            return inside.publish_or_wait(noun, json.text, std::move(what.operation));
+        });
+    }
 }
 
-void service::start_bind(const detail::bind_withdrawal& withdraw, detail::binding_ptr operation,
-                         const std::string& noun, const bind_options& options) {
-    constexpr auto start = [](const std::shared_ptr<detail::engine>& inside, std::weak_ptr<detail::feed_control>& made,
+void service::start_close(starting what, std::chrono::milliseconds limit) {
+    if (hops(what.elsewhere)) {
+        start_elsewhere(what.slot, [limit, operation = std::move(what.operation)](detail::engine& inside) mutable {
+            return inside.close(limit, std::move(operation));
+        });
+    } else {
+        start_here(what.slot, [&](detail::engine& inside) { return inside.close(limit, std::move(what.operation)); });
+    }
+}
+
+void service::start_bind(detail::starting<detail::binding_ptr> what, const std::string& noun,
+                         const bind_options& options) {
+    constexpr auto start = [](const std::shared_ptr<detail::engine>& inside, detail::late_start& late,
                               detail::binding_ptr bound, const std::string& target, const bind_options& chosen) {
         const auto control = detail::make_feed(inside, target, chosen);
-        made = control;
+        late.feed = control;
         bound->make_of(control);
         control->start(detail::pending_ptr{bound.release()});
     };
-    if (!withdraw.executor) {
-        start(engine_, *withdraw.feed, std::move(operation), noun, options);
+    const bool later = hops(what.elsewhere);
+    const auto late = std::make_shared<detail::late_start>(later ? get_executor() : asio::any_io_executor{});
+    what.slot.assign({.late = late});
+    if (!later) {
+        start(engine_, *late, std::move(what.operation), noun, options);
         return;
     }
-    asio::dispatch(withdraw.executor, [start, inside = engine_, made = withdraw.feed, noun, options,
-                                       operation = std::move(operation)]() mutable {
-        start(inside, *made, std::move(operation), noun, options);
-    });
+    asio::dispatch(late->executor,
+                   [start, inside = engine_, late, noun, options, operation = std::move(what.operation)]() mutable {
+                       start(inside, *late, std::move(operation), noun, options);
+                   });
 }
 
 std::string service::request(std::string_view command, const call_options& options) {
