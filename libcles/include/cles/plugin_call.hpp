@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/chrono.hpp>
 #include <cles/error.hpp>
 #include <cles/plugin_text.hpp>
 #include <cles/responder.hpp>
 
 #include <algorithm>
 #include <atomic>
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>

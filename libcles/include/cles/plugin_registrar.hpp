@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/chrono.hpp>
 #include <cles/plugin_call.hpp>
 #include <cles/plugin_text.hpp>
 #include <cles/registrar.hpp>
 
-#include <chrono>
 #include <memory>
 #include <mutex>
 #include <string>
