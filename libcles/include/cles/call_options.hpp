@@ -7,7 +7,6 @@
 #include <functional>
 #include <string>
 #include <string_view>
-#include <utility>
 
 namespace cles {
 
@@ -43,10 +42,7 @@ class call_options {
     }
     /// Called for each progress report of a DELEGATE, with a fraction from 0 to 1 and a JSON object. Runs inline on the
     /// service's executor. Makes the request ask the peer for reports.
-    call_options& on_progress(std::function<void(double, std::string_view)> callback) {
-        on_progress_ = std::move(callback);
-        return *this;
-    }
+    call_options& on_progress(std::function<void(double, std::string_view)> callback);
 
     std::chrono::milliseconds deadline_{0};
     std::string at_{};
