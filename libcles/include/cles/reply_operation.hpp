@@ -96,4 +96,70 @@ class reply_operation final : public pending {
     std::string* diagnostics_;
 };
 
+/// Where the result of a request is read to.
+struct reply_target {
+    void* value;
+    pending::verdict (*read)(std::string_view json, void* value, boost::system::error_code& code, std::string& why);
+    std::string* diagnostics;
+};
+
+/// The memory for a result of type T.
+template <class T>
+class reply_value {
+  public:
+    [[nodiscard]] reply_target target(std::string* diagnostics) noexcept { return {&carrier_, read, diagnostics}; }
+    [[nodiscard]] T& get() noexcept {
+        if constexpr (comes_wrapped<T>) {
+            return carrier_.value;
+        } else {
+            return carrier_;
+        }
+    }
+
+  private:
+    using carrier = std::conditional_t<comes_wrapped<T>, wrapped<T>, T>;
+
+    static pending::verdict read(std::string_view json, void* value, boost::system::error_code& code,
+                                 std::string& why) {
+        return read_result(json, *static_cast<carrier*>(value), code, why);
+    }
+
+    carrier carrier_{};
+};
+
+/// A pending request of a coroutine. Its type does not depend on that of the result, which is read into the coroutine's
+/// memory. The handler owns the coroutine.
+template <class Handler>
+class awaited_operation final : public pending {
+  public:
+    awaited_operation(Handler handler, const boost::asio::any_io_executor& service, const reply_target& target)
+        : complete_(std::move(handler), service), target_(target) {}
+
+    verdict offer(std::string_view json) override {
+        boost::system::error_code code;
+        std::string why;
+        if (target_.read(json, target_.value, code, why) == verdict::malformed) {
+            return verdict::malformed;
+        }
+        finish(code, why);
+        return verdict::completed;
+    }
+    void fail(boost::system::error_code code, std::string_view message) override {
+        finish(code, std::string{message}); // the view may refer to memory of the handler
+    }
+    void discard() noexcept override { discard_operation(this, complete_); }
+    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
+
+  private:
+    void finish(boost::system::error_code code, const std::string& message) {
+        if (code && target_.diagnostics != nullptr) {
+            *target_.diagnostics = message;
+        }
+        end_operation(this, complete_, code, message);
+    }
+
+    completion<true, Handler> complete_;
+    reply_target target_;
+};
+
 } // namespace cles::detail

@@ -23,10 +23,14 @@
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/associated_cancellation_slot.hpp>
 #include <boost/asio/async_result.hpp>
+#include <boost/asio/awaitable.hpp>
 #include <boost/asio/execution_context.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/version.hpp>
 
 #include <concepts>
 #include <cstdint>
+#include <exception>
 #include <functional>
 #include <map>
 #include <memory>
@@ -87,6 +91,8 @@ struct service_options {
     std::function<void(json_writer&)> metrics{};
 };
 
+class service;
+
 namespace detail {
 
 class engine; // the implementation of the service
@@ -103,8 +109,13 @@ struct outgoing_body {
     boost::system::error_code wrong{};
 };
 
-struct outgoing {
+struct request_kind {
     cles::verb verb = verb::pull;
+    bool is_command = false; ///< whether the noun is a whole command instead
+};
+
+struct outgoing {
+    request_kind kind;
     std::string_view noun;
     const outgoing_body& body;
 };
@@ -150,6 +161,45 @@ template <class Operation, class Slot>
 starting<pending_ptr> about_to_start(Operation* operation, Slot& slot) noexcept {
     return {pending_ptr{operation}, operation->elsewhere(), slot_ref{slot}};
 }
+
+/// A request that a coroutine awaits, as Asio awaits operations. Refers to memory of the coroutine.
+struct awaited_request {
+    service& from;
+    outgoing request;
+    const call_options& options;
+    reply_target target;
+
+    template <boost::asio::completion_token_for<void(std::exception_ptr)> Token>
+    auto operator()(Token&& token) {
+        return boost::asio::async_initiate<Token, void(std::exception_ptr)>(
+            [this](auto handler) { this->start(std::move(handler)); }, token);
+    }
+
+  private:
+    template <class Handler>
+    void start(Handler handler);
+};
+
+/// Awaits a request with the default token. There is less to compile than for other tokens, because only this depends
+/// on the type of the result. A class, because g++ warns about the frame of a function for a type without linkage.
+template <class T, class Options>
+struct reply_coroutine {
+    static boost::asio::awaitable<T> run(service& from, request_kind kind, short_text noun, outgoing_body body,
+                                         Options options);
+};
+// Outside the class, so that it is not inline: inline functions are compiled in spite of `extern template`.
+template <class T, class Options>
+boost::asio::awaitable<T> reply_coroutine<T, Options>::run(service& from, request_kind kind, short_text noun,
+                                                           outgoing_body body, Options options) {
+    reply_value<T> value;
+    const call_options& chosen = options;
+    awaited_request request{from, {kind, noun.view(), body}, chosen, value.target(chosen.diagnostics_)};
+    co_await std::move(request);
+    co_return std::move(value.get());
+}
+
+template <class Token>
+inline constexpr bool is_default_token = std::is_same_v<std::remove_cvref_t<Token>, boost::asio::use_awaitable_t<>>;
 
 } // namespace detail
 
@@ -272,43 +322,44 @@ class service : public registrar {
     /// The result is the reply's JSON.
     template <detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_request(std::string_view command, Token&& token = {}) {
-        return async_request(command, call_options{}, std::forward<Token>(token));
+        return initiate<json_text>({.is_command = true}, command, {}, std::cref(detail::no_options()),
+                                   std::forward<Token>(token));
     }
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_request(std::string_view command, const call_options& options, Token&& token = {}) {
-        return initiate_command<json_text>(command, options, std::forward<Token>(token));
+        return initiate<json_text>({.is_command = true}, command, {}, options, std::forward<Token>(token));
     }
 
     /// PULL: gets data once.
     template <class T = json_text, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_pull(std::string_view noun, Token&& token = {}) {
-        return initiate<T>(verb::pull, noun, {}, std::cref(detail::no_options()), std::forward<Token>(token));
+        return initiate<T>({verb::pull}, noun, {}, std::cref(detail::no_options()), std::forward<Token>(token));
     }
     template <class T = json_text, class Token = boost::asio::use_awaitable_t<>>
     auto async_pull(std::string_view noun, const call_options& options, Token&& token = {}) {
-        return initiate<T>(verb::pull, noun, {}, options, std::forward<Token>(token));
+        return initiate<T>({verb::pull}, noun, {}, options, std::forward<Token>(token));
     }
 
     /// PUSH: sends data; completes when its handler has run. Scalars are sent as {"value":x}.
     template <class T = json_text, class B, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_push(std::string_view noun, const B& body, Token&& token = {}) {
-        return initiate<T>(verb::push, noun, body_text(body), std::cref(detail::no_options()),
+        return initiate<T>({verb::push}, noun, body_text(body), std::cref(detail::no_options()),
                            std::forward<Token>(token));
     }
     template <class T = json_text, class B, class Token = boost::asio::use_awaitable_t<>>
     auto async_push(std::string_view noun, const B& body, const call_options& options, Token&& token = {}) {
-        return initiate<T>(verb::push, noun, body_text(body), options, std::forward<Token>(token));
+        return initiate<T>({verb::push}, noun, body_text(body), options, std::forward<Token>(token));
     }
 
     /// DELEGATE: sends data, gets the result of a task; see `call_options::on_progress`.
     template <class T = json_text, class B, detail::token Token = boost::asio::use_awaitable_t<>>
     auto async_delegate(std::string_view noun, const B& body, Token&& token = {}) {
-        return initiate<T>(verb::delegate, noun, body_text(body), std::cref(detail::no_options()),
+        return initiate<T>({verb::delegate}, noun, body_text(body), std::cref(detail::no_options()),
                            std::forward<Token>(token));
     }
     template <class T = json_text, class B, class Token = boost::asio::use_awaitable_t<>>
     auto async_delegate(std::string_view noun, const B& body, const call_options& options, Token&& token = {}) {
-        return initiate<T>(verb::delegate, noun, body_text(body), options, std::forward<Token>(token));
+        return initiate<T>({verb::delegate}, noun, body_text(body), options, std::forward<Token>(token));
     }
 
 #if defined(__GNUC__) && !defined(__clang__) && __GNUC__ < 13
@@ -383,27 +434,21 @@ class service : public registrar {
     // The operation keeps the noun and the options, because it may start later: a short noun without allocation, and
     // options by value, or by reference if they are the defaults.
     template <class T, class Token, class Options>
-    auto initiate(cles::verb verb, std::string_view noun, detail::outgoing_body body, const Options& options,
+    auto initiate(detail::request_kind kind, std::string_view noun, detail::outgoing_body body, const Options& options,
                   Token&& token) {
-        return boost::asio::async_initiate<Token, detail::signature_for<Token, T>>(
-            [this, verb](auto handler, const detail::short_text& target, const detail::outgoing_body& content,
-                         const call_options& chosen) {
-                auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                start(detail::about_to_start(operation, slot), {verb, target.view(), content}, chosen);
-            },
-            token, detail::short_text{noun}, std::move(body), options);
-    }
-
-    template <class T, class Token>
-    auto initiate_command(std::string_view command, const call_options& options, Token&& token) {
-        return boost::asio::async_initiate<Token, detail::signature_for<Token, T>>(
-            [this](auto handler, const std::string& text, const call_options& chosen) {
-                auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
-                start_command(detail::about_to_start(operation, slot), text, chosen);
-            },
-            token, std::string{command}, options);
+        if constexpr (detail::is_default_token<Token>) {
+            return detail::reply_coroutine<T, Options>::run(*this, kind, detail::short_text{noun}, std::move(body),
+                                                            options);
+        } else {
+            return boost::asio::async_initiate<Token, detail::signature_for<Token, T>>(
+                [this, kind](auto handler, const detail::short_text& target, const detail::outgoing_body& content,
+                             const call_options& chosen) {
+                    auto slot = boost::asio::get_associated_cancellation_slot(handler);
+                    auto* operation = make_operation<T, Token>(std::move(handler), chosen.diagnostics_);
+                    start(detail::about_to_start(operation, slot), {kind, target.view(), content}, chosen);
+                },
+                token, detail::short_text{noun}, std::move(body), options);
+        }
     }
 
     template <class T, class Token, class Handler>
@@ -420,7 +465,6 @@ class service : public registrar {
     using starting = detail::starting<detail::pending_ptr>;
     // They start the operation on the service's executor, now or later, and connect its slot.
     void start(starting what, const detail::outgoing& request, const call_options& options);
-    void start_command(starting what, const std::string& command, const call_options& options);
     void start_update(starting what, const std::string& noun, const detail::outgoing_body& json);
     void start_close(starting what, std::chrono::milliseconds limit);
     void start_bind(detail::starting<detail::binding_ptr> what, const std::string& noun, const bind_options& options);
@@ -433,8 +477,26 @@ class service : public registrar {
     [[nodiscard]] bool hops(bool elsewhere) const noexcept { return elsewhere || (pooled_ && !on_strand()); }
     [[nodiscard]] bool on_strand() const noexcept;
 
+    friend detail::awaited_request;
+
     std::shared_ptr<detail::engine> engine_;
     bool pooled_; ///< whether it has made a strand of a pool
 };
+
+template <class Handler>
+void detail::awaited_request::start(Handler handler) {
+    auto slot = boost::asio::get_associated_cancellation_slot(handler);
+    auto* operation = make_operation<awaited_operation<Handler>>(std::move(handler), from.get_executor(), target);
+    from.start(about_to_start(operation, slot), request, options);
+}
+
+// The library contains these, so that its users need not compile them. Later versions of Asio than this name the
+// handler differently.
+#if BOOST_VERSION < 108900
+extern template void detail::awaited_request::start(
+    boost::asio::detail::awaitable_async_op_handler<void(std::exception_ptr), boost::asio::any_io_executor> handler);
+#endif
+extern template struct detail::reply_coroutine<json_text, call_options>;
+extern template struct detail::reply_coroutine<json_text, std::reference_wrapper<const call_options>>;
 
 } // namespace cles

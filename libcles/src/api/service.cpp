@@ -191,29 +191,22 @@ void service::start_elsewhere(const detail::slot_ref& slot, Start start) {
 }
 
 void service::start(starting what, const detail::outgoing& request, const call_options& options) {
+    constexpr auto send = [](detail::engine& inside, const detail::request_kind& kind, std::string_view noun,
+                             std::string_view body, const call_options& chosen, detail::pending_ptr operation) {
+        return kind.is_command ? inside.send_command(noun, chosen, std::move(operation))
+                               : inside.send(kind.verb, noun, body, chosen, std::move(operation));
+    };
     if (request.body.wrong) {
         engine_->fail_later(std::move(what.operation), request.body.wrong, request.body.text);
     } else if (hops(what.elsewhere)) {
-        start_elsewhere(what.slot, [verb = request.verb, noun = std::string{request.noun}, body = request.body.text,
-                                    options, operation = std::move(what.operation)](detail::engine& inside) mutable {
-            return inside.send(verb, noun, body, options, std::move(operation));
-        });
-    } else {
-        start_here(what.slot, [&](detail::engine& inside) {
-            return inside.send(request.verb, request.noun, request.body.text, options, std::move(what.operation));
-        });
-    }
-}
-
-void service::start_command(starting what, const std::string& command, const call_options& options) {
-    if (hops(what.elsewhere)) {
         start_elsewhere(what.slot,
-                        [command, options, operation = std::move(what.operation)](detail::engine& inside) mutable {
-                            return inside.send_command(command, options, std::move(operation));
+                        [send, kind = request.kind, noun = std::string{request.noun}, body = request.body.text, options,
+                         operation = std::move(what.operation)](detail::engine& inside) mutable {
+                            return send(inside, kind, noun, body, options, std::move(operation));
                         });
     } else {
         start_here(what.slot, [&](detail::engine& inside) {
-            return inside.send_command(command, options, std::move(what.operation));
+            return send(inside, request.kind, request.noun, request.body.text, options, std::move(what.operation));
         });
     }
 }
@@ -301,5 +294,12 @@ std::string service::request(std::string_view command, const call_options& optio
     }
     return std::move(result->body);
 }
+
+#if BOOST_VERSION < 108900
+template void detail::awaited_request::start(
+    asio::detail::awaitable_async_op_handler<void(std::exception_ptr), asio::any_io_executor> handler);
+#endif
+template struct detail::reply_coroutine<json_text, call_options>;
+template struct detail::reply_coroutine<json_text, std::reference_wrapper<const call_options>>;
 
 } // namespace cles
