@@ -115,8 +115,14 @@ class security_protocol {
 
     // -- announcements
 
-    /// Completes the announcement of this node, and signs it.
-    virtual void sign(announcement& said, std::uint64_t seq) const = 0;
+    /// Signs the announcement of this node, with the next `seq`, if there is something new in it; otherwise completes
+    /// it with the last one that was signed. Returns the line for the group: the announcement, or only its load.
+    [[nodiscard]] virtual std::string announce(announcement& said, std::uint64_t& seq, bool in_group,
+                                               bool by_gossip) = 0;
+    /// A node looks for this one.
+    virtual void on_solicited() = 0;
+    /// A member has reported its load in the group. Returns false if the report is malformed.
+    virtual bool on_load_report(const group_source& from, const protocol::request_line& report, time_point now) = 0;
     /// The endpoints to announce: the same for all receivers, since they are signed. With the addresses of the
     /// interfaces instead of an unspecified one, and without Unix sockets, which mean nothing to other hosts.
     /// \param all whether others reach this node by all of its interfaces, not only by those in the group

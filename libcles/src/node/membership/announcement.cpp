@@ -46,6 +46,15 @@ bool read_signed(json_reader& r, std::vector<std::string>& out) {
     return good && (bytes <= 2 * task_registry::max_signed_names || r.fail("the list of signed tasks is too long"));
 }
 
+bool read_digest(json_reader& r, std::string& out) {
+    if (!r.read(out)) {
+        return false;
+    }
+    return out.size() <= max_digest || r.fail("the digest has more than 64 bytes");
+}
+
+} // namespace
+
 bool read_load(json_reader& r, node_load& out) {
     out = {};
     return read_members(r, [&](std::string_view key) {
@@ -56,15 +65,6 @@ bool read_load(json_reader& r, node_load& out) {
                                      : r.skip();
     });
 }
-
-bool read_digest(json_reader& r, std::string& out) {
-    if (!r.read(out)) {
-        return false;
-    }
-    return out.size() <= max_digest || r.fail("the digest has more than 64 bytes");
-}
-
-} // namespace
 
 std::chrono::milliseconds interval_among(std::size_t others) noexcept {
     return std::clamp(interval_per_node * static_cast<std::int64_t>(others + 1), usual_interval, max_interval);
@@ -167,6 +167,10 @@ void write_signed_member(json_writer& w, const std::vector<std::string>& tasks) 
 
 void write_load_member(json_writer& w, const node_load& load) {
     w.plain_key("load");
+    write_load(w, load);
+}
+
+void write_load(json_writer& w, const node_load& load) {
     w.begin_object();
     write_member(w, "queued", load.queued);
     write_member(w, "running", load.running);

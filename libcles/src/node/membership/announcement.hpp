@@ -76,11 +76,16 @@ void append_announcement_body(std::string& out, const announcement& said, std::s
 void append_announcement(std::string& out, std::string_view node, const signed_announcement& said, std::uint64_t seq,
                          std::string_view epoch);
 
+/// The path of the noun under which secured nodes report their load.
+inline constexpr std::string_view load_path = "cles/load";
+
 // Members that several kinds of entries have.
 
 /// Writes the list of signed tasks, unless it is empty.
 void write_signed_member(json_writer& w, const std::vector<std::string>& tasks);
 void write_load_member(json_writer& w, const node_load& load);
+void write_load(json_writer& w, const node_load& load);
+bool read_load(json_reader& r, node_load& out);
 /// Writes at most `most` of the endpoints.
 void write_endpoints_member(json_writer& w, const std::vector<std::string>& endpoints, std::size_t most);
 bool read_epoch(json_reader& r, std::uint32_t& out);

@@ -227,7 +227,7 @@ void discovery::announce_to_group(announcement& said) {
     node.counts.announcements_sent += sent ? 1 : 0;
 }
 
-// The same by all interfaces and by gossip. By gossip alone, it is signed again only when there is something new in it.
+// The same by all interfaces and by gossip.
 void discovery::announce_signed(announcement& said) {
     auto& node = host_.node();
     said.endpoints =
@@ -235,18 +235,11 @@ void discovery::announce_signed(announcement& said) {
     if (group_ != nullptr) {
         said.sources = sources_in_group();
     }
-    if (group_ != nullptr || node.peers.has_news(said)) {
-        ++seq_;
-        node.secured->sign(said, seq_);
-    } else {
-        said.original = node.peers.own()->announced.original;
-    }
+    const auto line = node.secured->announce(said, seq_, group_ != nullptr, gossip_ != nullptr);
     if (gossip_) {
         node.peers.announce_self(said, seq_, host_.now());
     }
     if (group_ != nullptr) {
-        std::string line;
-        append_announcement(line, node.name, *said.original, seq_, node.epoch);
         node.counts.announcements_sent += group_->send(line) ? 1 : 0;
     }
 }
@@ -297,6 +290,9 @@ std::vector<std::string> discovery::endpoints_for_group(bool loopback) const {
 std::size_t discovery::others() const { return host_.node().peers.size(); }
 
 void discovery::on_solicitation(bool by_name, time_point now) {
+    if (const auto& secured = host_.node().secured) {
+        secured->on_solicited();
+    }
     if (by_name) {
         announcer_.expedite(now); // no other node answers
     } else {

@@ -21,6 +21,38 @@ membership::verdict membership::apply_announcement(const announcement& said, std
     return take_sighting({said, epoch, seq, now, from, observed_source::of(from)}, now);
 }
 
+// A hint: members can send unsigned updates under another name. So it moves nothing, and makes no conflict.
+membership::verdict membership::apply_load(std::string_view node, std::uint32_t epoch, std::uint64_t seq,
+                                           const node_load& load, const group_source& from, time_point now) {
+    if (node == own_name_ && epoch == own_epoch_) {
+        return verdict::own;
+    }
+    const auto at = peers_.find(node);
+    const auto applies_to = [&](const incarnation& r) { return r.announced.original && r.matches(epoch, from); };
+    auto* const second = node == own_name_    ? own_name_conflict_.get()
+                         : at == peers_.end() ? nullptr
+                                              : at->second.second.get();
+    if (second != nullptr && applies_to(second->contender) && seq >= second->contender.seq) {
+        second->contender.on_hint(now, revision_);
+        follow(suspect_at(second->contender));
+        return verdict::taken;
+    }
+    if (at == peers_.end() || !applies_to(at->second.owner)) {
+        return verdict::unknown;
+    }
+    auto& r = at->second.owner;
+    if (seq < r.seq) {
+        return verdict::old;
+    }
+    r.on_hint(now, revision_);
+    if (r.from == from) {
+        r.last_seen_at_source = now;
+    }
+    r.announced.load = load;
+    on_owner_seen(*at, false, true, now);
+    return verdict::taken;
+}
+
 membership::verdict membership::apply_gossip(const peer_report& report, const observed_source& by, time_point asked,
                                              time_point now) {
     const sighting w{report.announced, report.epoch, report.seq, asked - report.age, {}, by};

@@ -96,6 +96,10 @@ class membership final : private deadline {
     /// Applies an announcement received by multicast.
     verdict apply_announcement(const announcement& said, std::uint32_t epoch, std::uint64_t seq,
                                const group_source& from, time_point now);
+    /// Applies a load report received by multicast: the node, known by its signed announcement, is alive, and has this
+    /// load. `seq` is that of its last announcement.
+    verdict apply_load(std::string_view node, std::uint32_t epoch, std::uint64_t seq, const node_load& load,
+                       const group_source& from, time_point now);
     /// Applies what another node reported. `asked`: when the request for it was sent; ages count from then.
     verdict apply_gossip(const peer_report& report, const observed_source& by, time_point asked, time_point now);
     verdict apply_gossip(const peer_heartbeat& beat, time_point asked, time_point now);

@@ -190,7 +190,7 @@ void multicast_group::solicited(bool by_name, time_point now) {
 }
 
 // In a secured fleet, a member publishes under its own name, with the epoch that it has confirmed. Announcements are
-// signed, since others pass them on.
+// signed, since others pass them on; reports of the load are not.
 bool multicast_group::is_authentic(const group_datagram& datagram) const {
     const auto& security = node_->security;
     if (!security) {
@@ -200,7 +200,7 @@ bool multicast_group::is_authentic(const group_datagram& datagram) const {
     if (datagram.member != update.noun.target || datagram.epoch != update.epoch) {
         return false;
     }
-    return update.noun.task != "cles" ||
+    return update.noun.task != "cles" || update.noun.path == load_path ||
            security->is_signed(datagram.member, update.noun.path, *update.seq, protocol::epoch_text(*update.epoch),
                                update.body, update.sig);
 }
@@ -212,6 +212,9 @@ bool multicast_group::take(const group_datagram& datagram, time_point now) {
     const auto& noun = update.noun;
     if (!is_authentic(datagram)) {
         return false;
+    }
+    if (node_->secured && noun.path == load_path) {
+        return datagram.accept() && node_->secured->on_load_report(from, update, now);
     }
     if (noun.task == "cles") {
         return datagram.accept(true) && take_announcement(from, update, now);

@@ -13,7 +13,8 @@
 
 namespace cles::core {
 
-secured_protocol::secured_protocol(node_state& host) : node_(host), confirmed_(host.bounds.peers), challenges_(host) {}
+secured_protocol::secured_protocol(node_state& host)
+    : node_(host), confirmed_(host.bounds.peers), challenges_(host), announcer_(host) {}
 
 void secured_protocol::start(local_node& host) {
     security_.emplace(host);
@@ -70,8 +71,12 @@ update_check secured_protocol::check(const protocol::request_line& update, bool 
     return check_signature(node_, update, direct);
 }
 
-void secured_protocol::sign(announcement& said, std::uint64_t seq) const {
-    said.original = sign_announcement(said, "cles", seq, node_.epoch, *node_.security);
+std::string secured_protocol::announce(announcement& said, std::uint64_t& seq, bool in_group, bool by_gossip) {
+    return announcer_.announce(said, seq, in_group, by_gossip);
+}
+
+bool secured_protocol::on_load_report(const group_source& from, const protocol::request_line& report, time_point now) {
+    return take_load_report(node_, from, report, now);
 }
 
 std::vector<std::string> secured_protocol::endpoints(const std::vector<group_port*>& in_group, bool all) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "node/secured/confirmed_epochs.hpp"
+#include "node/secured/load_reports.hpp"
 #include "node/secured/local_security.hpp"
 #include "node/secured/request_challenges.hpp"
 #include "node/secured/request_signer.hpp"
@@ -32,7 +33,9 @@ class secured_protocol final : public security_protocol {
     bool serve_reserved(reply_writer& replies, const protocol::request_line& request) override;
     std::optional<bool> must_be_signed(std::string_view publisher, std::string_view task) const override;
     update_check check(const protocol::request_line& update, bool direct) const override;
-    void sign(announcement& said, std::uint64_t seq) const override;
+    std::string announce(announcement& said, std::uint64_t& seq, bool in_group, bool by_gossip) override;
+    void on_solicited() override { announcer_.sign_next(); }
+    bool on_load_report(const group_source& from, const protocol::request_line& report, time_point now) override;
     std::vector<std::string> endpoints(const std::vector<group_port*>& in_group, bool all) override;
     void on_stated_roster(std::string_view node, std::uint32_t version, time_point now) override;
 
@@ -43,6 +46,7 @@ class secured_protocol final : public security_protocol {
     node_state& node_;
     confirmed_epochs confirmed_;
     request_challenges challenges_;
+    signed_announcer announcer_;
     local_node* host_ = nullptr;             // null: it does not run
     std::optional<local_security> security_; // while it runs
     std::shared_ptr<request_signer> signer_; // likewise

@@ -102,6 +102,37 @@ BOOST_AUTO_TEST_CASE(an_announcement_with_another_epoch_does_not_count) {
     BOOST_TEST(heard.received == 0);
 }
 
+BOOST_AUTO_TEST_CASE(a_load_report_is_not_signed) {
+    cles::core::announcement known{.node = "car2", .endpoints = {"tls://10.0.0.3:1"}};
+    known.original = std::make_shared<cles::core::signed_announcement>();
+    node.host->peers.apply_announcement(known, 0x5f3a09c2, 17, source_at(4001), node.host->time.now());
+    const auto queued = [&] { return node.host->peers.find_member("car2")->load.queued; };
+    const std::string report = "UPDATE car2:cles/load seq=17 epoch=5f3a09c2 {\"queued\":3}";
+    hear("car3", report);
+    hear("", report);
+    hear("car2", report, 0x5f3a09c3);
+    asked.answer = false; // a repeat
+    hear("car2", report);
+    asked.answer = true;
+    for (const auto* wrong : {"cles/load/1 seq=17 epoch=5f3a09c2 {\"queued\":3}",
+                              "cles/load seq=17 epoch=5f3a09c2 {\"queued\":", "cles/load seq=17 epoch=5f3a09c2 [3]",
+                              "cles/load seq=17 epoch=5f3a09c2 {\"queued\":3} {}"}) {
+        hear("car2", std::string{"UPDATE car2:"} + wrong);
+    }
+    BOOST_TEST(queued() == 0U);
+    BOOST_TEST(node.counts().group_dropped == 8U);
+    hear("car2", "UPDATE car2:cles/load seq=16 epoch=5f3a09c2 {\"queued\":3}");
+    BOOST_TEST(queued() == 0U);
+    BOOST_TEST(node.counts().announcements_dropped == 1U);
+    asked.of_others = asked.of_signed = 0;
+    hear("car2", report);
+    BOOST_TEST(queued() == 3U);
+    BOOST_TEST(node.counts().announcements_received == 1U);
+    BOOST_TEST(asked.of_others == 1);
+    BOOST_TEST(asked.of_signed == 0);
+    BOOST_TEST(heard.received == 0);
+}
+
 BOOST_AUTO_TEST_CASE(a_repeat_does_not_count) {
     asked.answer = false;
     hear("car2", announcement("car2", "car2"));
