@@ -12,6 +12,7 @@
 #include <array>
 #include <cstddef>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -397,6 +398,23 @@ BOOST_AUTO_TEST_CASE(a_certificate_that_is_too_large_is_refused) {
     }
     BOOST_TEST(!shake_hands(far, client));
     BOOST_TEST((far.state == status::failed));
+}
+
+// OpenSSL keeps a key of each connection that was accepted, in memory that is locked and bounded.
+BOOST_AUTO_TEST_CASE(thousands_of_connections_are_open_at_a_time) {
+    connect();
+    std::vector<std::unique_ptr<end>> open;
+    for (int i = 0; i < 2'500; ++i) {
+        auto& accepted = *open.emplace_back(std::make_unique<end>(far_context, role::server));
+        end peer{near_context, role::client};
+        peer.step();
+        for (int j = 0; j < 3; ++j) {
+            accepted.receive(peer.take_output());
+            peer.receive(accepted.take_output());
+        }
+        BOOST_REQUIRE_MESSAGE(accepted.established && peer.established, i << ": " << accepted.why.message());
+        accepted.engine.shrink();
+    }
 }
 
 BOOST_AUTO_TEST_CASE(unused_memory_is_freed_and_comes_back) {

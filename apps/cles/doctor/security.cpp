@@ -40,7 +40,7 @@ void check_rules(const security::node_description& node, const std::string& dire
 }
 
 void check_locked_memory(findings& found) {
-    constexpr rlim_t needed = rlim_t{1024} * 1024; // each secret has pages of its own
+    constexpr rlim_t needed = rlim_t{2048} * 1024; // secrets of sessions, and OpenSSL's heap for keys
     rlimit locked{};
     if (::getrlimit(RLIMIT_MEMLOCK, &locked) == 0 && locked.rlim_cur < needed) {
         found.warning("keys",

@@ -28,7 +28,8 @@ using certificate_ptr = std::unique_ptr<X509, free_certificate>;
 // In the form of ALPN: each name after its length.
 constexpr std::array<unsigned char, 7> application_protocol{6, 'c', 'l', 'e', 's', '/', '1'};
 constexpr long max_certificate = 8192; // bytes of what the other end sends as its certificate
-constexpr std::size_t secure_heap = 65536;
+// Space for 32,768 keys: OpenSSL keeps one of each link that was accepted. Pages are locked when they are first used.
+constexpr std::size_t secure_heap = std::size_t{1} << 20U;
 constexpr std::size_t secure_heap_least = 32;
 
 void require(bool succeeded, std::string_view what) {
