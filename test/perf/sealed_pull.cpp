@@ -5,9 +5,8 @@
 #include <cles/service.hpp>
 
 #include "counted_allocations.hpp"
+#include "fleet_folder.hpp"
 #include "security/datagrams/noise_kk.hpp"
-#include "security/fleet/fleet_authority.hpp"
-#include "security/fleet/key_directory.hpp"
 
 #include <boost/asio/io_context.hpp>
 
@@ -18,12 +17,10 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
-#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
-#include <stdlib.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -41,33 +38,6 @@ double median(std::vector<double>& all) {
     std::nth_element(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), all.end());
     return all[all.size() / 2];
 }
-
-/// A fleet of car1 and car2 in a folder.
-class fleet_folder {
-  public:
-    fleet_folder() {
-        std::string name = "/tmp/cles-sealed-pull-XXXXXX";
-        if (::mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error("cannot create a folder");
-        }
-        folder_ = name;
-        auto authority = cles::security::fleet_authority::found(cles::security::signing_key::generate());
-        for (const auto* car : {"car1", "car2"}) {
-            const auto directory = cles::security::key_directory::create(of(car));
-            authority.add(directory.create_key(car).public_part(), {});
-        }
-        for (const auto* car : {"car1", "car2"}) {
-            cles::security::key_directory{of(car)}.store_roster(authority.newest());
-        }
-    }
-    fleet_folder(const fleet_folder&) = delete;
-    fleet_folder& operator=(const fleet_folder&) = delete;
-    ~fleet_folder() { std::filesystem::remove_all(folder_); }
-    [[nodiscard]] std::string of(const std::string& car) const { return folder_ + "/" + car; }
-
-  private:
-    std::string folder_;
-};
 
 cles::service_options options_of(const char* name, const fleet_folder* sealed) {
     cles::service_options made{.name = name, .listen = {"udp://127.0.0.1:0"}};
