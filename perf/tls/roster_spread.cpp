@@ -40,7 +40,7 @@ namespace {
 
 using steady = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds patience{60};
+constexpr std::chrono::seconds patience{120};
 
 double seconds(steady::duration span) { return std::chrono::duration<double>(span).count(); }
 

@@ -3,6 +3,8 @@
 // the node, then the node opens them to the members. Each link carries a PULL. Node and members are two processes.
 //
 //   cles_tls_links [LINKS]
+//
+// Fails if a link takes more than 64 KiB of the node's resident memory.
 #include <cles/convert_containers.hpp>
 #include <cles/link.hpp>
 #include <cles/security.hpp>
@@ -55,7 +57,8 @@ using steady = std::chrono::steady_clock;
 
 constexpr std::size_t opened_at_once = 32;
 constexpr std::chrono::minutes patience{2};
-constexpr std::chrono::seconds idle_time{6}; // after which a node has released the buffers of idle links
+constexpr double most_resident = 64;         // KiB for each link
+constexpr std::chrono::seconds idle_time{5}; // after which a node has released the buffers of idle links
 
 double seconds_since(steady::time_point begun) { return std::chrono::duration<double>(steady::now() - begun).count(); }
 
@@ -291,15 +294,17 @@ class members_end {
     std::size_t answered_ = 0;
 };
 
-void report(const char* what, std::size_t links, double took, const node_memory& before, const node_memory& after,
+bool report(const char* what, std::size_t links, double took, const node_memory& before, const node_memory& after,
             const node_memory& idle) {
     const auto per_link = [&](std::uint64_t with, std::uint64_t without) {
         return (static_cast<double>(with) - static_cast<double>(without)) / 1024 / static_cast<double>(links);
     };
+    const auto resident = per_link(after.resident, before.resident);
     std::cout << links << " links " << what << " in " << took
-              << " s, each with a PULL; KiB of the node for each: " << per_link(after.resident, before.resident)
-              << " resident, " << per_link(after.allocated, before.allocated) << " allocated; when idle "
+              << " s, each with a PULL; KiB of the node for each: " << resident << " resident, "
+              << per_link(after.allocated, before.allocated) << " allocated; when idle "
               << per_link(idle.resident, before.resident) << ", " << per_link(idle.allocated, before.allocated) << "\n";
+    return resident <= most_resident;
 }
 
 /// False if the system does not permit so many files.
@@ -314,7 +319,7 @@ bool permit_files(std::size_t wanted) {
     return true;
 }
 
-void measure(std::size_t links) {
+bool measure(std::size_t links) {
     fleet_folder of{links + 1};
     const auto where = place_ends();
     const auto run_node = [&](const child_process::announce& announce) { const node_end end{of, links, announce}; };
@@ -322,14 +327,17 @@ void measure(std::size_t links) {
     child_process opening{where.server, run_node};
     const auto transports = of.transports();
     pin_to(where.client);
+    bool good = true;
     for (auto* node : {&opened, &opening}) {
         members_end members{transports, node->announced()};
         const auto before = members.memory();
         const auto took = node == &opened ? members.pull_all() : members.be_pulled();
         const auto after = members.memory();
         members.stay_idle();
-        report(node == &opened ? "by the members" : "by the node", links, took, before, after, members.memory());
+        const auto idle = members.memory();
+        good = report(node == &opened ? "by the members" : "by the node", links, took, before, after, idle) && good;
     }
+    return good;
 }
 
 } // namespace
@@ -346,8 +354,7 @@ int main(int count, char** arguments) {
             std::cout << "skipped: the system does not permit so many open files\n";
             return 77;
         }
-        cles::perf::measure(links);
-        return 0;
+        return cles::perf::measure(links) ? 0 : 1;
     } catch (const std::exception& e) {
         std::cerr << "cles_tls_links: " << e.what() << "\n";
         return 1;
