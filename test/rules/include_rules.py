@@ -120,7 +120,7 @@ RESERVED_HEADERS = [
     (re.compile(r"yaml-cpp/"), re.compile(r"runtime/src/config/"), "yaml-cpp belongs to runtime/config alone"),
     (re.compile(r"boost/dll(\.hpp$|/)"), re.compile(r"runtime/src/plugins/plugin_library\.[ch]pp$"),
      "Boost.DLL belongs to runtime/plugins/plugin_library alone"),
-    (re.compile(r"sodium(\.h$|/)"), re.compile(r"libcles/src/security/|test/security/"), "libsodium belongs to security alone"),
+    (re.compile(r"sodium(\.h$|/)"), re.compile(r"libcles/src/security/|test/security/|test/simulation/secured/"), "libsodium belongs to security alone"),
     (re.compile(r"openssl/"), re.compile(r"libcles/src/tls/|test/tls/|test/perf/sealed_pull\.cpp$"), "OpenSSL belongs to tls alone"),
     (re.compile(r"node/secured/"), re.compile(r"libcles/src/(node/secured|api)/|test/"),
      "programs without security do not contain it: use node/security_protocol.hpp"),

@@ -53,7 +53,10 @@ BOOST_AUTO_TEST_CASE(what_once_failed) {
     std::sort(files.begin(), files.end());
     BOOST_TEST(!files.empty());
     for (const auto& path : files) {
-        check(sim::simulate_twice(sim::plan_in_file(path.string())), path.string());
+        const auto p = sim::plan_in_file(path.string());
+        if (sim::has_security || !p.secured) {
+            check(sim::simulate_twice(p), path.string());
+        }
     }
 }
 

@@ -30,6 +30,7 @@ struct options {
     std::uint64_t seed = 1;
     std::uint64_t seeds = 1;
     unsigned steps = 300;
+    bool secured = false;
     bool twice = false;
     bool trace = false;
     bool minimise = false;
@@ -75,7 +76,7 @@ int run(const options& o) {
     }
     for (std::uint64_t i = 0; o.files.empty() && i < o.seeds; ++i) {
         const auto seed = o.seed + i;
-        failed += live_through(make_plan(seed, o.steps), "seed " + std::to_string(seed), o, sum) ? 0 : 1;
+        failed += live_through(make_plan(seed, o.steps, o.secured), "seed " + std::to_string(seed), o, sum) ? 0 : 1;
     }
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
     if (o.bench) {
@@ -184,6 +185,7 @@ int main(int argc, char** argv) {
     program.add_option("--seed", given.seed, "The first seed")->capture_default_str();
     program.add_option("--seeds", given.seeds, "How many")->capture_default_str();
     program.add_option("--steps", given.steps, "What happens in each from the outside")->capture_default_str();
+    program.add_flag("--secured", given.secured, "Nodes with security, whose roster changes, and an attacker");
     program.add_flag("--twice", given.twice, "Each twice, to see that both are the same");
     program.add_flag("--trace", given.trace, "Tells all that happens");
     program.add_flag("--minimise", given.minimise, "Makes a plan that fails smaller, and prints it");

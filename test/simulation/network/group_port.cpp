@@ -61,8 +61,11 @@ core::datagrams_done group_port::send(core::datagram_list all) {
     return taken;
 }
 
-// No simulated node is secured, and others send nothing to a source in the group.
-void group_port::send_to(const core::group_source&, std::string_view) {}
+void group_port::send_to(const core::group_source& to, std::string_view datagram) {
+    if (owner_ != nullptr) {
+        net_.send(local_, {to.address - address_of(0), to.port}, datagram);
+    }
+}
 
 // What a planted fault loses.
 bool group_port::is_swallowed(std::string_view line) {
@@ -83,7 +86,6 @@ bool group_port::put(std::string_view line) {
     if (silent_ || is_swallowed(line)) {
         return true;
     }
-    const auto process = process_.lock();
     const bool twice =
         net_.fault() == planted::group_sends_twice && line.starts_with("UPDATE ") && !is_announcement(line);
     for (int times = twice ? 2 : 1; times != 0; --times) {
@@ -95,11 +97,18 @@ bool group_port::put(std::string_view line) {
             unsent_ += line.size();
             waiting_.emplace_back(line);
         }
-        if (process && process->judge() != nullptr) {
-            process->judge()->on_group_sent(*process, line);
+        if (!net_.secured()) {
+            report_sent(line);
         }
     }
     return true;
+}
+
+void group_port::report_sent(std::string_view line) {
+    const auto process = process_.lock();
+    if (process && process->judge() != nullptr) {
+        process->judge()->on_group_sent(*process, line);
+    }
 }
 
 void group_port::pass_on(std::string_view line) {
@@ -107,7 +116,7 @@ void group_port::pass_on(std::string_view line) {
     if (owner_ == nullptr || !process) {
         return;
     }
-    net_.watcher().saw(to_string(local_), "==>", line);
+    net_.watcher().saw(to_string(local_), "==>", net_.secured() ? "a sealed datagram" : line);
     net_.multicast(local_, line);
     if (in_system_++ == 0) {
         process->later(until_writable, [weak = weak_from_this()] {
@@ -134,23 +143,38 @@ void group_port::drain() {
 
 // -- receiving -------------------------------------------------------------------------------------------------------
 
-void group_port::receive(const endpoint& from, const std::string& datagram) {
+void group_port::receive(const endpoint& from, const std::string& datagram, bool to_group) {
     if (const auto process = process_.lock()) {
-        process->receive([weak = weak_from_this(), from, datagram] {
+        process->receive([weak = weak_from_this(), from, datagram, to_group] {
             if (const auto self = weak.lock(); self && self->owner_ != nullptr) {
-                self->hand_over(from, datagram);
+                self->hand_over(from, datagram, to_group);
             }
         });
     }
 }
 
-void group_port::hand_over(const endpoint& from, const std::string& datagram) {
+void group_port::report_received(const core::group_source& from, std::string_view line) {
     const auto process = process_.lock();
-    const auto sender = source_of(from);
-    net_.watcher().saw(process->name(), "<==", datagram);
+    net_.watcher().saw(process->name(), "<==", line);
     if (process->judge() != nullptr) {
-        process->judge()->on_group_heard(*process, sender, datagram);
+        process->judge()->on_group_heard(*process, from, line);
     }
+}
+
+void group_port::report_accepted(std::string_view member, std::string_view line) {
+    const auto process = process_.lock();
+    if (process->judge() != nullptr) {
+        process->judge()->on_group_accepted(*process, member, line);
+    }
+}
+
+void group_port::hand_over(const endpoint& from, const std::string& datagram, bool to_group) {
+    const auto sender = source_of(from);
+    if (net_.secured()) {
+        owner_->on_datagram({.from = sender, .text = datagram, .request = nullptr, .to_group = to_group});
+        return;
+    }
+    report_received(sender, datagram);
     if (net_.fault() == planted::farewell_unheard && is_farewell(datagram)) {
         return;
     }

@@ -32,7 +32,11 @@ class group_port final : public core::group_port, public std::enable_shared_from
 
     [[nodiscard]] const endpoint& local() const noexcept { return local_; }
     /// A datagram has arrived at the host.
-    void receive(const endpoint& from, const std::string& datagram);
+    void receive(const endpoint& from, const std::string& datagram, bool to_group);
+    /// With security, whoever seals for this port reports what the node sends and receives; otherwise, it does so.
+    void report_sent(std::string_view line);
+    void report_received(const core::group_source& from, std::string_view line);
+    void report_accepted(std::string_view member, std::string_view line);
     /// Loses everything that is sent from now on.
     void fall_silent() noexcept { silent_ = true; }
 
@@ -43,7 +47,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     [[nodiscard]] bool put(std::string_view line);
     void pass_on(std::string_view line);
     void drain();
-    void hand_over(const endpoint& from, const std::string& datagram);
+    void hand_over(const endpoint& from, const std::string& datagram, bool to_group);
 
     network& net_;
     std::weak_ptr<node_run> process_;

@@ -24,14 +24,14 @@ std::string to_string(const endpoint& where) {
         core::group_source{.address = address_of(where.host), .port = static_cast<std::uint16_t>(where.port)});
 }
 
-std::string url_of(unsigned host, carrier by) {
-    return by == carrier::datagram ? "udp://" + to_string(endpoint{host, datagram_listen_port})
-                                   : "tcp://" + to_string(endpoint{host, stream_listen_port});
-}
-
 endpoint endpoint_of(const url& where) {
     const auto read = core::parse_group_source(where.host + ":" + std::to_string(where.port)).value();
     return {read.address - address_of(0), read.port};
+}
+
+std::string network::url_of(unsigned host, carrier by) const {
+    return by == carrier::datagram ? "udp://" + to_string(endpoint{host, datagram_listen_port})
+                                   : (secured_ ? "tls://" : "tcp://") + to_string(endpoint{host, stream_listen_port});
 }
 
 // -- conditions ----------------------------------------------------------------------------------------------------
@@ -157,6 +157,9 @@ void network::cut(unsigned host, unsigned which) {
 
 void network::send(const endpoint& from, const endpoint& to, std::string_view datagram) {
     inspect(from, datagram);
+    if (eavesdropper_) {
+        eavesdropper_(from, to, datagram);
+    }
     carry(from.host, to.host, chance_between(from.host, to.host), datagram,
           [&](const std::string& bytes, std::chrono::microseconds after, bool copy) {
               auto source = from;
@@ -174,6 +177,9 @@ void network::join(const std::shared_ptr<group_port>& port) {
 
 void network::multicast(const endpoint& from, std::string_view datagram) {
     inspect(from, datagram);
+    if (eavesdropper_) {
+        eavesdropper_(from, std::nullopt, datagram);
+    }
     for (const auto& weak : group_) {
         const auto port = weak.lock();
         if (!port) {
@@ -182,17 +188,50 @@ void network::multicast(const endpoint& from, std::string_view datagram) {
         const auto to = port->local().host;
         carry(from.host, to, chance_between(from.host + group_lane, to), datagram,
               [&](const std::string& bytes, std::chrono::microseconds after, bool) {
-                  time_.at(time_.now() + after, [weak, from, bytes] {
-                      if (const auto there = weak.lock()) {
-                          there->receive(from, bytes);
-                      }
-                  });
+                  deliver_to_group(weak, from, bytes, after);
               });
+    }
+}
+
+void network::deliver_to_group(const std::weak_ptr<group_port>& member, const endpoint& from,
+                               const std::string& datagram, std::chrono::microseconds after) {
+    time_.at(time_.now() + after, [member, from, datagram] {
+        if (const auto there = member.lock()) {
+            there->receive(from, datagram, true);
+        }
+    });
+}
+
+void network::inject(const endpoint& from, std::optional<endpoint> to, std::string_view datagram) {
+    const std::string bytes{datagram};
+    if (to) {
+        deliver(from, *to, bytes, weather_.least);
+        return;
+    }
+    for (const auto& member : group_) {
+        deliver_to_group(member, from, bytes, weather_.least);
+    }
+}
+
+// DATA: the member, the receiver's index and the counter; GROUP: the salt and the counter.
+void network::inspect_sealed(const endpoint& from, std::string_view datagram) {
+    constexpr std::size_t most = 1248;
+    const auto kind = static_cast<unsigned char>(datagram.front());
+    const std::size_t head = kind == 0x83 ? 20 : kind == 0x84 ? 32 : 0;
+    if (datagram.size() > most || datagram.size() < head || kind < 0x81 || kind > 0x84) {
+        watcher_.broken(rule::well_formed,
+                        "a sealed datagram of " + std::to_string(datagram.size()) + " bytes from " + to_string(from));
+    } else if (head != 0 && !nonces_.emplace(datagram.substr(head == 20 ? 0 : 8, head == 20 ? 20 : 24)).second) {
+        watcher_.broken(rule::nonces_differ, to_string(from) + " seals two datagrams with the same nonce");
     }
 }
 
 void network::inspect(const endpoint& from, std::string_view datagram) {
     ++datagrams_;
+    if (secured_) {
+        inspect_sealed(from, datagram);
+        return;
+    }
     if (datagram.size() > protocol::datagram_bytes || !datagram.ends_with('\n') ||
         protocol::has_many_lines(datagram.substr(0, datagram.size() - 1))) {
         watcher_.broken(rule::well_formed, "a datagram of " + std::to_string(datagram.size()) + " bytes from " +
@@ -202,11 +241,11 @@ void network::inspect(const endpoint& from, std::string_view datagram) {
 
 void network::carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver) {
     if (!reaches(from, to) || chance.chance(weather_.lost)) {
-        watcher_.saw("net", "loses", datagram);
+        watcher_.saw("net", "loses", secured_ ? "a sealed datagram" : datagram);
         return;
     }
     std::string bytes{datagram};
-    if (chance.chance(200)) { // its LF is optional
+    if (!secured_ && chance.chance(200)) { // its LF is optional
         bytes.pop_back();
     }
     const auto way = [&] {
@@ -224,10 +263,20 @@ void network::carry(unsigned from, unsigned to, dice& chance, std::string_view d
 
 void network::deliver(const endpoint& from, const endpoint& to, const std::string& datagram,
                       std::chrono::microseconds after) {
+    constexpr char welcome = '\x82';
+    if (fault_ == planted::welcome_late && datagram.starts_with(welcome)) {
+        after += much_later;
+    }
     time_.at(time_.now() + after, [this, from, to, datagram] {
         const auto found = ports_.find(to);
         if (const auto port = found == ports_.end() ? nullptr : found->second.lock()) {
             port->receive(from, datagram);
+        } else if (secured_) { // the sources in the group have sessions, too
+            for (const auto& weak : group_) {
+                if (const auto member = weak.lock(); member && member->local() == to) {
+                    member->receive(from, datagram, false);
+                }
+            }
         }
     });
 }

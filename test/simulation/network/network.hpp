@@ -16,6 +16,8 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -40,7 +42,7 @@ std::string to_string(const endpoint& where);
 constexpr std::uint32_t address_of(unsigned host) noexcept { return 0x0A000001U + host; }
 
 inline constexpr unsigned stream_listen_port = 1;   ///< the port on which nodes listen
-inline constexpr unsigned datagram_listen_port = 2; ///< the same for datagrams
+inline constexpr unsigned datagram_listen_port = 1; ///< the same for datagrams
 
 /// How a request travels.
 enum class carrier : std::uint8_t {
@@ -49,8 +51,6 @@ enum class carrier : std::uint8_t {
     urgent, ///< by a separate stream
     name,   ///< to the address that the node of that name announces
 };
-/// The URL on which the node of a host listens.
-std::string url_of(unsigned host, carrier by);
 endpoint endpoint_of(const url& where);
 
 /// The conditions of the network, per mille of datagrams.
@@ -88,13 +88,19 @@ class network {
     /// Each direction has separate random numbers, so that changes in one affect the others less.
     [[nodiscard]] dice& chance_between(unsigned from, unsigned to);
     [[nodiscard]] planted fault() const noexcept { return fault_; }
+    /// Links are authenticated: nodes have security.
+    void secure() noexcept { secured_ = true; }
+    [[nodiscard]] bool secured() const noexcept { return secured_; }
+    /// The URL on which the node of a host listens.
+    [[nodiscard]] std::string url_of(unsigned host, carrier by) const;
     [[nodiscard]] witness& watcher() noexcept { return watcher_; }
     [[nodiscard]] agenda& time() noexcept { return time_; }
     /// An unused port of the host.
     unsigned free_port(unsigned host);
 
-    using on_link = std::function<void(link_ptr)>;
-    using on_dialled = std::function<void(boost::system::error_code, std::shared_ptr<stream_half>)>;
+    using stream_ptr = std::shared_ptr<stream_half>;
+    using on_link = std::function<void(stream_ptr)>;
+    using on_dialled = std::function<void(boost::system::error_code, stream_ptr)>;
     void listen(endpoint where, const std::shared_ptr<place>& at, const limits& bounds, on_link arrived);
     /// Stops listening there.
     void shut(endpoint where) { doors_.erase(where); }
@@ -108,6 +114,11 @@ class network {
     void join(const std::shared_ptr<group_port>& port);
     /// To all members; each copy is lost, delayed or duplicated independently.
     void multicast(const endpoint& from, std::string_view datagram);
+    /// Sees all datagrams as they are sent; `to` is nothing for the group.
+    using eavesdropper = std::function<void(const endpoint& from, std::optional<endpoint> to, std::string_view)>;
+    void eavesdrop(eavesdropper who) { eavesdropper_ = std::move(who); }
+    /// A datagram of somebody else, who may state any source. It arrives soon, and once.
+    void inject(const endpoint& from, std::optional<endpoint> to, std::string_view datagram);
     /// Stops listening on all ports of the host.
     void close_doors(unsigned host);
 
@@ -125,6 +136,9 @@ class network {
 
     using delivery = std::function<void(const std::string& datagram, std::chrono::microseconds after, bool copy)>;
     void inspect(const endpoint& from, std::string_view datagram);
+    void inspect_sealed(const endpoint& from, std::string_view datagram);
+    void deliver_to_group(const std::weak_ptr<group_port>& member, const endpoint& from, const std::string& datagram,
+                          std::chrono::microseconds after);
     void carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver);
     void deliver(const endpoint& from, const endpoint& to, const std::string& datagram,
                  std::chrono::microseconds after);
@@ -137,6 +151,9 @@ class network {
     planted fault_;
     weather weather_;
     bool stormy_ = false;
+    bool secured_ = false;
+    eavesdropper eavesdropper_;
+    std::set<std::string, std::less<>> nonces_;                  // with which datagrams were sealed
     std::map<std::pair<unsigned, unsigned>, time_point> parted_; // from and to
     time_point disturbed_{};                                     // the end of the last disturbance
     std::map<endpoint, door> doors_;

@@ -1,14 +1,19 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/identity.hpp>
+
 #include "simulation/network/agenda.hpp"
 
 #include <deque>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace cles::simulation {
+
+class link_security;
 
 /// A simulated process: one incarnation of a node, or a client. After it has ended, nothing of it runs any more; while
 /// it is frozen, like a stopped process, everything that arrives waits. It has its own clock, which may be ahead.
@@ -22,6 +27,11 @@ class place : public std::enable_shared_from_this<place> {
     [[nodiscard]] unsigned host() const noexcept { return host_; }
     [[nodiscard]] const std::string& name() const noexcept { return name_; }
     [[nodiscard]] agenda& time() const noexcept { return time_; }
+    /// Null without security.
+    [[nodiscard]] virtual link_security* security() noexcept { return nullptr; }
+    /// A line is about to leave by a link, or has arrived by a datagram.
+    virtual void on_link_sends(const identity& /*to*/, std::string_view) {}
+    virtual void on_link_receives(const identity& /*from*/, std::string_view) {}
     [[nodiscard]] time_point now() const { return time_.now() + ahead_; }
 
     /// Runs an action here: now, or when the process continues.

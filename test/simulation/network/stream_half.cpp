@@ -10,8 +10,8 @@ namespace cles::simulation {
 
 stream_half::stream_half(network& net, const std::shared_ptr<place>& home, const limits& bounds, unsigned peer_host)
     : net_(net), home_(home), host_(home->host()), peer_host_(peer_host),
-      name_(home->name()), who_{.transport = "tcp",
-                                .address = "tcp://" + to_string(endpoint{peer_host, 1}),
+      name_(home->name()), who_{.transport = net.secured() ? "tls" : "tcp",
+                                .address = net.url_of(peer_host, carrier::stream),
                                 .name = {},
                                 .uid = {},
                                 .local = true},
@@ -32,6 +32,83 @@ stream_half::make(network& net, const std::shared_ptr<place>& near, const limits
     a->peer_ = b;
     b->peer_ = a;
     return {a, b};
+}
+
+// -- admission -----------------------------------------------------------------------------------------------------
+
+void stream_half::open(link_security& own, std::string_view expected, std::function<void(bool)> opened) {
+    constexpr std::chrono::seconds most{5};
+    opened_ = std::move(opened);
+    opening_ = true;
+    const auto home = home_.lock();
+    const auto peer = peer_.lock();
+    const auto peer_home = peer == nullptr ? nullptr : peer->home_.lock();
+    if (peer_home == nullptr || peer_home->security() == nullptr) { // not TLS
+        home->later({}, [self = shared_from_this()] { self->cut(); });
+        return;
+    }
+    gate_ = own.make_gate(expected);
+    std::string first;
+    gate_->begin(peer_home->security()->own_key(), first);
+    transmit(first);
+    home->later(most, [weak = weak_from_this()] {
+        if (const auto self = weak.lock(); self && self->opening_) {
+            self->lose();
+        }
+    });
+    home->later({}, [self = shared_from_this()] { self->admit(); });
+}
+
+// Takes the lines that have arrived, up to the peer's welcome.
+void stream_half::admit() {
+    const auto keep = shared_from_this();
+    while (opening_ && gate_ && state_ == state::open) {
+        input_.set_limit(gate_->max_line());
+        std::string_view line;
+        const auto found = input_.next(line);
+        if (found == protocol::line_buffer::status::overlong) {
+            lose();
+        } else if (found == protocol::line_buffer::status::line) {
+            net_.watcher().saw(name_, "<--", line);
+            std::string reply;
+            const auto verdict = gate_->on_line(line, reply);
+            transmit(reply);
+            if (verdict == stream_gate::verdict::admitted) {
+                on_admitted();
+            } else if (verdict == stream_gate::verdict::refused) {
+                transmit_end();
+                lose();
+            }
+        } else if (!fill()) {
+            if (ended_) {
+                lose();
+            }
+            return;
+        }
+    }
+}
+
+void stream_half::on_admitted() {
+    opening_ = false;
+    input_.set_limit(bounds_.line);
+    who_.name = gate_->name();
+    gate_->watch([this] {
+        removed_ = true;
+        if (const auto home = home_.lock()) {
+            home->later({}, [weak = weak_from_this()] {
+                if (const auto self = weak.lock()) {
+                    self->lose();
+                }
+            });
+        }
+    });
+    flush();
+    if (const auto home = home_.lock()) {
+        home->later({}, [self = shared_from_this()] { self->hand_over(); });
+    }
+    if (const auto opened = std::exchange(opened_, nullptr)) {
+        opened(true);
+    }
 }
 
 void stream_half::start(std::shared_ptr<link_events> owner) {
@@ -113,7 +190,10 @@ bool stream_half::fill() {
 }
 
 void stream_half::hand_over() {
-    if (handing_ || overlong_ || owner_ == nullptr) {
+    if (opening_) {
+        admit();
+    }
+    if (opening_ || removed_ || handing_ || overlong_ || owner_ == nullptr) {
         return;
     }
     const auto keep = shared_from_this();
@@ -139,7 +219,7 @@ void stream_half::hand_over() {
 bool stream_half::hand_over_batch() {
     const auto owner = owner_;
     bool more = true;
-    while (more && !paused_ && state_ == state::open) {
+    while (more && !paused_ && state_ == state::open && !removed_) {
         std::string_view line;
         switch (input_.next(line)) {
         case protocol::line_buffer::status::line:
@@ -187,7 +267,7 @@ void stream_half::pause(bool stop) {
 void stream_half::tamper() { net_.tampered.apply(output_, home_, net_.chance_between(host_, peer_host_)); }
 
 void stream_half::flush() {
-    if (state_ == state::closed || state_ == state::discarding || shut_ || !sending_.empty()) {
+    if (state_ == state::closed || state_ == state::discarding || shut_ || opening_ || removed_ || !sending_.empty()) {
         return;
     }
     if (net_.fault() != planted::urgent_lost) {
@@ -198,6 +278,7 @@ void stream_half::flush() {
         return;
     }
     tamper();
+    report_updates(output_);
     const auto count = std::min(free_window(), output_.size());
     transmit(std::string_view{output_}.substr(0, count));
     sent_ += count;
@@ -232,6 +313,18 @@ void stream_half::write_rest() {
         end_sending();
     } else if (const auto owner = owner_) {
         owner->on_writable();
+    }
+}
+
+// What is sent to a member is checked against its rights.
+void stream_half::report_updates(std::string_view lines) {
+    const auto home = gate_ ? home_.lock() : nullptr;
+    while (home && !lines.empty()) {
+        const auto line = lines.substr(0, lines.find('\n'));
+        lines.remove_prefix(std::min(line.size() + 1, lines.size()));
+        if (line.starts_with("UPDATE ")) {
+            home->on_link_sends(who_, line);
+        }
     }
 }
 
@@ -338,7 +431,11 @@ void stream_half::lose() {
     }
     const auto keep = shared_from_this();
     const auto owner = owner_;
+    const auto opened = std::exchange(opened_, nullptr);
     close();
+    if (opened) {
+        opened(false);
+    }
     if (owner) {
         owner->on_lost(make_error_code(errc::unavailable));
     }
@@ -349,6 +446,7 @@ void stream_half::close() {
         return;
     }
     const auto keep = weak_from_this().lock();
+    opened_ = nullptr;
     const bool unread = inbox_at_ < inbox_.size();
     state_ = state::closed;
     owner_.reset();

@@ -4,10 +4,12 @@
 #include <cles/line_link.hpp>
 
 #include "protocol/line.hpp"
+#include "simulation/network/link_security.hpp"
 #include "simulation/network/network.hpp"
 #include "simulation/network/place.hpp"
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -26,6 +28,8 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     make(network& net, const std::shared_ptr<place>& near, const limits& near_bounds, const std::shared_ptr<place>& far,
          const limits& far_bounds);
 
+    /// With security: admits the peer first. Until then, no line is delivered or sent. `opened` may be empty.
+    void open(link_security& own, std::string_view expected, std::function<void(bool admitted)> opened);
     void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }
     std::string& urgent_output() override { return urgent_; }
@@ -43,6 +47,9 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     void finish() override;
     void close() override;
     [[nodiscard]] const identity& peer() const noexcept override { return who_; }
+    [[nodiscard]] std::string_view epoch() const noexcept override {
+        return gate_ && !opening_ ? gate_->epoch() : std::string_view{};
+    }
 
     /// Shuts down the sending side, and continues to read.
     void half_close();
@@ -60,7 +67,10 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     void taken(std::size_t bytes);
 
     bool fill();
+    void admit();
+    void on_admitted();
     void hand_over();
+    void report_updates(std::string_view lines);
     bool hand_over_batch();
     void transmit(std::string_view bytes);
     void transmit_end();
@@ -102,6 +112,10 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     bool overlong_ = false;
     bool shut_ = false; // the sending side
     bool severed_ = false;
+    std::unique_ptr<stream_gate> gate_; // null: without security
+    std::function<void(bool)> opened_;
+    bool opening_ = false; // the peer has not been admitted yet
+    bool removed_ = false; // the peer or this end: nothing is delivered or sent any more
 };
 
 } // namespace cles::simulation

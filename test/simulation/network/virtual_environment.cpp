@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "simulation/network/virtual_environment.hpp"
 
+#include <cles/error.hpp>
+
 #include "simulation/network/datagram_port.hpp"
 #include "simulation/network/group_port.hpp"
 #include "simulation/network/stream_half.hpp"
@@ -111,7 +113,7 @@ void virtual_environment::run_timer_as_if(time_point shown) {
 // -- links -----------------------------------------------------------------------------------------------------------
 
 bool virtual_environment::has_transport(std::string_view scheme) const {
-    return scheme == "tcp" || scheme == "udp" || scheme == "inproc";
+    return scheme == (net_.secured() ? "tls" : "tcp") || scheme == "udp" || scheme == "inproc";
 }
 
 std::unique_ptr<acceptor> virtual_environment::listen(const url& where, const limits& bounds) {
@@ -120,10 +122,13 @@ std::unique_ptr<acceptor> virtual_environment::listen(const url& where, const li
             where, [](const on_link&) {}, [] {});
     }
     const auto at = endpoint_of(where);
-    if (where.scheme == "tcp") {
+    if (where.scheme != "udp") {
         const auto open = [this, at, bounds](const on_link& arrived) {
-            net_.listen(at, process_->shared_from_this(), bounds, [this, arrived](const link_ptr& made) {
+            net_.listen(at, process_->shared_from_this(), bounds, [this, arrived](const network::stream_ptr& made) {
                 remember(made, true);
+                if (auto* const own = process_->security()) {
+                    made->open(*own, {}, {});
+                }
                 arrived(made);
             });
         };
@@ -133,7 +138,7 @@ std::unique_ptr<acceptor> virtual_environment::listen(const url& where, const li
             }
         });
     }
-    const auto port = std::make_shared<datagram_port>(net_, process_->shared_from_this(), at, strangers_);
+    const auto port = make_port(at, strangers_);
     const auto open = [this, port](const on_link& arrived) {
         port->accept([this, arrived](const link_ptr& made) {
             remember(made, true);
@@ -144,7 +149,16 @@ std::unique_ptr<acceptor> virtual_environment::listen(const url& where, const li
     return std::make_unique<door>(where, open, [port] { port->accept(nullptr); });
 }
 
-std::function<void()> virtual_environment::dial(const url& where, std::string_view, const limits& bounds,
+std::shared_ptr<datagram_port> virtual_environment::make_port(const endpoint& at, bool strangers) {
+    auto* const own = process_->security();
+    auto made = std::make_shared<datagram_port>(net_, process_->shared_from_this(), at, strangers,
+                                                own != nullptr ? own->make_codec() : nullptr);
+    std::erase_if(ports_, [](const auto& each) { return each.expired(); });
+    ports_.push_back(made);
+    return made;
+}
+
+std::function<void()> virtual_environment::dial(const url& where, std::string_view name, const limits& bounds,
                                                 dial_callback done) {
     auto wanted = std::make_shared<bool>(true);
     const auto to = endpoint_of(where);
@@ -163,15 +177,33 @@ std::function<void()> virtual_environment::dial(const url& where, std::string_vi
     if (process_ == nullptr) {
         return [] {};
     }
-    if (where.scheme == "tcp") {
-        net_.dial(process_->shared_from_this(), to, bounds, std::move(arrive));
+    auto* const own = process_->security();
+    if (where.scheme != "udp") {
+        net_.dial(process_->shared_from_this(), to, bounds,
+                  [this, own, expected = std::string{name},
+                   arrive = std::move(arrive)](boost::system::error_code code, const network::stream_ptr& made) {
+                      if (!made || own == nullptr || process_ == nullptr) {
+                          arrive(code, made);
+                          return;
+                      }
+                      remember(made, false);
+                      made->open(*own, expected, [arrive, made](bool admitted) {
+                          if (admitted) {
+                              arrive({}, made);
+                          } else {
+                              arrive(make_error_code(errc::unavailable), nullptr);
+                          }
+                      });
+                  });
     } else {
-        process_->later({}, [this, to, arrive = std::move(arrive)] {
-            if (process_ != nullptr) {
-                const endpoint local{process_->host(), net_.free_port(process_->host())};
-                const auto port = std::make_shared<datagram_port>(net_, process_->shared_from_this(), local, false);
+        process_->later({}, [this, own, to, expected = std::string{name}, arrive = std::move(arrive)] {
+            const auto member = own != nullptr && process_ != nullptr ? own->number_of(expected) : 0;
+            if (own != nullptr && member == 0) {
+                arrive(make_error_code(errc::unavailable), nullptr);
+            } else if (process_ != nullptr) {
+                const auto port = make_port({process_->host(), net_.free_port(process_->host())}, false);
                 port->open();
-                arrive({}, port->connect(to));
+                arrive({}, port->connect(to, member));
             }
         });
     }
@@ -216,6 +248,11 @@ void virtual_environment::end() {
     }
     net_.close_doors(process_->host());
     process_ = nullptr;
+    for (const auto& weak : ports_) {
+        if (const auto port = weak.lock()) {
+            port->end();
+        }
+    }
     on_due_ = nullptr;
     for (const auto& [weak, incoming] : std::exchange(links_, {})) {
         if (const auto open = weak.lock()) {

@@ -18,6 +18,7 @@
 
 namespace cles::simulation {
 
+class datagram_port;
 class group_port;
 class node_run;
 
@@ -39,6 +40,7 @@ class virtual_environment final : public core::environment {
     void stop_timer() override { on_due_ = nullptr; }
 
     [[nodiscard]] bool has_transport(std::string_view scheme) const override;
+    [[nodiscard]] bool is_trusted(const url& where) const override { return has_transport(where.scheme); }
     [[nodiscard]] bool is_exposed(const url&) const override { return true; }
     std::unique_ptr<acceptor> listen(const url& where, const limits& bounds) override;
     std::function<void()> dial(const url& where, std::string_view name, const limits& bounds,
@@ -75,6 +77,7 @@ class virtual_environment final : public core::environment {
     void on_timer();
     void run_timer();
     void remember(const link_ptr& made, bool incoming);
+    std::shared_ptr<datagram_port> make_port(const endpoint& at, bool strangers);
 
     network& net_;
     node_run* process_; // null: it has ended
@@ -87,6 +90,7 @@ class virtual_environment final : public core::environment {
     std::uint64_t timer_ = 0;                                 // the current one
     std::optional<time_point> shown_;                         // the time that a planted fault shows
     std::vector<std::pair<std::weak_ptr<link>, bool>> links_; // and whether others opened them
+    std::vector<std::weak_ptr<datagram_port>> ports_;
     std::shared_ptr<group_port> group_;
 };
 

@@ -336,6 +336,7 @@ class asking final : public part {
         world_.watcher().saw(world::name_of(a.from), "has an answer", json);
         on_end(a);
         a.succeeded = true;
+        world_.note_outcome(a.op, json);
         if (!speaks_of(json, a.op)) {
             complain(rule::replies_match, a, "got the answer " + std::string{json.substr(0, 80)});
         }
@@ -347,9 +348,11 @@ class asking final : public part {
     void on_failure(asked& a, errc code, std::string_view message) {
         world_.watcher().saw(world::name_of(a.from), "has no answer", message);
         on_end(a);
+        world_.note_outcome(a.op, "error " + std::to_string(static_cast<int>(code)));
         const bool may_be = code == errc::deadline || code == errc::unavailable || code == errc::busy ||
                             code == errc::too_large || (code == errc::cancelled && a.withdrawn) ||
                             (code == errc::failed && a.what == work && a.end == fails) ||
+                            (code == errc::denied && world_.secured() && !a.vital) ||
                             // Not known yet, or another node of that name, which offers nothing.
                             (a.by == carrier::name && (code == errc::no_target || code == errc::no_task));
         if (!may_be) {
@@ -363,6 +366,9 @@ class asking final : public part {
         }
         if (code == errc::unavailable && a.by != carrier::datagram && is_answered_by_leaver(a)) {
             complain(rule::replies_match, a, "was lost though it ran at a node that left in order");
+        }
+        if (code == errc::denied && a.by != carrier::datagram && has_run(a)) {
+            complain(rule::replies_match, a, "was denied and ran all the same");
         }
         // A copy of a datagram may run once there is capacity again.
         if (code == errc::busy && a.by != carrier::datagram && tasks[a.what].has_effect && has_run(a)) {

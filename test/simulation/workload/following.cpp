@@ -207,7 +207,7 @@ class following final : public part {
         const auto path = path_of(a["noun"]);
         add(*n, follow_by_link(*n, a["feed"], target, path,
                                {.noun = target + ":" + path,
-                                .at = url_of(a["to"], a["by"] == 0 ? carrier::stream : carrier::datagram),
+                                .at = n->address_for(a["to"], a["by"] == 0 ? carrier::stream : carrier::datagram),
                                 .every_ms = a["every"],
                                 .keep = a["keep"]},
                                milliseconds{a["slow"]}));

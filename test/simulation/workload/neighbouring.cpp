@@ -28,8 +28,6 @@ std::string run_text(std::string_view node, std::uint32_t epoch) {
     return std::string{node} + " (" + protocol::epoch_text(epoch) + ")";
 }
 
-std::string listener_of(unsigned host) { return url_of(host, carrier::stream); }
-
 class neighbouring final : public part {
   public:
     explicit neighbouring(world& in) noexcept : world_(in) {}
@@ -40,7 +38,7 @@ class neighbouring final : public part {
     }
 
     void perform(const action& a) override {
-        if (a.what == deed::namesake && world_.has_group()) {
+        if (a.what == deed::namesake && world_.has_group() && !world_.secured()) {
             begin_namesake(a["host"]);
             world_.time().at(world_.time().now() + milliseconds{a["for"]},
                              [this, host = a["host"], silently = a["silent"] != 0] { end_namesake(host, silently); });
@@ -133,7 +131,9 @@ class neighbouring final : public part {
         while (!namesakes_.empty()) {
             end_namesake(namesakes_.begin()->first, true);
         }
-        world_.time().at(world_.time().now() + until_all_know, [this] { expect_all_known("soon"); });
+        // With security, all need the newest roster first.
+        const auto soon = world_.secured() ? 2 * until_all_know : until_all_know;
+        world_.time().at(world_.time().now() + soon, [this] { expect_all_known("soon"); });
     }
 
     void probe() override {
@@ -143,6 +143,9 @@ class neighbouring final : public part {
         expect_all_known("for long");
         for (auto& [n, mine] : accounts_) {
             mine.clashes.clear();
+        }
+        if (world_.secured()) { // a name belongs to a key
+            return;
         }
         begin_namesake(0);
         world_.time().at(world_.time().now() + namesake_lives, [this] {
@@ -310,7 +313,8 @@ class neighbouring final : public part {
                     complain(rule::others_known, n,
                              "does not " + std::string{when} + " know " + name + " as it is" +
                                  (known ? ", but as " + run_text(name, known->epoch) : std::string{}));
-                } else if (known->where != listener_of(other) || others.address_of(name) != listener_of(other)) {
+                } else if (known->where != world_.net().url_of(other, carrier::stream) ||
+                           others.address_of(name) != known->where) {
                     complain(rule::others_known, n, "takes " + name + " to be at " + std::string{known->where});
                 }
             }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <cles/identity.hpp>
+
 #include "node/membership/membership.hpp"
 #include "port/group_port.hpp"
 #include "simulation/world/plan.hpp"
@@ -11,6 +13,7 @@
 namespace cles::simulation {
 
 class node_run;
+class simulated_security;
 class world;
 
 /// A part of the workload: performs one kind of activity and checks its rules. To add an activity, add an action
@@ -24,6 +27,8 @@ class part {
 
     /// Performs the action, if it is one of this part's.
     virtual void perform(const action& what) = 0;
+    /// The faults are about to end.
+    virtual void on_mending() {}
     /// A node has started: registers what it offers.
     virtual void on_start(node_run&) {}
     /// A node is about to leave with notice.
@@ -33,6 +38,13 @@ class part {
     /// A node is about to receive a datagram of the multicast group, or to send one.
     virtual void on_group_heard(node_run&, const core::group_source&, std::string_view) {}
     virtual void on_group_sent(node_run&, std::string_view) {}
+    /// With security: a node is about to serve a request.
+    virtual void on_request(node_run&, const access&) {}
+    /// With security: a line leaves for a peer (of streams, updates only), or has arrived from one by datagram.
+    virtual void on_link_sends(node_run&, const identity&, std::string_view) {}
+    virtual void on_link_receives(node_run&, const identity&, std::string_view) {}
+    /// With security: the group port delivers or sends a line for which each copy counts.
+    virtual void on_group_accepted(node_run&, std::string_view /*member*/, std::string_view) {}
     /// A node reports that the state of another one has changed.
     virtual void on_neighbour(node_run&, std::string_view, core::membership::change) {}
     /// The faults have just ended.
@@ -40,6 +52,8 @@ class part {
     /// The faults ended a while ago: tries what has to work again; the result is checked later.
     virtual void probe() {}
     virtual void judge_probe() {}
+    /// All is well: restarts a node, and checks soon how long that takes.
+    virtual void reboot() {}
     /// Ends all activity that continues by itself.
     virtual void wind_down() {}
     /// There has been no activity for long.
@@ -58,6 +72,15 @@ std::unique_ptr<part> make_following(world& in);
 /// Clients such as netcat on streams whose requests have no id, and which therefore rely on the order of replies. They
 /// send faster than replies arrive, make mistakes, read slowly, and end their links in every possible way.
 std::unique_ptr<part> make_talking(world& in);
+
+/// Security: the roster changes, and nodes do not receive it at the same time; somebody forges and repeats datagrams,
+/// and opens links. Checks what may never happen then.
+class securing : public part {
+  public:
+    /// What a new node of that host uses; null if it cannot start, because its roster does not contain it.
+    virtual std::shared_ptr<simulated_security> equip(unsigned host) = 0;
+};
+std::unique_ptr<securing> make_securing(world& in);
 
 /// Membership: nodes announce themselves to the group, leave it with or without notice, restart, and some use another
 /// node's name. What each node has received is recorded, to check its conclusions.

@@ -50,6 +50,22 @@ class planner {
     }
 
     std::uint32_t next_request() noexcept { return ++op_; }
+    /// The roster changes, often while hosts cannot reach each other, and somebody attacks.
+    void add_security(std::uint32_t until) {
+        for (auto count = chance_.between(1, 10); count != 0; --count) {
+            at_ = chance_.below(until + 1);
+            const auto a = host();
+            const auto b = other(a);
+            put(deed::roster, {chance_.below(6), a, b});
+            if (chance_.chance(500)) {
+                put(deed::part, {a, b, chance_.between(100, 4000)});
+            }
+        }
+        for (auto count = chance_.between(5, 30); count != 0; --count) {
+            at_ = chance_.below(until + 1);
+            put(deed::attack, {chance_.below(8), host(), chance_.between(1, 40)});
+        }
+    }
 
   private:
     void put(deed what, std::initializer_list<std::uint32_t> numbers) {
@@ -130,7 +146,7 @@ class planner {
 
 } // namespace
 
-plan make_plan(std::uint64_t seed, unsigned actions) {
+plan make_plan(std::uint64_t seed, unsigned actions, bool secured) {
     dice chance{seed * 2 + 1};
     plan p{.seed = seed,
            .hosts = chance.between(2, 4),
@@ -139,7 +155,8 @@ plan make_plan(std::uint64_t seed, unsigned actions) {
     auto pace = chance.chance(500) ? chance.between(2, 20) : chance.between(20, 150);
     // A separate generator, so that the other plans do not depend on it.
     dice group{~seed};
-    p.group = group.chance(250);
+    p.group = group.chance(secured ? 500 : 250);
+    p.secured = secured;
     if (p.group) { // membership changes take seconds
         pace = group.between(20, 150);
     }
@@ -172,6 +189,10 @@ plan make_plan(std::uint64_t seed, unsigned actions) {
                                  .numbers = {think.next_request(), from, leaver, departing.chance(250) ? 2U : 0U,
                                              departing.below(7), 6000, departing.below(200), departing.below(300)}});
         }
+    }
+    if (secured) {
+        dice attacking{seed * 13 + 9};
+        planner{attacking, p}.add_security(at);
     }
     return p;
 }

@@ -54,10 +54,17 @@ detail::pending_ptr when_ended(std::function<void(std::string_view json)> succee
 
 node_run::node_run(network& net, unsigned host, unsigned run, std::string name, options how)
     : place(net.time(), host, std::move(name)), net_(net), run_(run), judge_(how.judge),
+      security_(std::move(how.security)),
       environment_(std::make_shared<virtual_environment>(net, *this, how.seed, how.strangers)),
       local_(std::make_shared<core::local_node>(
           environment_,
-          core::local_node_options{.node = {.name = this->name(), .bounds = how.bounds, .load = std::move(how.load)},
+          core::local_node_options{.node = {.name = this->name(),
+                                            .bounds = how.bounds,
+                                            .authorise = security_ ? reporter() : authoriser{},
+                                            .security = security_,
+                                            .secured = security_ ? security_->maker_of_protocol() : nullptr,
+                                            .load = std::move(how.load)},
+                                   .peers = std::move(how.peers),
                                    .insecure = true,
                                    .multicast = {.interface = how.multicast ? "net0" : ""},
                                    .routing = how.routing})),
@@ -69,7 +76,7 @@ node_run::~node_run() { crash(); }
 
 void node_run::start() {
     started_ = now();
-    run([this] { local_->start({url_of(host(), carrier::stream), url_of(host(), carrier::datagram)}); });
+    run([this] { local_->start({net_.url_of(host(), carrier::stream), net_.url_of(host(), carrier::datagram)}); });
     if (fault() == planted::names_given_up) {
         constexpr std::chrono::milliseconds soon{1};
         later(soon, [this] { environment_->run_timer_as_if(now() + core::discovery_grace::length); });
@@ -97,15 +104,42 @@ void node_run::fall_silent() {
     local_->discovery().leave();
 }
 
+// With security, datagrams are for a name, whose address is known here.
+std::string node_run::address_for(unsigned to, carrier by) const {
+    const bool by_name = by == carrier::name || (by == carrier::datagram && net_.secured());
+    return by_name ? std::string{} : net_.url_of(to, by);
+}
+
 std::uint64_t node_run::ask(unsigned to, carrier by, const request_order& what, detail::pending_ptr operation,
                             core::outbound::progress_function progress) {
     return local_->send(what.verb, what.noun, what.body,
                         call_options{}
                             .deadline(what.deadline)
-                            .at(by == carrier::name ? "" : url_of(to, by))
+                            .at(address_for(to, by))
                             .urgent(by == carrier::urgent)
                             .on_progress(std::move(progress)),
                         std::move(operation));
+}
+
+authoriser node_run::reporter() {
+    return [this](const access& what) {
+        if (judge_ != nullptr) {
+            judge_->on_request(*this, what);
+        }
+        return true;
+    };
+}
+
+void node_run::on_link_sends(const identity& to, std::string_view line) {
+    if (judge_ != nullptr) {
+        judge_->on_link_sends(*this, to, line);
+    }
+}
+
+void node_run::on_link_receives(const identity& from, std::string_view line) {
+    if (judge_ != nullptr) {
+        judge_->on_link_receives(*this, from, line);
+    }
 }
 
 void node_run::on_peer(std::string_view node, core::membership::change what, std::string_view where) {
@@ -162,7 +196,7 @@ void node_run::check_rest() {
         }
     };
     auto& n = *node();
-    expect_none(n.deadlines.size(), "deadlines");
+    expect_none(n.deadlines.size() - (security_ ? 1 : 0), "deadlines"); // security looks at its files
     expect_none(n.remembered.used, "bytes remembered");
     expect_none(n.kept_requests->used(), "bytes of requests that wait for a link");
     expect_none(n.counts.handlers_running, "handlers that run");

@@ -8,6 +8,7 @@
 #include "node/local_node.hpp"
 #include "node/membership/membership.hpp"
 #include "node/session/outbound.hpp"
+#include "simulation/network/link_security.hpp"
 #include "simulation/network/network.hpp"
 #include "simulation/network/place.hpp"
 #include "simulation/network/virtual_environment.hpp"
@@ -15,6 +16,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -46,6 +48,9 @@ class node_run final : public place, private core::membership::watcher {
         part* judge = nullptr;  ///< checks its membership reports; null: none
         std::function<node_load()> load{};
         const detail::routing_part* routing = nullptr;
+        std::shared_ptr<simulated_security> security{}; ///< null: none
+        /// Where others are, by name.
+        std::map<std::string, std::string> peers{};
     };
 
     node_run(network& net, unsigned host, unsigned run, std::string name, options how);
@@ -57,6 +62,10 @@ class node_run final : public place, private core::membership::watcher {
     void stop();
     /// Ends the process at once: the system closes its sockets.
     void crash();
+
+    [[nodiscard]] simulated_security* security() noexcept override { return security_.get(); }
+    void on_link_sends(const identity& to, std::string_view line) override;
+    void on_link_receives(const identity& from, std::string_view line) override;
 
     [[nodiscard]] core::node_state* node() noexcept { return &local_->node(); }
     [[nodiscard]] core::local_node& local() noexcept { return *local_; }
@@ -74,6 +83,8 @@ class node_run final : public place, private core::membership::watcher {
     /// Stops announcing itself, and its farewell is not received.
     void fall_silent();
 
+    /// The URL at which that node is asked; empty: it is known by its name.
+    [[nodiscard]] std::string address_for(unsigned to, carrier by) const;
     /// Sends a request to the node of a host, independently of the name in the noun.
     std::uint64_t ask(unsigned to, carrier by, const request_order& what, detail::pending_ptr operation,
                       core::outbound::progress_function progress = {});
@@ -86,12 +97,14 @@ class node_run final : public place, private core::membership::watcher {
 
   private:
     void after_jump() override { environment_->on_jump(); }
+    [[nodiscard]] authoriser reporter();
     void on_peer(std::string_view node, core::membership::change what, std::string_view where) override;
     void complain(rule which, const std::string& what) { watcher().broken(which, name() + ": " + what); }
 
     network& net_;
     unsigned run_;
     part* judge_;
+    std::shared_ptr<simulated_security> security_;
     std::shared_ptr<virtual_environment> environment_;
     std::shared_ptr<core::local_node> local_;
     core::membership::watcher& told_; // the node's own watcher

@@ -19,7 +19,7 @@ struct kind {
 };
 
 // In the order of `deed`. Times and durations in milliseconds, sizes in bytes, probabilities per mille.
-constexpr std::array<kind, 19> kinds{{
+constexpr std::array<kind, 21> kinds{{
     {"ask", 10, {"op", "from", "to", "by", "what", "deadline", "size", "work", "steps", "end"}},
     {"cancel", 1, {"op"}},
     {"follow", 8, {"feed", "from", "to", "by", "noun", "every", "keep", "slow"}},
@@ -39,6 +39,8 @@ constexpr std::array<kind, 19> kinds{{
     {"mute", 3, {"from", "to", "for"}},
     {"jump", 2, {"host", "ahead"}},
     {"retire", 3, {"host", "limit", "down"}},
+    {"roster", 3, {"what", "host", "other"}},
+    {"attack", 3, {"what", "host", "count"}},
 }};
 
 const kind& kind_of(deed what) noexcept { return kinds[static_cast<std::size_t>(what)]; }
@@ -100,7 +102,7 @@ std::uint32_t action::operator[](std::string_view field) const {
 std::string to_text(const plan& p) {
     std::string text = "seed " + std::to_string(p.seed) + "\nhosts " + std::to_string(p.hosts) + "\nlimits " +
                        (p.small_limits ? "small" : "default") + "\nstrangers " + (p.strangers ? "yes" : "no") +
-                       "\ngroup " + (p.group ? "yes" : "no") + "\n";
+                       "\ngroup " + (p.group ? "yes" : "no") + "\nsecured " + (p.secured ? "yes" : "no") + "\n";
     for (const auto& a : p.actions) {
         text.append(std::to_string(a.at_ms)).append(" ").append(to_string(a.what));
         for (std::size_t i = 0; i < fields_of(a.what).size(); ++i) {
@@ -133,6 +135,8 @@ plan plan_from(std::string_view text) {
                 p.strangers = rest == "yes";
             } else if (first == "group") {
                 p.group = rest == "yes";
+            } else if (first == "secured") {
+                p.secured = rest == "yes";
             } else {
                 p.actions.push_back(action_from(first, rest));
             }

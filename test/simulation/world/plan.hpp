@@ -32,6 +32,8 @@ enum class deed : std::uint8_t {
     mute,
     jump,
     retire,
+    roster,
+    attack,
 };
 
 /// The numbers of an action, by name.
@@ -58,6 +60,7 @@ struct plan {
     bool small_limits = true; ///< so that they are reached
     bool strangers = false;   ///< output to sources of datagrams is limited
     bool group = false;       ///< nodes take part in multicast
+    bool secured = false;     ///< nodes are members of a fleet
     std::vector<action> actions{};
 
     bool operator==(const plan&) const = default;
@@ -70,7 +73,7 @@ plan plan_from(std::string_view text);
 /// \throws std::runtime_error the same, or if the file cannot be read
 plan plan_in_file(const std::string& path);
 
-/// Makes the plan of a seed, with this number of actions.
-plan make_plan(std::uint64_t seed, unsigned actions);
+/// Makes the plan of a seed, with this number of actions; with security, there are some more.
+plan make_plan(std::uint64_t seed, unsigned actions, bool secured = false);
 
 } // namespace cles::simulation

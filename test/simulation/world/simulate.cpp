@@ -77,6 +77,9 @@ class shrinking {
     }
     // No node sends requests to itself or binds its own nouns.
     static bool is_sound(const action& a) {
+        if (a.what == deed::roster) {
+            return a["host"] != a["other"];
+        }
         const bool between_two = a.what == deed::ask || a.what == deed::follow || a.what == deed::mute ||
                                  (a.what == deed::gather && a["all"] == 0);
         return !between_two || a["from"] != a["to"];
@@ -90,7 +93,7 @@ class shrinking {
                 const auto fields = fields_of(a.what);
                 for (std::size_t f = 0; f < fields.size(); ++f) {
                     const bool is_host = fields[f] == "from" || fields[f] == "to" || fields[f] == "host" ||
-                                         (a.what == deed::part && f < 2);
+                                         fields[f] == "other" || (a.what == deed::part && f < 2);
                     if (is_host && a.numbers[f] >= p.hosts) {
                         return true;
                     }

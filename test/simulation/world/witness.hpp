@@ -33,9 +33,16 @@ BOOST_DEFINE_FIXED_ENUM_CLASS(rule, std::uint8_t,
                               nobody_lost,   ///< a node received lately is not considered silent, gone, or another one
                               gone_in_time,  ///< a silent node is suspect and gone in time; one that leaves, at once
                               clashes_told,  ///< a second live node of a name is reported, and does not get the name
-                              sent_once,     ///< the group gets each update once, and again only for a new subscriber
-                              first_soon,    ///< a new subscriber in the group soon receives the last update
-                              same_trace);   ///< a seed always produces the same trace
+                              authentic,     ///< with security, only what a member has sent is delivered, and once
+                              removed_unserved, ///< nobody is served who is not in the roster
+                              rights_hold,      ///< nobody is served, or sent an update, without the right to it
+                              rosters_spread,   ///< after the faults have ended, all nodes soon have the newest roster
+                              rosters_advance,  ///< a node never returns to an older roster
+                              back_soon,        ///< a node that has restarted is soon asked and received again
+                              nonces_differ,    ///< no two datagrams are sealed with the same nonce and key
+                              sent_once,   ///< the group gets each update once, and again only for a new subscriber
+                              first_soon,  ///< a new subscriber in the group soon receives the last update
+                              same_trace); ///< a seed always produces the same trace
 
 inline std::string_view to_string(rule r) noexcept { return boost::describe::enum_to_string(r, ""); }
 

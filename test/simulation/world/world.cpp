@@ -2,6 +2,8 @@
 #include "simulation/world/world.hpp"
 
 #include <algorithm>
+#include <map>
+#include <stdexcept>
 #include <utility>
 
 namespace cles::simulation {
@@ -12,11 +14,12 @@ using std::chrono::seconds;
 
 constexpr seconds memory_of_datagrams{75}; // and a margin: then remembered datagrams are forgotten
 constexpr seconds probing{10};
+constexpr seconds rebooting{4};
 constexpr seconds quiet{300};
 
-limits small_limits() {
+limits small_limits(bool secured) {
     limits bounds;
-    bounds.line = 2048;
+    bounds.line = secured ? 4096 : 2048; // longer than a roster
     bounds.links = 64;
     bounds.in_flight = 24;
     bounds.bindings = 8;
@@ -47,25 +50,60 @@ bool report::broke(rule which) const noexcept {
 world::world(const plan& what, planted fault, witness::reader reader)
     : node_hosts(what.seed + leak(fault), fault), plan_(what), runs_(what.hosts) {
     watcher_.read_by(std::move(reader));
-    for (const auto make_part : {make_asking, make_following, make_talking, make_neighbouring}) {
+    for (const auto make_part : {make_asking, make_following, make_neighbouring}) {
         parts_.push_back(make_part(*this));
     }
+    if (!plan_.secured) { // clients without a key get no answer
+        parts_.insert(parts_.begin() + 2, make_talking(*this));
+        return;
+    }
+#if CLES_SIMULATION_SECURED
+    net_.secure();
+    auto made = make_securing(*this);
+    securing_ = made.get();
+    parts_.push_back(std::move(made));
+#else
+    throw std::runtime_error{"this simulation is built without security"};
+#endif
 }
 
 world::~world() { end_all(); }
 
 std::shared_ptr<node_run> world::make(const std::string& name, unsigned host, unsigned run) {
-    return std::make_shared<node_run>(net_, host, run, name,
-                                      node_run::options{.seed = chance_.next(),
-                                                        .bounds = plan_.small_limits ? small_limits() : limits{},
-                                                        .strangers = plan_.strangers,
-                                                        .multicast = plan_.group,
-                                                        .judge = this});
+    std::shared_ptr<simulated_security> security;
+    std::map<std::string, std::string> peers;
+    if (securing_ != nullptr) {
+        security = securing_->equip(host);
+        if (!security) {
+            return nullptr;
+        }
+        for (unsigned other = 0; other < hosts(); ++other) {
+            peers.emplace(name_of(other), net_.url_of(other, carrier::datagram));
+        }
+    }
+    return std::make_shared<node_run>(
+        net_, host, run, name,
+        node_run::options{.seed = chance_.next(),
+                          .bounds = plan_.small_limits ? small_limits(plan_.secured) : limits{},
+                          .strangers = plan_.strangers,
+                          .multicast = plan_.group,
+                          .judge = this,
+                          .security = std::move(security),
+                          .peers = std::move(peers)});
 }
 
 void world::start(unsigned host) {
-    const auto run = ++runs_[host];
-    nodes_[host] = make(name_of(host), host, run);
+    nodes_[host] = make(name_of(host), host, runs_[host] + 1);
+    if (nodes_[host] == nullptr) {
+        constexpr milliseconds until_next_try{500};
+        time_.at(time_.now() + until_next_try, [this, host] {
+            if (node(host) == nullptr) {
+                start(host);
+            }
+        });
+        return;
+    }
+    ++runs_[host];
     auto& n = *nodes_[host];
     watcher_.saw(n.name(), "starts", n.node()->epoch);
     n.start();
@@ -169,6 +207,20 @@ void world::on_group_heard(node_run& at, const core::group_source& from, std::st
 
 void world::on_group_sent(node_run& by, std::string_view line) { each(&part::on_group_sent, by, line); }
 
+void world::on_request(node_run& at, const access& what) { each(&part::on_request, at, what); }
+
+void world::on_link_sends(node_run& by, const identity& to, std::string_view line) {
+    each(&part::on_link_sends, by, to, line);
+}
+
+void world::on_link_receives(node_run& at, const identity& from, std::string_view line) {
+    each(&part::on_link_receives, at, from, line);
+}
+
+void world::on_group_accepted(node_run& at, std::string_view member, std::string_view line) {
+    each(&part::on_group_accepted, at, member, line);
+}
+
 void world::on_neighbour(node_run& at, std::string_view node, core::membership::change what) {
     each(&part::on_neighbour, at, node, what);
 }
@@ -200,12 +252,17 @@ report world::live() {
     time_.run_until(last + milliseconds{1});
     report_.node_seconds = std::chrono::duration<double>(time_.now() - begun).count() * hosts();
     watcher_.saw("world", "the trouble is over");
+    each(&part::on_mending);
     end_trouble();
     each(&part::on_calm);
     pass(memory_of_datagrams);
     each(&part::probe);
     pass(probing);
     each(&part::judge_probe);
+    if (secured()) {
+        each(&part::reboot);
+        pass(rebooting);
+    }
     each(&part::wind_down);
     pass(quiet);
     each(&part::judge_rest);

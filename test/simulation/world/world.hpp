@@ -25,9 +25,10 @@ struct report {
     std::uint64_t steps = 0;
     std::uint64_t datagrams = 0;
     std::uint64_t stream_bytes = 0;
-    std::uint64_t requests = 0; ///< served by nodes
-    std::uint64_t updates = 0;  ///< received by feeds
-    double node_seconds = 0;    ///< simulated while something was planned
+    std::uint64_t requests = 0;                    ///< served by nodes
+    std::uint64_t updates = 0;                     ///< received by feeds
+    double node_seconds = 0;                       ///< simulated while something was planned
+    std::map<std::uint32_t, std::string> outcomes; ///< of the requests between nodes, by number: what they ended with
 
     [[nodiscard]] bool broke(rule which) const noexcept;
 };
@@ -56,6 +57,11 @@ class world final : public node_hosts, private part {
     std::shared_ptr<node_run> begin_namesake(const std::string& name, unsigned host, unsigned run);
     void end_run(node_run& n) override;
     [[nodiscard]] bool has_group() const noexcept { return plan_.group; }
+    [[nodiscard]] bool secured() const noexcept { return plan_.secured; }
+    [[nodiscard]] std::uint64_t seed() const noexcept { return plan_.seed; }
+    void note_outcome(std::uint32_t op, std::string_view what) { report_.outcomes.insert_or_assign(op, what); }
+    /// Crashes the node there, and starts another one at once.
+    void restart(unsigned host) { crash(host, std::chrono::milliseconds{1}); }
 
   private:
     template <class... Arguments>
@@ -76,12 +82,17 @@ class world final : public node_hosts, private part {
     [[nodiscard]] std::shared_ptr<node_run> make(const std::string& name, unsigned host, unsigned run);
     void on_group_heard(node_run& at, const core::group_source& from, std::string_view datagram) override;
     void on_group_sent(node_run& by, std::string_view line) override;
+    void on_request(node_run& at, const access& what) override;
+    void on_link_sends(node_run& by, const identity& to, std::string_view line) override;
+    void on_link_receives(node_run& at, const identity& from, std::string_view line) override;
+    void on_group_accepted(node_run& at, std::string_view member, std::string_view line) override;
     void on_neighbour(node_run& at, std::string_view node, core::membership::change what) override;
 
     const plan& plan_;
     std::vector<unsigned> runs_;
     std::map<unsigned, departure> departures_; // by host
     std::vector<std::unique_ptr<part>> parts_;
+    securing* securing_ = nullptr; // one of them; null without security
     report report_;
 };
 
