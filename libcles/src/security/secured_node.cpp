@@ -13,7 +13,7 @@
 
 namespace cles::security {
 
-secured_node::secured_node(const std::string& directory) : directory_(directory) {
+secured_node::secured_node(const std::string& directory) : directory_(directory), files_(file_state()) {
     auto found = directory_.read_node();
     warnings_ = std::move(found.warnings);
     fleet_ = std::make_shared<security::fleet>(found.own.name, std::move(found.own.key), std::move(found.newest));
@@ -21,7 +21,6 @@ secured_node::secured_node(const std::string& directory) : directory_(directory)
     observation_ = fleet_->observe([this](const roster&) { on_roster(); }); // links bring rosters, too
     rules_ = read_local_rules(directory_.folder());
     adopt_changes();
-    files_ = file_state();
 }
 
 secured_node::~secured_node() = default;
@@ -213,14 +212,17 @@ bool secured_node::wants_roster(std::string_view from, std::uint32_t version, ti
     return true;
 }
 
-// A node that cannot store it goes on with it, and receives it again after a restart.
+// A node that cannot store it goes on with it, and receives it again after a restart. What others have changed in the
+// directory is still to be read.
 void secured_node::store() {
+    const bool is_unchanged = file_state() == files_;
     try {
-        static_cast<void>(directory_.store_roster(fleet_->in_force()));
+        if (directory_.store_roster(fleet_->in_force()) && is_unchanged) {
+            files_ = file_state();
+        }
     } catch (const security_error& e) {
         log(log_level::error, std::string{"the roster cannot be stored: "} + e.what());
     }
-    files_ = file_state();
 }
 
 void secured_node::adopt_changes() {
