@@ -205,10 +205,17 @@ bool secured_node::wants_roster(std::string_view from, std::uint32_t version, ti
     auto at = asked_.find(from);
     if (at == asked_.end()) {
         at = asked_.emplace(std::string{from}, asked_member{}).first;
-    } else if (at->second.version >= version && now - at->second.at < ask_again_after) {
-        return false;
     }
-    at->second = {.version = version, .at = now};
+    auto& asked = at->second;
+    if (asked.version < version) {
+        asked.pause = ask_again_after;
+    } else if (now - asked.at < asked.pause) {
+        return false;
+    } else { // the link may have been lost, or it does not have that roster
+        asked.pause = std::min<std::chrono::seconds>(2 * asked.pause, longest_pause);
+    }
+    asked.version = version;
+    asked.at = now;
     return true;
 }
 

@@ -25,8 +25,9 @@ class secured_node final : public core::node_security {
   public:
     /// How often the files are looked at.
     static constexpr std::chrono::seconds check_interval{1};
-    /// How long a member that did not deliver its roster is not asked again.
-    static constexpr std::chrono::minutes ask_again_after{1};
+    /// How long a member that did not deliver its roster is not asked again: at first, and at most.
+    static constexpr std::chrono::seconds ask_again_after{1};
+    static constexpr std::chrono::minutes longest_pause{1};
     static constexpr std::chrono::minutes log_again_after{1};
 
     /// \throws security_error
@@ -76,6 +77,7 @@ class secured_node final : public core::node_security {
     struct asked_member {
         std::uint32_t version = 0;
         time_point at{};
+        std::chrono::seconds pause{};
     };
 
     void on_roster();
