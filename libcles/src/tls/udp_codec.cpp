@@ -106,10 +106,14 @@ bool udp_codec::holds(const datagram_source& which) const {
     return owner_ != nullptr && owner_->holds(origin_of(which));
 }
 
+// If this node is another member now, the others have forgotten what it sent: it must not send that again.
 void udp_codec::on_roster(const security::roster& before) {
+    const auto* const self = fleet_->self();
+    const auto* const self_before = before.find(fleet_->own_key().public_part());
+    const bool is_another = self == nullptr || self_before == nullptr || !self->is(*self_before);
     for (const auto& member : before.members()) {
         const auto* const now = fleet_->in_force().find(member.number);
-        if (owner_ != nullptr && (now == nullptr || !now->is(member))) {
+        if (owner_ != nullptr && (is_another || now == nullptr || !now->is(member))) {
             owner_->on_removed(member.number);
         }
     }
