@@ -154,7 +154,11 @@ void connections::on_security_changed() {
             host_.post_log(log_level::info, peer.name + " is no longer a member of the fleet: closed its link",
                            peer.address);
             c->abandon(peer.name + " is no longer a member of the fleet");
-        } else if (!c->session().serving().are_bindings_permitted()) {
+        } else if (auto& serving = c->session().serving(); !serving.are_bindings_permitted()) {
+            if (c->datagram() != 0) { // the peer would not notice, and copies of its requests would run again
+                serving.drop_bindings();
+                continue;
+            }
             host_.post_log(log_level::info, peer.name + " may no longer bind what it has bound: closed its link",
                            peer.address);
             c->close();
