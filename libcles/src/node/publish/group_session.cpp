@@ -97,7 +97,9 @@ bool group_session::on_bind(const group_datagram& datagram, const protocol::requ
 bool group_session::bind_noun(const group_datagram& datagram, const protocol::request_line& bind, time_point now) {
     const auto& from = datagram.from;
     const auto peer = identity_of(datagram);
-    if (!allows(*node_, peer, bind)) {
+    // `allows` leaves the target `all` to the nodes that are asked.
+    if (!permits(*node_, requester_of(*node_, peer, bind), node_->name, verb::bind, bind.noun) ||
+        !allows(*node_, peer, bind)) {
         return false;
     }
     if (bind.unbinds()) {
