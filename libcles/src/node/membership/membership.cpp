@@ -221,10 +221,11 @@ membership::verdict membership::take_sighting(const sighting& w, time_point now)
     return verdict::taken;
 }
 
-// Whether it was announced before that incarnation ended, or may have been.
+// Whether it was announced before that incarnation ended, or may have been. In the group, each announcement has a `seq`
+// of its own, so one that is repeated there does not bring an incarnation back.
 bool membership::is_of_ended(const sighting& w) const noexcept {
-    return w.is_signed() ? ended_.covers_signed(w.announced.node, w.epoch, w.seq, w.announced_at)
-                         : ended_.covers(w.announced.node, w.epoch, w.seq);
+    return w.is_signed() && w.is_from_gossip() ? ended_.covers_signed(w.announced.node, w.epoch, w.seq, w.announced_at)
+                                               : ended_.covers(w.announced.node, w.epoch, w.seq);
 }
 
 membership::verdict membership::take_owner_sighting(entries::iterator at, const sighting& w, time_point now) {
