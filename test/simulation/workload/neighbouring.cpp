@@ -62,8 +62,14 @@ class neighbouring final : public part {
         if (datagram.ends_with('\n')) {
             datagram.remove_suffix(1);
         }
-        if (!protocol::parse_request(datagram, update, ignored) || !update.is_update() || update.noun.task != "cles" ||
-            !read_announcement(update, said, why)) {
+        if (!protocol::parse_request(datagram, update, ignored) || !update.is_update() || update.noun.task != "cles") {
+            return;
+        }
+        if (update.noun.path == core::load_path) {
+            on_load_heard(at, update);
+            return;
+        }
+        if (!read_announcement(update, said, why)) {
             return;
         }
         auto& r = accounts_[&at].runs[*update.epoch];
@@ -201,6 +207,7 @@ class neighbouring final : public part {
         std::string node;
         std::uint64_t seq = 0;
         time_point at{};
+        time_point reported{}; ///< its load, perhaps by somebody who has repeated it
         milliseconds interval{0};
         bool left = false; ///< announced that it leaves, and was listed then
     };
@@ -231,6 +238,16 @@ class neighbouring final : public part {
             n.stop();
         }
         world_.end_run(n);
+    }
+
+    // A sign of life, unless it is a copy.
+    void on_load_heard(node_run& at, const protocol::request_line& report) {
+        auto& runs = accounts_[&at].runs;
+        const auto found = runs.find(*report.epoch);
+        if (found != runs.end() && found->second.node == report.noun.target && *report.seq >= found->second.seq &&
+            !found->second.left) {
+            found->second.reported = at.now();
+        }
     }
 
     // -- checks ----------------------------------------------------------------------------------------------------
@@ -288,7 +305,7 @@ class neighbouring final : public part {
             return;
         }
         const auto& r = found->second;
-        const auto since = std::max(r.at, n.thawed_at());
+        const auto since = std::max({r.at, r.reported, n.thawed_at()});
         if (r.left) {
             complain(rule::gone_in_time, n, "lists " + who + ", who has left");
         } else if (n.now() > since + until_gone(r.interval) + slack) {
