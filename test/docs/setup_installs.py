@@ -35,7 +35,9 @@ def programs_in(command: str) -> list[str]:
             skip = True
         elif skip:
             skip = False
-        elif first and not re.match(r"\w+=", word):
+        elif first and word in ("for", "done"):
+            first = False
+        elif first and word != "do" and not re.match(r"\w+=", word):
             found.append(word)
             first = False
     return found
