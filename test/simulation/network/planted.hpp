@@ -56,7 +56,7 @@ BOOST_DEFINE_FIXED_ENUM_CLASS(planted, std::uint8_t,
                               stranger_admitted,  ///< a stream is opened to whoever states a member's name
                               removed_served,     ///< links to a removed member go on
                               rights_ignored,     ///< a node permits everything
-                              roster_ignored,     ///< a node neither asks for rosters nor takes them
+                              roster_withheld,    ///< the newest roster is given to no node
                               roster_rolled_back, ///< a node that restarts has an old roster
                               welcome_late,       ///< handshakes over datagrams take long
                               salt_repeated);     ///< a node that restarts draws the same random numbers

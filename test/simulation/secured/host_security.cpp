@@ -152,10 +152,6 @@ std::shared_ptr<core::group_port> host_security::seal(std::shared_ptr<core::grou
         fault_);
 }
 
-std::optional<std::string> host_security::offer_roster(std::string_view line) {
-    return fault_ == planted::roster_ignored ? std::nullopt : real_.offer_roster(line);
-}
-
 std::unique_ptr<stream_gate> host_security::make_gate(std::string_view expected) {
     const bool admits = fault_ == planted::stranger_admitted && expected.empty();
     return std::make_unique<link_gate>(terms_, expected, fault_, admits ? fleet().name() : std::string{});

@@ -56,9 +56,9 @@ class host_security final : public simulated_security {
     [[nodiscard]] std::uint64_t unsealed_datagrams() const override { return real_.unsealed_datagrams(); }
     [[nodiscard]] std::uint32_t roster_version() const override { return real_.roster_version(); }
     [[nodiscard]] const std::string& roster_line() const override { return real_.roster_line(); }
-    std::optional<std::string> offer_roster(std::string_view line) override;
+    std::optional<std::string> offer_roster(std::string_view line) override { return real_.offer_roster(line); }
     bool wants_roster(std::string_view from, std::uint32_t version, time_point now) override {
-        return fault_ != planted::roster_ignored && real_.wants_roster(from, version, now);
+        return real_.wants_roster(from, version, now);
     }
 
     [[nodiscard]] protocol_maker maker_of_protocol() const override;

@@ -93,7 +93,9 @@ class securing_part final : public securing {
         fleet_.restore();
         world_.watcher().saw("fleet", "is restored in version", std::to_string(fleet_.newest().version()));
         given_ = chance_.below(world_.hosts());
-        fleet_.give(given_);
+        if (world_.fault() != planted::roster_withheld) {
+            fleet_.give(given_);
+        }
     }
 
     void on_calm() override {
