@@ -194,7 +194,7 @@ boost::asio::awaitable<T> reply_coroutine<T, Options>::run(service& from, reques
     reply_value<T> value;
     const call_options& chosen = options;
     awaited_request request{from, {kind, noun.view(), body}, chosen, value.target(chosen.diagnostics_)};
-    co_await std::move(request);
+    co_await std::move(request); // NOLINT(performance-move-const-arg): Asio awaits rvalues
     co_return std::move(value.get());
 }
 
