@@ -3,6 +3,7 @@
 
 #ifdef CLES_SECURITY
 
+#include <cles/security/core_dumps.hpp>
 #include <cles/security/fleet_files.hpp>
 #include <cles/security/node_files.hpp>
 
@@ -63,6 +64,7 @@ void create_members(const std::string& folder, std::size_t vehicles) {
 
 laboratory_fleet::laboratory_fleet(std::size_t vehicles) : folder_(temporary_folder()) {
     try {
+        security::forbid_core_dumps();
         create_members(folder_, vehicles);
     } catch (...) {
         remove(folder_);

@@ -13,6 +13,8 @@
 #include <filesystem>
 #include <string>
 
+#include <sys/prctl.h>
+
 BOOST_AUTO_TEST_SUITE(laboratory_fleet)
 
 #ifdef CLES_SECURITY
@@ -38,6 +40,12 @@ BOOST_AUTO_TEST_CASE(each_has_its_own_key) {
         BOOST_TEST(node.version == found.version);
         BOOST_TEST(node.rights.has_value());
     }
+}
+
+BOOST_AUTO_TEST_CASE(whoever_has_all_keys_leaves_no_core_dump) {
+    BOOST_REQUIRE(::prctl(PR_SET_DUMPABLE, 1) == 0);
+    const platoon::laboratory_fleet made{1};
+    BOOST_TEST(::prctl(PR_GET_DUMPABLE) == 0);
 }
 
 BOOST_AUTO_TEST_CASE(only_this_user_can_read_it_and_it_is_removed) {
