@@ -21,8 +21,9 @@ void require(int result) {
 void forbid_core_dumps() {
     rlimit limit{};
     require(::getrlimit(RLIMIT_CORE, &limit));
-    limit.rlim_cur = 0; // a core pattern that is a pipe ignores the limit, but not the other
+    limit.rlim_cur = 0;
     require(::setrlimit(RLIMIT_CORE, &limit));
+    // The kernel ignores this limit if the core pattern is a pipe, so the process is also made undumpable.
     require(::prctl(PR_SET_DUMPABLE, 0));
 }
 
