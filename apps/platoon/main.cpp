@@ -27,7 +27,8 @@ struct arguments {
     std::string controller = "leader", group{}, record{}, vanish{};
     std::vector<std::string> vanishes{}, joins{}, leaves{};
     bool json = false, view = false, lead = false, join = false, report = false, insecure = false, secured = false;
-    tool::keys_option keys{};
+    tool::keys_option keys{}; // of a vehicle
+    std::string fleet{};
     std::string name{}, ahead{};
     double x = 0;
     std::size_t turn = 0, turns = 1;
@@ -92,7 +93,7 @@ int run(const arguments& args) {
                                    .setup = args.setup(),
                                    .group = args.group_options(),
                                    .insecure = args.insecure,
-                                   .keys = args.secured ? "" : args.keys.given_directory(),
+                                   .keys = args.fleet,
                                    .secured = args.secured,
                                    .quiet = args.json,
                                    .in_place = !args.json && (args.view || ::isatty(STDOUT_FILENO) == 1)};
@@ -107,6 +108,7 @@ int run(const arguments& args) {
     if (!args.record.empty()) {
         platoon::check_writable(args.record); // before a drive of minutes
     }
+    ::unsetenv("CLES_KEYS"); // it would be the key of every vehicle
     const auto drive = platoon::drive(options);
     std::puts(args.json ? cles::to_json(drive).c_str() : summary_of(drive).c_str());
     std::fflush(stdout);
@@ -194,7 +196,10 @@ int main(int argc, char** argv) {
     on_road.add_option("--vanish", args.vanishes, "The process of vehicle I is killed at T")->type_name("I@T");
     on_road.add_option("--join", args.joins, "Vehicle I joins the end of the platoon at T")->type_name("I@T");
     on_road.add_option("--leave", args.leaves, "Vehicle I leaves at T")->type_name("I@T");
-    args.keys.add_optional_to(on_road, "A fleet's folder with the keys of operator, v0, v1 ...: all is sealed");
+    // Not from CLES_KEYS, which names the directory of one member.
+    on_road
+        .add_option("-k,--keys", args.fleet, "A fleet's folder with the keys of operator, v0, v1 ...: all is sealed")
+        ->type_name("DIR");
     on_road
         .add_flag("--secured", args.secured, "The same with a fleet for this drive alone, whose keys are then removed")
         ->excludes("--keys");

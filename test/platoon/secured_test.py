@@ -144,11 +144,29 @@ class Drive(Secured):
         folder = self.fleet("operator", "v0", "v1")
         found = self.drive("--vehicles", 2, "--hz", 50, "--seconds", 3, "--keys", folder)
         self.check_kept_its_distance(found, 2)
-        os.environ["CLES_KEYS"] = folder
-        self.addCleanup(os.environ.pop, "CLES_KEYS", None)
-        process = subprocess.run([PLATOON, "run", "--vehicles", "2", "--seconds", "1", "--json", "--multicast", self.group],
-                                 stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE, check=False)
-        self.assertEqual((process.returncode, process.stderr), (0, ""))
+
+    def test_the_variable_names_a_member_and_not_a_fleet(self):
+        folder = self.fleet("operator", "v0", "v1")
+        variable = {**environment(), "CLES_KEYS": f"{folder}/operator"}
+        for options, is_sealed in (([], False), (["--keys", folder], True), (["--secured"], True)):
+            group = free_group()
+            listener = Listener(group)
+            self.addCleanup(listener.close)
+            process = subprocess.run([PLATOON, "run", "--vehicles", "2", "--seconds", "1", "--json", "--multicast", group,
+                                      *options], stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                                     timeout=PATIENCE, check=False, env=variable)
+            listener.close()
+            self.assertEqual((process.returncode, process.stderr), (0, ""), options)
+            self.assertTrue(listener.heard)
+            self.assertEqual({datagram[0] >= SEALED for datagram in listener.heard}, {is_sealed}, options)
+
+    def test_a_vehicle_takes_the_key_of_the_variable(self):
+        folder = self.fleet("v0")
+        done = subprocess.run([PLATOON, "vehicle", "--lead", "--seconds", "1", "--report", "--multicast", self.group],
+                              stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=PATIENCE, check=False,
+                              env={**environment(), "CLES_KEYS": f"{folder}/v0"})
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertIn('"vehicle":"v0"', done.stdout)
 
 
 class Strangers(Secured):
