@@ -44,21 +44,24 @@ std::string keys_of(const std::string& member, const std::string& fleet) {
 
 // Checks that everybody's keys are in the folder of the fleet.
 void check_keys(const drive_options& options, const std::string& fleet) {
-    std::vector<std::string> names{operator_name};
-    for (std::size_t i = 0; i < options.vehicles; ++i) {
-        names.push_back(name_of(i));
-    }
-    std::erase_if(names, [&fleet](const auto& name) { return std::filesystem::exists(keys_of(name, fleet)); });
-    if (names.empty()) {
-        return;
-    }
+    std::string all;
     std::string missing;
-    for (const auto& name : names) {
-        missing.append(missing.empty() ? "" : ",").append(name);
+    const auto check = [&](const std::string& name) {
+        all.append(all.empty() ? "" : ",").append(name);
+        if (!std::filesystem::exists(keys_of(name, fleet))) {
+            missing.append(missing.empty() ? "" : ",").append(name);
+        }
+    };
+    check(operator_name);
+    for (std::size_t i = 0; i < options.vehicles; ++i) {
+        check(name_of(i));
     }
-    throw cles::error(cles::errc::denied, fleet + " has no keys of " + missing +
-                                              ": name the folder of a fleet, which 'cles fleet init DIR --with " +
-                                              missing + "' creates");
+    if (!missing.empty()) {
+        throw cles::error(cles::errc::denied,
+                          fleet + " has no keys of " + missing +
+                              ": name the folder of a fleet, which 'cles fleet init DIR --with " + all +
+                              "' creates; to an existing one, 'cles keys new' and 'cles fleet add' add members");
+    }
 }
 
 cles::service_options options_of(const drive_options& options, const std::string& fleet) {

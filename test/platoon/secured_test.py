@@ -244,8 +244,9 @@ class Usage(Secured):
     def test_what_is_wrong_is_said(self):
         folder = self.fleet("operator", "v0")
         for code, said, arguments in (
-                (5, f"{folder} has no keys of v1,v2: name the folder of a fleet, which 'cles fleet init DIR --with v1,v2' "
-                    "creates", ("run", "--vehicles", 3, "--keys", folder)),
+                (5, f"{folder} has no keys of v1,v2: name the folder of a fleet, which 'cles fleet init DIR --with "
+                    "operator,v0,v1,v2' creates; to an existing one, 'cles keys new' and 'cles fleet add' add members",
+                 ("run", "--vehicles", 3, "--keys", folder)),
                 (5, f"the key in {folder}/v0 is that of 'v0', and this node is 'v1'",
                  ("vehicle", "--keys", f"{folder}/v0", "--name", "v1")),
                 (5, "cannot open the folder /nowhere: No such file or directory", ("vehicle", "--keys", "/nowhere")),
