@@ -43,11 +43,19 @@ void take_name(const CLI::App& command, const std::string& keys, std::string& na
     name = known;
 }
 
+// "recon/" stands for "recon".
+std::string without_slashes_at_end(std::string path) {
+    while (path.size() > 1 && path.ends_with('/')) {
+        path.pop_back();
+    }
+    return path;
+}
+
 int run_recon(const CLI::App& command, jadc2::recon_options args, const std::string& keys) {
     if (!keys.empty()) {
         args.keys = keys;
         if (args.camera_keys.empty()) {
-            args.camera_keys = keys + "-camera";
+            args.camera_keys = without_slashes_at_end(keys) + "-camera";
             if (!std::filesystem::exists(args.camera_keys)) {
                 throw tool::usage_error("the node for satellites has a key of its own, which is not in " +
                                         args.camera_keys + ": name its directory with --camera-keys");

@@ -177,6 +177,8 @@ class Usage(unittest.TestCase):
                  ("mission", "--keys", mission, "--name", "x")),
                 (2, f"the node for satellites has a key of its own, which is not in {recon}-camera: name its directory with "
                     "--camera-keys", ("recon", "--keys", recon)),
+                (2, f"the node for satellites has a key of its own, which is not in {recon}-camera: name its directory with "
+                    "--camera-keys", ("recon", "--keys", f"{recon}//")),
                 (2, "--camera-keys: needs --keys too", ("recon", "--camera-keys", recon)),
                 (5, "cannot open the folder /nowhere: No such file or directory", ("mission", "--keys", "/nowhere")),
                 (5, "insecure_listen: 'tcp' is refused with security: use 'tls' instead of 'tcp://127.0.0.1:0'",
