@@ -191,7 +191,7 @@ BOOST_AUTO_TEST_CASE(a_host_checks_the_pin) {
     const std::string other(64, '0');
     BOOST_TEST(refusal([&] { host.load("mine.so", "{}", node, other); }) ==
                "sha256: mine.so: the SHA-256 of " + file.string() + " is " + pin +
-                   ", not the configured one: if you know why the file has changed, configure this");
+                   ", not the configured one: if you know why the file has changed, set sha256 to this");
     host.load("mine.so", "{}", node, pin);
     BOOST_TEST(node.request("PULL self:number") == R"({"value":42})");
 }

@@ -66,7 +66,7 @@ void require_pin(const std::string& path, const security::checked_file& file, co
     }
     if (found != sha256) {
         throw pin_error(path, "the SHA-256 of " + file.path() + " is " + found +
-                                  ", not the configured one: if you know why the file has changed, configure this");
+                                  ", not the configured one: if you know why the file has changed, set sha256 to this");
     }
 }
 

@@ -146,7 +146,7 @@ class PluginFiles(unittest.TestCase):
 
     def wrong_pin(self):
         return (f"the SHA-256 of {self.plugin} is {sha256_of(self.plugin)}, not the configured one: if you know why the "
-                "file has changed, configure this")
+                "file has changed, set sha256 to this")
 
     def test_the_configured_content(self):
         pin = sha256_of(self.plugin)
