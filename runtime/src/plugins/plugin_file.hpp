@@ -17,7 +17,7 @@ namespace cles::runtime {
 
 /// Which files may be loaded as plugins.
 struct plugin_rules {
-    bool secured = false; ///< with security: only from these folders, and only if no other user can change the file
+    bool secured = false; ///< with security: only from these folders and below, and only if no other user can change it
     std::vector<std::filesystem::path> folders{};
 };
 
