@@ -28,8 +28,8 @@ multicast: off
 drain: 500ms
 plugins: [{plugins}]
 """
-# What each role may request, and what others may request of it. The requests for `cles` are those by which nodes find each
-# other, and what they offer.
+# What each role may request, and what others may request of it. With PULL `cles` and `cles/peers`, nodes learn of each other
+# and of their tasks.
 FINDS = ["pull *:cles", "pull,push *:cles/peers"]
 SATELLITE = {"may": [], "offers": ["delegate,pull *:FMV_Processing", *FINDS]}
 RIGHTS = {
