@@ -222,10 +222,10 @@ bool secured_node::wants_roster(std::string_view from, std::uint32_t version, ti
 // A node that cannot store it goes on with it, and receives it again after a restart. What others have changed in the
 // directory is still to be read.
 void secured_node::store() {
-    const bool is_unchanged = file_state() == files_;
+    const bool is_unchanged = roster_state() == files_.roster;
     try {
         if (directory_.store_roster(fleet_->in_force()) && is_unchanged) {
-            files_ = file_state();
+            files_.roster = roster_state();
         }
     } catch (const security_error& e) {
         log(log_level::error, std::string{"the roster cannot be stored: "} + e.what());
@@ -241,16 +241,17 @@ void secured_node::adopt_changes() {
 
 // -- files ---------------------------------------------------------------------------------------------------------
 
-// Which files there are, and when they were changed: enough to see whether to read them.
-std::string secured_node::file_state() const {
-    std::vector<std::string> names{"rules", "roster"};
+std::string secured_node::roster_state() const { return directory_.folder().state_of({"roster"}); }
+
+secured_node::directory_state secured_node::file_state() const {
+    std::vector<std::string> names{"rules"};
     try {
         for (auto& each : directory_.folder().names_ending(".join")) {
             names.push_back(std::move(each));
         }
     } catch (const security_error&) { // reported when they are read
     }
-    return directory_.folder().state_of(names);
+    return {roster_state(), directory_.folder().state_of(names)};
 }
 
 void secured_node::check_files() {

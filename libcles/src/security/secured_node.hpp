@@ -84,7 +84,15 @@ class secured_node final : public core::node_security {
     void adopt_changes();
     void store();
     void check_files();
-    [[nodiscard]] std::string file_state() const;
+    /// Enough to see whether files are to be read: which there are, and when they were changed.
+    struct directory_state {
+        std::string roster;
+        std::string others;
+
+        bool operator==(const directory_state&) const = default;
+    };
+    [[nodiscard]] std::string roster_state() const;
+    [[nodiscard]] directory_state file_state() const;
     void report_unanswered(std::uint32_t member, const std::vector<std::string>& endpoints) const;
 
     key_directory directory_;
@@ -99,7 +107,7 @@ class secured_node final : public core::node_security {
     std::deque<refused_link> refused_;  // that were logged in the last minute
     std::shared_ptr<void> observation_; // of the fleet
     std::map<std::string, asked_member, std::less<>> asked_;
-    std::string files_; // the state of the files at the last check
+    directory_state files_; // at the last check
     time_point next_check_{};
     time_point next_datagrams_{time_point::max()};
 };

@@ -13,6 +13,8 @@
 #include <string>
 #include <string_view>
 
+#include <sys/resource.h>
+
 namespace cles::tls {
 namespace {
 
@@ -29,8 +31,9 @@ using certificate_ptr = std::unique_ptr<X509, free_certificate>;
 constexpr std::array<unsigned char, 7> application_protocol{6, 'c', 'l', 'e', 's', '/', '1'};
 constexpr long max_certificate = 8192; // bytes of what the other end sends as its certificate
 // Space for 32,768 keys: OpenSSL keeps one of each link that was accepted. Pages are locked when they are first used.
-constexpr std::size_t secure_heap = std::size_t{1} << 20U;
-constexpr std::size_t secure_heap_least = 32;
+constexpr std::size_t most_secure_heap = std::size_t{1} << 20U;
+constexpr std::size_t least_secure_heap = std::size_t{1} << 14U;
+constexpr std::size_t secure_block = 32;
 
 void require(bool succeeded, std::string_view what) {
     if (!succeeded) {
@@ -38,11 +41,23 @@ void require(bool succeeded, std::string_view what) {
     }
 }
 
+// It is locked as a whole, so it has to fit into what this process may lock.
+std::size_t secure_heap() noexcept {
+    rlimit limit{};
+    auto size = most_secure_heap;
+    if (::getrlimit(RLIMIT_MEMLOCK, &limit) == 0) {
+        while (size > least_secure_heap && size > limit.rlim_cur / 2) {
+            size /= 2;
+        }
+    }
+    return size;
+}
+
 // Private keys are on OpenSSL's secure heap, if it exists: locked, and not in core dumps.
 void prepare_secure_heap() {
     static const bool prepared = [] {
         return ::CRYPTO_secure_malloc_initialized() != 0 ||
-               ::CRYPTO_secure_malloc_init(secure_heap, secure_heap_least) != 0;
+               ::CRYPTO_secure_malloc_init(secure_heap(), secure_block) != 0;
     }();
     static_cast<void>(prepared); // without it, the key is still wiped
 }

@@ -179,7 +179,7 @@ void inproc_link::flush() {
     }
     if (peer_closed_) { // reported later: the owner may be in the middle of something
         output_.clear();
-        [[gnu::cold]] lose_later();
+        lose_later();
         return;
     }
     in_transit_ += output_.size();
@@ -336,7 +336,7 @@ void inproc_link::finish() {
     discard_input();
     post_to_peer([](inproc_link& other) { other.on_other_finished(); });
     if (ended_ || peer_closed_) {
-        [[gnu::cold]] lose_later();
+        lose_later();
     } else if (excess_in_transit() == 0) {
         wait_for_peer_close();
     }
@@ -354,7 +354,7 @@ void inproc_link::wait_for_peer_close() {
 void inproc_link::on_other_finished() {
     ended_ = true;
     if (state_ == state::finishing) {
-        [[gnu::cold]] lose_later();
+        lose_later();
     } else {
         hand_over();
     }
@@ -380,7 +380,7 @@ void inproc_link::lose() {
         return;
     }
     const auto owner = owner_;
-    [[gnu::cold]] close();
+    close();
     if (owner) {
         owner->on_lost(asio::error::eof);
     }

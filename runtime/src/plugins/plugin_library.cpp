@@ -147,7 +147,9 @@ std::string loader_message(std::string why, const std::string& opened, const plu
 
 std::shared_ptr<const boost::dll::shared_library> open_library(const std::string& path, const plugin_file& file) {
     const auto opened = file.loader_path(path);
-    file.keep_open();
+    if (file.is_checked()) {
+        file.keep_open();
+    }
     auto library = std::make_shared<boost::dll::shared_library>();
     std::error_code failed;
     library->load(opened, failed, boost::dll::load_mode::rtld_now);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/publish/bind_requests.hpp"
 
+#include <cles/error.hpp>
+
 #include "node/base/deadlines.hpp"
 #include "node/routing/router.hpp"
 #include "node/routing/subrequest.hpp"
@@ -73,13 +75,28 @@ void bind_requests::unbind(std::string_view path) {
     bound_.unbind(path);
 }
 
-bool bind_requests::are_permitted() const {
-    return std::ranges::all_of(requesters_,
-                               [&](const auto& entry) {
-                                   const auto& [path, requester] = entry;
-                                   return permits(node_, requester, node_.name, verb::bind, path);
-                               }) &&
-           (!remote_bindings_ || remote_bindings_->are_permitted(node_));
+std::vector<bind_requests::leased> bind_requests::forbidden() const {
+    std::vector<leased> found;
+    for (const auto& [path, requester] : requesters_) {
+        if (!permits(node_, requester, node_.name, verb::bind, path)) {
+            found.push_back({{}, {path}});
+        }
+    }
+    if (remote_bindings_) {
+        for (auto& [node, path] : remote_bindings_->forbidden(node_)) {
+            found.push_back({std::move(node), std::move(path)});
+        }
+    }
+    return found;
+}
+
+void bind_requests::drop_forbidden() {
+    for (const auto& which : forbidden()) {
+        if (leases_) {
+            leases_->drop(which);
+        }
+        drop(which);
+    }
 }
 
 void bind_requests::serve_remote(const protocol::request_line& r, time_point due, time_point now, inbound& from) {
@@ -189,6 +206,9 @@ void bind_requests::serve_later(const protocol::request_line& r, std::string_vie
                 return;
             }
             try {
+                if (!permits(node_, requester_of(node_, peer_, **wanted), node_.name, verb::bind, path)) {
+                    throw error(errc::denied, "the right to bind '" + path + "' was withdrawn");
+                }
                 auto& t = open(path);
                 // Bound before the reply, which may set off other requests of the peer; updates follow it later.
                 bind(t, **wanted, path, node_.time.now());

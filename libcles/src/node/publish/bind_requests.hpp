@@ -46,7 +46,9 @@ class bind_requests {
     }
     [[nodiscard]] bool empty() const noexcept { return size() == 0; }
     /// Whether all requesters may still bind what is bound for them. True without security.
-    [[nodiscard]] bool are_permitted() const;
+    [[nodiscard]] bool are_permitted() const { return forbidden().empty(); }
+    /// Ends the bindings whose requesters may no longer bind them.
+    void drop_forbidden();
 
   private:
     struct asking {
@@ -63,6 +65,7 @@ class bind_requests {
         auto operator<=>(const leased&) const = default;
     };
 
+    [[nodiscard]] std::vector<leased> forbidden() const;
     void drop(const leased& which);
     void bind(topic& t, const protocol::request_line& request, std::string_view path, time_point now);
     void unbind(std::string_view path);

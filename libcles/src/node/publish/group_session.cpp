@@ -83,25 +83,23 @@ bool group_session::on_bind(const group_datagram& datagram, const protocol::requ
     if (by_name && noun.target != node_->name) { // for another node
         return true;
     }
+    // `allows` leaves the target `all` to the nodes that are asked.
+    const auto peer = identity_of(datagram);
+    if (!permits(*node_, requester_of(*node_, peer, bind), node_->name, verb::bind, noun) ||
+        !allows(*node_, peer, bind)) {
+        return false;
+    }
     if (!solicits) {
         return !group_.is_ignored(datagram.from, now) && bind_noun(datagram, bind, now);
-    }
-    if (!allows(*node_, identity_of(datagram), bind)) {
-        return false;
     }
     group_.solicited(by_name, now);
     return true;
 }
 
-// Subject to the access rules, and to the handler for BIND if there is one.
+// Subject to the handler for BIND if there is one.
 bool group_session::bind_noun(const group_datagram& datagram, const protocol::request_line& bind, time_point now) {
     const auto& from = datagram.from;
     const auto peer = identity_of(datagram);
-    // `allows` leaves the target `all` to the nodes that are asked.
-    if (!permits(*node_, requester_of(*node_, peer, bind), node_->name, verb::bind, bind.noun) ||
-        !allows(*node_, peer, bind)) {
-        return false;
-    }
     if (bind.unbinds()) {
         withdraw(from, bind);
     } else if (is_bind_decided_later(*node_, bind)) {

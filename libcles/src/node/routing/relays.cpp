@@ -208,12 +208,19 @@ bool relayed_bindings::is_by_name(std::string_view key) const {
     return std::ranges::any_of(by_name_, [key](const named& each) { return each.key == key; });
 }
 
-bool relayed_bindings::are_permitted(const node_state& host) const {
-    return std::ranges::all_of(by_name_,
-                               [&](const named& each) {
-                                   return permits(host, each.path.requester, each.node, verb::bind, each.path.text);
-                               }) &&
-           std::ranges::all_of(all_, [](const auto& entry) { return entry.second->is_permitted(); });
+std::vector<std::pair<std::string, relayed_path>> relayed_bindings::forbidden(const node_state& host) const {
+    std::vector<std::pair<std::string, relayed_path>> found;
+    for (const auto& each : by_name_) {
+        if (!permits(host, each.path.requester, each.node, verb::bind, each.path.text)) {
+            found.emplace_back(each.node, each.path);
+        }
+    }
+    for (const auto& [path, all] : all_) {
+        if (!all->is_permitted()) {
+            found.emplace_back("all", path);
+        }
+    }
+    return found;
 }
 
 void relayed_bindings::withdraw(std::string_view noun) {

@@ -85,8 +85,8 @@ class relayed_bindings {
     /// Ends a binding, or a BIND that is still in progress.
     void unbind(std::string_view target, const relayed_path& path);
     void clear();
-    /// Whether all requesters may still bind what is bound for them.
-    [[nodiscard]] bool are_permitted(const node_state& host) const;
+    /// Those whose requesters may no longer bind them: targets and paths.
+    [[nodiscard]] std::vector<std::pair<std::string, relayed_path>> forbidden(const node_state& host) const;
     void drain(time_point now) { bound_.drain(now); }
     [[nodiscard]] bool binds(std::string_view target, const relayed_path& path);
     [[nodiscard]] std::size_t size() const noexcept { return bound_.size() + all_.size(); }

@@ -156,7 +156,9 @@ void connections::on_security_changed() {
             c->abandon(peer.name + " is no longer a member of the fleet");
         } else if (auto& serving = c->session().serving(); !serving.are_bindings_permitted()) {
             if (c->datagram() != 0) { // the peer would not notice, and copies of its requests would run again
-                serving.drop_bindings();
+                serving.drop_forbidden_bindings();
+                host_.post_log(log_level::info,
+                               peer.name + " may no longer bind what it has bound: ended these bindings", peer.address);
                 continue;
             }
             host_.post_log(log_level::info, peer.name + " may no longer bind what it has bound: closed its link",

@@ -62,8 +62,8 @@ class inbound final : private task_sink {
     [[nodiscard]] std::size_t bindings() const noexcept { return bound_.size(); }
     /// Whether all bindings are still permitted. True without security.
     [[nodiscard]] bool are_bindings_permitted() const { return bound_.are_permitted(); }
-    /// The peer binds again what it may bind.
-    void drop_bindings() { bound_.clear(); }
+    /// Ends the bindings that are not.
+    void drop_forbidden_bindings() { bound_.drop_forbidden(); }
 
   private:
     static constexpr std::size_t max_frame = 64; // around a reply: "id=7 " and the closing characters

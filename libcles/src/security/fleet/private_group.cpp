@@ -3,7 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include <grp.h>
 #include <pwd.h>
@@ -40,17 +43,19 @@ std::optional<group_entry> find_group(gid_t id) {
     return made;
 }
 
-std::vector<user_entry> all_users() {
+// Nothing if they cannot all be listed.
+std::optional<std::vector<user_entry>> all_users() {
     std::vector<user_entry> users;
     passwd entry{};
     passwd* found = nullptr;
     std::array<char, entry_size> buffer{};
     setpwent();
-    while (getpwent_r(&entry, buffer.data(), buffer.size(), &found) == 0 && found != nullptr) {
+    int why = 0;
+    while ((why = getpwent_r(&entry, buffer.data(), buffer.size(), &found)) == 0 && found != nullptr) {
         users.push_back(entry_of(entry));
     }
     endpwent();
-    return users;
+    return why == 0 || why == ENOENT ? std::optional{std::move(users)} : std::nullopt;
 }
 
 } // namespace
@@ -65,7 +70,8 @@ bool is_private_group(const group_entry& group, const user_entry& owner, const s
 bool has_private_group(const struct stat& status) {
     const auto owner = find_user(status.st_uid);
     const auto group = find_group(status.st_gid);
-    return owner && group && is_private_group(*group, *owner, all_users());
+    const auto users = all_users();
+    return owner && group && users && is_private_group(*group, *owner, *users);
 }
 
 } // namespace cles::security

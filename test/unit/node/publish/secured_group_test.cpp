@@ -102,6 +102,24 @@ BOOST_AUTO_TEST_CASE(an_announcement_with_another_epoch_does_not_count) {
     BOOST_TEST(heard.received == 0);
 }
 
+BOOST_AUTO_TEST_CASE(asking_needs_the_right_to_bind_here_whoever_is_asked) {
+    for (const auto* target : {"all", "car1"}) {
+        const auto ask = "BIND " + std::string{target} + ":cles";
+        security->denied = {"car2 BIND car1:cles"};
+        heard.solicitations = 0;
+        hear("car2", ask);
+        BOOST_TEST(heard.solicitations == 0, target);
+        security->denied.clear();
+        hear("car2", ask);
+        BOOST_TEST(heard.solicitations == 1, target);
+    }
+    security->denied = {"car2 BIND car1:pose"};
+    hear("car2", "BIND all:pose");
+    static_cast<void>(port.take());
+    node.publish_now("pose", "{}");
+    BOOST_TEST(port.take().empty());
+}
+
 BOOST_AUTO_TEST_CASE(a_load_report_is_not_signed) {
     cles::core::announcement known{.node = "car2", .endpoints = {"tls://10.0.0.3:1"}};
     known.original = std::make_shared<cles::core::signed_announcement>();

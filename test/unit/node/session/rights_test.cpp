@@ -117,6 +117,16 @@ BOOST_AUTO_TEST_CASE(it_is_known_when_one_is_no_longer_permitted) {
     BOOST_TEST(link.session().serving().are_bindings_permitted());
 }
 
+BOOST_AUTO_TEST_CASE(only_those_that_are_no_longer_permitted_end) {
+    node.open("speed");
+    BOOST_TEST(link.kind("BIND car1:pose id=7") == "id=7 ok");
+    BOOST_TEST(link.kind("BIND car1:speed id=8") == "id=8 ok");
+    security->denied = {"car2 BIND car1:pose"};
+    link.session().serving().drop_forbidden_bindings();
+    BOOST_TEST(link.session().serving().bindings() == 1U);
+    BOOST_TEST(link.session().serving().are_bindings_permitted());
+}
+
 BOOST_AUTO_TEST_CASE(one_that_was_forwarded_is_the_stated_requesters) {
     security->forwarders = {"car2"};
     BOOST_TEST(link.kind("BIND car1:pose id=7 from=car3") == "id=7 ok");
