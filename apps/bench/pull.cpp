@@ -21,7 +21,6 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include <unistd.h>
 
@@ -198,7 +197,7 @@ std::string measure_pulls(const bench_options& options) {
     const std::string noun = node + ":localization";
     auto asking = requester(options);
     asking.peers.emplace(node, url);
-    cles::service client{io, std::move(asking)};
+    cles::service client{io, asking};
     perf::pull_load load{io, client, noun, options.style, !remote, options.how};
 
     const auto requests = requests_of(options);

@@ -174,7 +174,7 @@ class binder : public feed_reader<binder, publication, fan_out_pass> {
 
 void serve_fan_out(service_options options, const run_options& how, const child_process::announce& announce) {
     asio::io_context io{1};
-    cles::service car{io, std::move(options)};
+    cles::service car{io, options};
     car.on_bind("localization");
     car.on_push("publish", [&car](fan_out_order order) {
         return order.interval_ns != 0 ? publish_paced(car, order) : publish_flat_out(car, order.updates);

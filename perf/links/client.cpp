@@ -79,7 +79,7 @@ template <class F>
 void by_cles(cles::service_options setup, F work) {
     asio::io_context io{1};
     setup.name = "asker";
-    cles::service client{io, std::move(setup)};
+    cles::service client{io, setup};
     std::exception_ptr failure;
     asio::co_spawn(io, work(client), [&](std::exception_ptr ended_by) {
         failure = std::move(ended_by);

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
 namespace tool {
 namespace {
@@ -63,8 +62,8 @@ void check_no_parameters(const cles::request& r) {
 
 } // namespace
 
-demo_node::demo_node(boost::asio::io_context& io, cles::service_options options, double rate)
-    : service_(io, std::move(options)), timer_(io), next_(std::chrono::steady_clock::now()) {
+demo_node::demo_node(boost::asio::io_context& io, const cles::service_options& options, double rate)
+    : service_(io, options), timer_(io), next_(std::chrono::steady_clock::now()) {
     register_localization();
     register_demo_tasks(service_);
     if (rate > 0) {

@@ -14,7 +14,7 @@ namespace tool {
 class demo_node {
   public:
     /// `rate`: publications of the localization per second; 0: it can only be pulled.
-    demo_node(boost::asio::io_context& io, cles::service_options options, double rate);
+    demo_node(boost::asio::io_context& io, const cles::service_options& options, double rate);
 
     cles::service& service() noexcept { return service_; }
     void stop();

@@ -24,7 +24,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 namespace tool {
@@ -96,7 +95,7 @@ int serve(const serve_arguments& args, int verbosity) {
             running->stop();
         };
     }
-    demo_node node{io, std::move(options), args.rate};
+    demo_node node{io, options, args.rate};
     running = &node;
 
     signals.async_wait([&](boost::system::error_code failed, int signal) {

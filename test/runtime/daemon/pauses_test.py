@@ -14,7 +14,7 @@ from support import PATIENCE, wait_until
 
 COUNTING = os.environ.get("COUNTING_PLUGIN", "")
 PAUSE = 1.0  # seconds
-JOB = 0.6 * max(PATIENCE / 30, 1)  # seconds: longer than it takes to queue 20 jobs and to pause, with a sanitizer too
+JOB = 1.0 * max(PATIENCE / 30, 1)  # seconds: longer than it takes to queue 20 jobs and to pause, with a sanitizer too
 
 
 class Pauses(unittest.TestCase):
