@@ -10,11 +10,10 @@
 #include "simulation.hpp"
 
 #include <cerrno>
+#include <cstdlib>
 #include <filesystem>
 #include <system_error>
 #include <vector>
-
-#include <stdlib.h>
 
 namespace platoon {
 namespace {

@@ -39,7 +39,6 @@
 #include <vector>
 
 #include <malloc.h>
-#include <stdlib.h>
 #include <sys/resource.h>
 
 namespace cles::perf {
