@@ -14,7 +14,6 @@
 #include <deque>
 #include <memory>
 #include <string_view>
-#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -29,10 +28,6 @@ namespace {
 
 constexpr int max_links = 40; // as the kernel follows
 
-[[noreturn]] void fail_with(int code, const std::string& what) {
-    throw security_error{what + ": " + std::generic_category().message(code)};
-}
-
 std::string absolute(const std::string& path) {
     if (path.starts_with('/')) {
         return path;
@@ -42,14 +37,6 @@ std::string absolute(const std::string& path) {
         fail_with(errno, "cannot find the current folder");
     }
     return std::string{folder.get()} + "/" + path;
-}
-
-struct stat status_of(const descriptor& file, const std::string& path) {
-    struct stat status {};
-    if (fstat(file.get(), &status) != 0) {
-        fail_with(errno, "cannot examine " + path);
-    }
-    return status;
 }
 
 // With an access control list, the group's permissions are the most that any other user or group in it has.
@@ -124,7 +111,7 @@ class path_walk {
             flaw_ = flaw;
         }
     }
-    // Whoever owns the root can replace everything. In a user namespace, that is root outside of it.
+    // The owner of the root can replace everything. In a user namespace, that is root outside of it.
     [[nodiscard]] bool is_trusted(uid_t user) const noexcept {
         return user == 0 || user == geteuid() || user == top_owner_;
     }

@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include <string>
+
+struct stat;
+
 namespace cles::security {
 
 /// An open file or folder.
@@ -20,5 +24,11 @@ class descriptor {
   private:
     int fd_ = -1;
 };
+
+/// \param code that of `errno` \throws security_error
+[[noreturn]] void fail_with(int code, const std::string& what);
+
+/// \param path for the message \throws security_error
+struct stat status_of(const descriptor& file, const std::string& path);
 
 } // namespace cles::security

@@ -8,7 +8,6 @@
 #include <array>
 #include <cerrno>
 #include <memory>
-#include <system_error>
 #include <utility>
 
 #include <dirent.h>
@@ -19,18 +18,6 @@
 
 namespace cles::security {
 namespace {
-
-[[noreturn]] void fail_with(int code, const std::string& what) {
-    throw security_error{what + ": " + std::generic_category().message(code)};
-}
-
-struct stat status_of(const descriptor& file, const std::string& path) {
-    struct stat status {};
-    if (fstat(file.get(), &status) != 0) {
-        fail_with(errno, "cannot examine " + path);
-    }
-    return status;
-}
 
 void require_none(const std::string& flaw) {
     if (!flaw.empty()) {
