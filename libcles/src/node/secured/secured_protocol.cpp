@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/secured/secured_protocol.hpp"
 
+#include <cles/json_reader.hpp>
+
 #include "node/local_node.hpp"
 #include "node/secured/epoch_confirmation.hpp"
 #include "node/secured/own_announcement.hpp"
@@ -76,7 +78,14 @@ std::string secured_protocol::announce(announcement& said, std::uint64_t& seq, b
 }
 
 bool secured_protocol::on_load_report(const group_source& from, const protocol::request_line& report, time_point now) {
-    return take_load_report(node_, from, report, now);
+    node_load load;
+    json_reader body{report.body.empty() ? std::string_view{"{}"} : report.body, node_.bounds.depth};
+    if (!read_load(body, load) || !body.at_end()) {
+        return false;
+    }
+    const auto found = node_.peers.apply_load(report.noun.target, *report.epoch, *report.seq, load, from, now);
+    ++(found == membership::verdict::taken ? node_.counts.announcements_received : node_.counts.announcements_dropped);
+    return true;
 }
 
 std::vector<std::string> secured_protocol::endpoints(const std::vector<group_port*>& in_group, bool all) {

@@ -2,10 +2,10 @@
 #pragma once
 
 #include "node/secured/confirmed_epochs.hpp"
-#include "node/secured/load_reports.hpp"
 #include "node/secured/local_security.hpp"
 #include "node/secured/request_challenges.hpp"
 #include "node/secured/request_signer.hpp"
+#include "node/secured/signed_announcer.hpp"
 #include "node/security_protocol.hpp"
 
 #include <memory>

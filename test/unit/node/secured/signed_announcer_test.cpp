@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/secured/load_reports.hpp"
+#include "node/secured/signed_announcer.hpp"
 #include "protocol/request_line.hpp"
 #include "support/scripted_security.hpp"
 #include "support/session_fixture.hpp"

@@ -1,17 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
-#include <cles/limits.hpp>
-
 #include "node/membership/announcement.hpp"
-#include "port/group_port.hpp"
-#include "protocol/request_line.hpp"
 
 #include <cstdint>
 #include <optional>
 #include <string>
-
-/// The load that a node reports in the group between signed announcements (docs/security.md, "Announcements").
 
 namespace cles::core {
 
@@ -38,9 +32,5 @@ class signed_announcer {
 
 /// Whether two announcements of a node have the same content, except for the load of the same workers.
 [[nodiscard]] bool differ_in_load_only(const announcement& one, const announcement& other);
-
-/// Takes the report of another node. Returns false if it is malformed.
-[[nodiscard]] bool take_load_report(node_state& host, const group_source& from, const protocol::request_line& report,
-                                    time_point now);
 
 } // namespace cles::core

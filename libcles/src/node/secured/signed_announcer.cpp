@@ -1,14 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
-#include "node/secured/load_reports.hpp"
+#include "node/secured/signed_announcer.hpp"
 
-#include <cles/json_reader.hpp>
 #include <cles/json_writer.hpp>
 
 #include "node/node_state.hpp"
 #include "node/secured/own_announcement.hpp"
 #include "port/node_security.hpp"
-
-#include <string_view>
 
 namespace cles::core {
 
@@ -44,18 +41,6 @@ bool differ_in_load_only(const announcement& one, const announcement& other) {
            one.sources == other.sources && one.interval == other.interval && one.tasks == other.tasks &&
            one.leaving == other.leaving && one.roster == other.roster && one.signed_tasks == other.signed_tasks &&
            one.load.workers == other.load.workers;
-}
-
-bool take_load_report(node_state& host, const group_source& from, const protocol::request_line& report,
-                      time_point now) {
-    node_load load;
-    json_reader body{report.body.empty() ? std::string_view{"{}"} : report.body, host.bounds.depth};
-    if (!read_load(body, load) || !body.at_end()) {
-        return false;
-    }
-    const auto found = host.peers.apply_load(report.noun.target, *report.epoch, *report.seq, load, from, now);
-    ++(found == membership::verdict::taken ? host.counts.announcements_received : host.counts.announcements_dropped);
-    return true;
 }
 
 } // namespace cles::core
