@@ -218,7 +218,7 @@ measurement selected_measurement(const CLI::App& command, const bench_arguments&
         refuse("--keys", "needs --against with the URL of a node with security, as in tls://10.0.0.2");
     }
     if (is_secured && given.keys.given_directory().empty()) {
-        refuse("--against", given.against + " needs the key of a member: give --keys DIR, or set CLES_KEYS");
+        refuse("--against", given.against + " " + keys_needed);
     }
     return what;
 }

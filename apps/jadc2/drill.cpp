@@ -3,8 +3,8 @@
 
 #include <cles/service.hpp>
 
+#include "client/member_key.hpp"
 #include "events.hpp"
-#include "member_options.hpp"
 #include "strike/order.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -75,7 +75,7 @@ boost::asio::awaitable<void> give_orders(cles::service& from, const drill_option
 
 int drill(const drill_options& args) {
     boost::asio::io_context io{1};
-    cles::service node{io, options_of_member("drill", args.keys)};
+    cles::service node{io, tool::options_of_member("drill", args.keys)};
     std::vector<double> took;
     std::exception_ptr failure;
     boost::asio::co_spawn(io, give_orders(node, args, took), [&](const std::exception_ptr& thrown) {

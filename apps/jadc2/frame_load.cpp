@@ -3,10 +3,10 @@
 
 #include <cles/service.hpp>
 
+#include "client/member_key.hpp"
 #include "events.hpp"
 #include "fmv/base64.hpp"
 #include "fmv/messages.hpp"
-#include "member_options.hpp"
 #include "scene.hpp"
 
 #include <boost/asio/co_spawn.hpp>
@@ -70,7 +70,7 @@ int run_load(const load_options& args) {
         pixels.push_back(fmv::to_base64(ground.frame(number)));
     }
     boost::asio::io_context io{1};
-    cles::service node{io, options_of_member("load", args.keys)};
+    cles::service node{io, tool::options_of_member("load", args.keys)};
     const auto begun = steady::now();
     work all{.args = args,
              .pixels = pixels,

@@ -18,8 +18,7 @@ namespace {
 int report_failure(const cles::error& why) {
     const auto code = why.code();
     const bool keyless = code == cles::errc::unknown_scheme && why.message().find("'tls'") != std::string::npos;
-    std::fprintf(stderr, "cles-jadc2: %s%s\n", why.what(),
-                 keyless ? ": it needs the key of a member: give --keys DIR, or set CLES_KEYS" : "");
+    std::fprintf(stderr, "cles-jadc2: %s%s%s\n", why.what(), keyless ? ": it " : "", keyless ? tool::keys_needed : "");
     const bool missing = code == cles::errc::no_target || code == cles::errc::no_task;
     return missing ? 3 : code == cles::errc::deadline ? 4 : code == cles::errc::busy ? 6 : 5;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "mission.hpp"
 
-#include "member_options.hpp"
+#include "client/member_key.hpp"
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/buffer.hpp>
@@ -23,7 +23,7 @@ namespace {
 using std::chrono::milliseconds;
 
 cles::service_options options_of(const mission_options& args) {
-    auto out = options_of_member(args.name, args.keys);
+    auto out = tool::options_of_member(args.name, args.keys);
     out.peers = {{args.recon_name, args.recon}};
     out.gossip = cles::gossip(args.strikers);
     out.routing = cles::routing();

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "recon.hpp"
 
+#include "client/member_key.hpp"
 #include "fmv/base64.hpp"
-#include "member_options.hpp"
 
 #include <boost/asio/as_tuple.hpp>
 #include <boost/asio/co_spawn.hpp>
@@ -29,14 +29,14 @@ double ms_since(steady::time_point begin) {
 }
 
 cles::service_options options_for_ground(const recon_options& args) {
-    auto out = options_of_member(args.name, args.keys);
+    auto out = tool::options_of_member(args.name, args.keys);
     out.listen = {args.listen};
     out.insecure = args.insecure;
     return out;
 }
 
 cles::service_options options_for_space(const recon_options& args) {
-    auto out = options_of_member(args.name + "-camera", args.camera_keys);
+    auto out = tool::options_of_member(args.name + "-camera", args.camera_keys);
     out.gossip = cles::gossip(args.satellites);
     out.routing = cles::routing();
     return out;

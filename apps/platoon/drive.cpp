@@ -65,13 +65,12 @@ void check_keys(const drive_options& options, const std::string& fleet) {
 }
 
 cles::service_options options_of(const drive_options& options, const std::string& fleet) {
-    cles::service_options out;
+    std::string keys;
     if (!fleet.empty()) {
         check_keys(options, fleet);
-        tool::use_member_key(out, keys_of(operator_name, fleet));
-    } else {
-        out.name = "platoon-" + std::to_string(::getpid());
+        keys = keys_of(operator_name, fleet);
     }
+    auto out = tool::options_of_member("platoon-" + std::to_string(::getpid()), keys);
     out.insecure = options.insecure;
     out.multicast = options.group;
     return out;

@@ -49,3 +49,17 @@ std::string name_of_member(const std::string& directory) { refuse(directory); }
 } // namespace tool
 
 #endif
+
+namespace tool {
+
+cles::service_options options_of_member(const std::string& name, const std::string& directory) {
+    cles::service_options out;
+    if (directory.empty()) {
+        out.name = name;
+    } else {
+        use_member_key(out, directory);
+    }
+    return out;
+}
+
+} // namespace tool

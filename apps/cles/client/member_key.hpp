@@ -11,6 +11,10 @@ namespace tool {
 /// \throws std::runtime_error that says what is wrong in the directory, and what corrects it
 void use_member_key(cles::service_options& options, const std::string& directory);
 
+/// Options of a service with the key in that directory, and its name; without a directory, with this name.
+/// \throws std::runtime_error as above
+cles::service_options options_of_member(const std::string& name, const std::string& directory);
+
 /// The name of the key in this directory.
 /// \throws std::runtime_error as above
 std::string name_of_member(const std::string& directory);

@@ -84,7 +84,7 @@ void address_book::check_url(const std::string& text) const {
     const auto scheme = cles::parse_url(text).scheme;
     if (scheme == "tls") {
         if (!is_secured()) {
-            throw usage_error("'" + text + "' needs the key of a member: give --keys DIR, or set CLES_KEYS");
+            throw usage_error("'" + text + "' " + keys_needed);
         }
     } else if (cles::find_transport(scheme) == nullptr) {
         throw usage_error("'" + text + "': there is no transport " + scheme);

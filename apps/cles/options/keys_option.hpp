@@ -9,6 +9,9 @@ class App;
 
 namespace tool {
 
+/// What to do about the address of a node with security, without keys.
+inline constexpr const char* keys_needed = "needs the key of a member: give --keys DIR, or set CLES_KEYS";
+
 /// --keys: the directory with the key of a node or of a fleet. The default is CLES_KEYS. Commands that manage such a
 /// directory otherwise use a folder beside the user's configuration; those that talk to nodes use no key.
 class keys_option {
