@@ -7,6 +7,7 @@
 //
 // Fails if it takes longer than 5 seconds, or than MOST_SECONDS.
 #include "perf/support/descriptor.hpp"
+#include "perf/support/temporary_folder.hpp"
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
 
@@ -43,37 +44,14 @@ constexpr std::chrono::seconds patience{120};
 
 double seconds(steady::duration span) { return std::chrono::duration<double>(span).count(); }
 
-/// A folder that is removed in the end.
-class own_folder {
-  public:
-    own_folder() {
-        std::string name = (std::filesystem::temp_directory_path() / "cles-spread-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error("cannot create a folder");
-        }
-        path_ = name;
-        std::ofstream{path("empty.yaml")}; // so that a configuration of this host does not count
-    }
-    own_folder(const own_folder&) = delete;
-    own_folder& operator=(const own_folder&) = delete;
-    ~own_folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-    [[nodiscard]] std::string path(const std::string& name) const { return path_ + "/" + name; }
-
-  private:
-    std::string path_;
-};
-
 /// `clesd` with the keys of a member, in a directory of that name.
 class daemon_process {
   public:
-    daemon_process(const std::string& program, const own_folder& in, std::string name)
-        : name_(std::move(name)), keys_(in.path(name_)), socket_(in.path(name_ + ".sock")) {
+    daemon_process(const std::string& program, const temporary_folder& in, std::string name)
+        : name_(std::move(name)), keys_((in / name_).string()), socket_((in / (name_ + ".sock")).string()) {
         const std::vector<std::string> words{program,
                                              "--config",
-                                             in.path("empty.yaml"),
+                                             (in / "empty.yaml").string(),
                                              "--keys",
                                              keys_,
                                              "--multicast",
@@ -184,16 +162,17 @@ void wait_until(Condition&& holds, std::chrono::milliseconds pause, const char* 
 class spreading_fleet {
   public:
     spreading_fleet(const std::string& program, std::size_t daemons, std::size_t members) {
+        const std::ofstream empty{folder_ / "empty.yaml"}; // so that a configuration of this host does not count
         std::vector<security::public_identity> all;
         for (std::size_t i = 0; i < members; ++i) {
             const auto name = "m" + std::to_string(i);
-            all.push_back(i < daemons
-                              ? security::key_directory::create(folder_.path(name)).create_key(name).public_part()
-                              : security::public_identity{name, security::signing_key::generate().public_part()});
+            all.push_back(
+                i < daemons ? security::key_directory::create((folder_ / name).string()).create_key(name).public_part()
+                            : security::public_identity{name, security::signing_key::generate().public_part()});
         }
         authority_.add(all);
         for (std::size_t i = 0; i < daemons; ++i) {
-            security::key_directory{folder_.path(all[i].name)}.store_roster(authority_.newest());
+            security::key_directory{(folder_ / all[i].name).string()}.store_roster(authority_.newest());
             daemons_.push_back(std::make_unique<daemon_process>(program, folder_, all[i].name));
         }
     }
@@ -237,7 +216,7 @@ class spreading_fleet {
     [[nodiscard]] std::size_t roster_bytes() const { return authority_.newest().line().size(); }
 
   private:
-    own_folder folder_;
+    temporary_folder folder_{"cles-spread"};
     security::fleet_authority authority_ = security::fleet_authority::found(security::signing_key::generate());
     std::vector<std::unique_ptr<daemon_process>> daemons_;
 };

@@ -13,6 +13,7 @@
 #include "perf/support/child_process.hpp"
 #include "perf/support/descriptor.hpp"
 #include "perf/support/pinning.hpp"
+#include "perf/support/temporary_folder.hpp"
 #include "security/fleet/fleet.hpp"
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
@@ -74,12 +75,7 @@ node_memory memory_now() {
 class fleet_folder {
   public:
     explicit fleet_folder(std::size_t members) {
-        std::string name = (std::filesystem::temp_directory_path() / "cles-tls-links-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error("cannot create a folder");
-        }
-        folder_ = name;
-        const auto directory = security::key_directory::create(folder_ + "/node");
+        const auto directory = security::key_directory::create(node());
         authority_.add(directory.create_key("node").public_part());
         std::vector<security::public_identity> all;
         for (std::size_t i = 0; i < members; ++i) {
@@ -91,13 +87,9 @@ class fleet_folder {
     }
     fleet_folder(const fleet_folder&) = delete;
     fleet_folder& operator=(const fleet_folder&) = delete;
-    ~fleet_folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(folder_, ignored);
-    }
 
     static std::string name_of(std::size_t member) { return "m" + std::to_string(member); }
-    [[nodiscard]] std::string node() const { return folder_ + "/node"; }
+    [[nodiscard]] std::string node() const { return (folder_ / "node").string(); }
     /// The transports of all members. Call it once.
     std::vector<std::unique_ptr<link_transport>> transports() {
         std::vector<std::unique_ptr<link_transport>> made;
@@ -110,7 +102,7 @@ class fleet_folder {
     }
 
   private:
-    std::string folder_;
+    temporary_folder folder_{"cles-tls-links"};
     security::fleet_authority authority_ = security::fleet_authority::found(security::signing_key::generate());
     std::vector<security::signing_key> keys_;
 };

@@ -3,23 +3,14 @@
 
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
+#include "support/temporary_folder.hpp"
 
-#include <filesystem>
-#include <stdexcept>
 #include <string>
-#include <system_error>
-
-#include <stdlib.h>
 
 /// A fleet of car1 and car2, each with a directory.
 class fleet_folder {
   public:
     fleet_folder() {
-        std::string name = (std::filesystem::temp_directory_path() / "cles-perf-XXXXXX").string();
-        if (::mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error("cannot create a folder");
-        }
-        folder_ = name;
         auto authority = cles::security::fleet_authority::found(cles::security::signing_key::generate());
         for (const auto* car : {"car1", "car2"}) {
             const auto directory = cles::security::key_directory::create(of(car));
@@ -31,12 +22,8 @@ class fleet_folder {
     }
     fleet_folder(const fleet_folder&) = delete;
     fleet_folder& operator=(const fleet_folder&) = delete;
-    ~fleet_folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(folder_, ignored);
-    }
-    [[nodiscard]] std::string of(const std::string& car) const { return folder_ + "/" + car; }
+    [[nodiscard]] std::string of(const std::string& car) const { return (folder_ / car).string(); }
 
   private:
-    std::string folder_;
+    cles::test::temporary_folder folder_{"cles-perf"};
 };

@@ -7,6 +7,7 @@
 #include "plugins/plugin_host.hpp"
 #include "plugins/plugin_library.hpp"
 #include "plugins/plugin_trial.hpp"
+#include "support/temporary_folder.hpp"
 
 #include <boost/asio/io_context.hpp>
 #include <boost/test/unit_test.hpp>
@@ -24,8 +25,6 @@
 #include <thread>
 #include <vector>
 
-#include <stdlib.h>
-
 namespace plugin_file {
 namespace {
 
@@ -34,20 +33,10 @@ using namespace cles::runtime;
 using namespace std::chrono_literals;
 using checked = cles::runtime::plugin_file;
 
-fs::path make_folder() {
-    auto name = (fs::temp_directory_path() / "cles-plugin-file-XXXXXX").string();
-    BOOST_REQUIRE(mkdtemp(name.data()) != nullptr);
-    return name;
-}
-
 struct fixture {
     fixture() { put("sound", file); }
     fixture(const fixture&) = delete;
     fixture& operator=(const fixture&) = delete;
-    ~fixture() {
-        std::error_code ignored;
-        fs::remove_all(folder, ignored);
-    }
 
     // As an installer does it: another file gets the name.
     void put(const std::string& plugin, const fs::path& as) const {
@@ -57,7 +46,8 @@ struct fixture {
     }
     [[nodiscard]] checked open(const std::string& sha256 = {}) const { return {"mine.so", file, rules, sha256}; }
 
-    fs::path folder = make_folder();
+    cles::test::temporary_folder made{"cles-plugin-file"};
+    fs::path folder = made.path();
     fs::path file = folder / "mine.so";
     plugin_rules rules{.secured = true, .folders = {folder}};
 };

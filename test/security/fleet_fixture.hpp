@@ -5,6 +5,7 @@
 #include "security/fleet/roster.hpp"
 #include "security/hex.hpp"
 #include "security/keys/keys.hpp"
+#include "support/temporary_folder.hpp"
 
 #include <boost/json.hpp>
 
@@ -20,8 +21,6 @@
 #include <string_view>
 #include <system_error>
 #include <vector>
-
-#include <stdlib.h>
 
 /// What the tests of the fleet share: the test vectors, keys that are the same in each run, a folder of their own.
 
@@ -79,29 +78,15 @@ inline std::shared_ptr<const roster> reread(const std::string& line) {
     return roster::read(line, roster::named_fleet(line));
 }
 
-/// A folder that is removed in the end.
+/// A temporary folder, and what is in it.
 class own_folder {
   public:
-    own_folder() {
-        auto name = (std::filesystem::temp_directory_path() / "cles-security-XXXXXX").string();
-        if (mkdtemp(name.data()) == nullptr) {
-            throw std::runtime_error{"cannot create " + name};
-        }
-        path_ = name;
-    }
-    own_folder(const own_folder&) = delete;
-    own_folder& operator=(const own_folder&) = delete;
-    ~own_folder() {
-        std::error_code ignored;
-        std::filesystem::remove_all(path_, ignored);
-    }
-
-    [[nodiscard]] std::string path() const { return path_.string(); }
-    [[nodiscard]] std::filesystem::path operator/(std::string_view name) const { return path_ / name; }
+    [[nodiscard]] std::string path() const { return folder_.path().string(); }
+    [[nodiscard]] std::filesystem::path operator/(std::string_view name) const { return folder_ / name; }
     /// The names of its files, sorted.
     [[nodiscard]] std::vector<std::string> names() const {
         std::vector<std::string> found;
-        for (const auto& entry : std::filesystem::directory_iterator{path_}) {
+        for (const auto& entry : std::filesystem::directory_iterator{folder_.path()}) {
             found.push_back(entry.path().filename().string());
         }
         std::sort(found.begin(), found.end());
@@ -109,7 +94,7 @@ class own_folder {
     }
 
   private:
-    std::filesystem::path path_;
+    cles::test::temporary_folder folder_{"cles-security"};
 };
 
 /// The message of the error that the call throws; empty if it throws none.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "config/config.hpp"
 #include "config/config_sources.hpp"
+#include "support/temporary_folder.hpp"
 
 #include <boost/test/unit_test.hpp>
 
@@ -10,8 +11,6 @@
 #include <string>
 #include <vector>
 
-#include <unistd.h>
-
 using namespace cles::runtime;
 namespace fs = std::filesystem;
 
@@ -19,9 +18,6 @@ namespace {
 
 struct scratch {
     scratch() {
-        std::string name = (fs::temp_directory_path() / "cles-config-XXXXXX").string();
-        BOOST_REQUIRE(::mkdtemp(name.data()) != nullptr);
-        folder = name;
         sources.host = "host";
         sources.cores = 2;
         sources.variable = [this](const char* name) -> const char* {
@@ -31,7 +27,6 @@ struct scratch {
         // So that no file of this machine is found.
         variables["CLES_CONFIG"] = write("named.yaml", "node: named\n");
     }
-    ~scratch() { fs::remove_all(folder); }
 
     std::string write(const std::string& name, const std::string& text) const {
         const auto path = folder / name;
@@ -40,7 +35,8 @@ struct scratch {
         return path.string();
     }
 
-    fs::path folder;
+    cles::test::temporary_folder made{"cles-config"};
+    fs::path folder = made.path();
     std::map<std::string, std::string> variables;
     config_sources sources;
 };

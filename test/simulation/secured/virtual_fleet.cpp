@@ -13,21 +13,15 @@ namespace cles::simulation {
 namespace {
 
 // In memory if possible, since nodes wait until their roster is stored.
-std::string new_folder() {
+std::filesystem::path fast_place() {
     const std::filesystem::path memory{"/dev/shm"};
-    auto pattern = ((std::filesystem::is_directory(memory) ? memory : std::filesystem::temp_directory_path()) /
-                    "cles-simulation-XXXXXX")
-                       .string();
-    if (mkdtemp(pattern.data()) == nullptr) {
-        throw std::runtime_error{"cannot create a folder as " + pattern};
-    }
-    return pattern;
+    return std::filesystem::is_directory(memory) ? memory : std::filesystem::temp_directory_path();
 }
 
 } // namespace
 
 virtual_fleet::virtual_fleet(std::vector<std::string> names)
-    : names_(std::move(names)), folder_(new_folder()), key_(security::signing_key::generate()),
+    : names_(std::move(names)), folder_("cles-simulation", fast_place()), key_(security::signing_key::generate()),
       authority_(security::fleet_authority::found(security::signing_key{key_.seed().copy()})) {
     for (std::size_t node = 0; node < names_.size(); ++node) {
         identities_.push_back(
@@ -40,12 +34,7 @@ virtual_fleet::virtual_fleet(std::vector<std::string> names)
     }
 }
 
-virtual_fleet::~virtual_fleet() {
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-}
-
-std::string virtual_fleet::directory_of(std::size_t node) const { return folder_ + "/" + names_[node]; }
+std::string virtual_fleet::directory_of(std::size_t node) const { return (folder_ / names_[node]).string(); }
 
 void virtual_fleet::remove(std::size_t node) {
     if (is_member(node) && newest().members().size() > 2) {

@@ -3,6 +3,7 @@
 
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
+#include "support/temporary_folder.hpp"
 
 #include <cstddef>
 #include <memory>
@@ -19,7 +20,6 @@ class virtual_fleet {
     explicit virtual_fleet(std::vector<std::string> names);
     virtual_fleet(const virtual_fleet&) = delete;
     virtual_fleet& operator=(const virtual_fleet&) = delete;
-    ~virtual_fleet();
 
     [[nodiscard]] std::string directory_of(std::size_t node) const;
     [[nodiscard]] const security::roster& newest() const noexcept { return authority_->newest(); }
@@ -44,7 +44,7 @@ class virtual_fleet {
     void write(std::size_t node, const security::roster& which) const;
 
     std::vector<std::string> names_;
-    std::string folder_;
+    test::temporary_folder folder_;
     std::vector<security::public_identity> identities_;
     security::signing_key key_;
     std::optional<security::fleet_authority> authority_;
