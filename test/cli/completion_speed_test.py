@@ -6,21 +6,11 @@ import os
 import time
 import unittest
 
-from completion_test import ENVIRONMENT, GROUP, offered, soon
-from support import Node, cles, environment, free_port
+from completion_test import ENVIRONMENT, TwoNodes, offered, soon
+from support import cles, environment, free_port
 
 
-class Speed(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.nodes = [Node("--name", name, "--multicast", GROUP) for name in ("car1", "car2")]
-
-    @classmethod
-    def tearDownClass(cls):
-        codes = [node.stop() for node in cls.nodes]
-        if any(codes):
-            raise AssertionError(f"nodes ended with {codes}")
-
+class Speed(TwoNodes):
     def test_in_less_than_100_ms(self):
         for name in ("car1", "car2"):
             soon("pull", f"{name}:")

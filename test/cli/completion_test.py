@@ -134,7 +134,7 @@ class WithoutNodes(unittest.TestCase):
         offered("pull", "", env=environment(CLES_MULTICAST="nowhere0"))
 
 
-class Nouns(unittest.TestCase):
+class TwoNodes(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.nodes = [Node("--name", name, "--multicast", GROUP) for name in ("car1", "car2")]
@@ -145,6 +145,8 @@ class Nouns(unittest.TestCase):
         if any(codes):
             raise AssertionError(f"nodes ended with {codes}")
 
+
+class Nouns(TwoNodes):
     def test_nodes(self):
         wait_until(lambda: list(offered("pull", "")) == ["car1:", "car2:", "self:", "any:", "all:"], "both nodes are heard")
         wait_until(lambda: list(offered("pull", "c")) == ["car1:", "car2:"], "both nodes are heard")

@@ -14,7 +14,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from jadc2_fleet import PATIENCE, Fleet, Namespaces, Trouble
+from jadc2_fleet import PATIENCE, Fleet, Namespaces
+from story import namespaces
 
 PROGRAMS = sys.argv[1]
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "jadc2"
@@ -29,14 +30,6 @@ def ends(handle):
 
 
 class LeavesNothing(unittest.TestCase):
-    def namespaces(self, kind=Namespaces):
-        try:
-            return kind()
-        except Trouble as no_way:
-            if os.environ.get("CI") == "true" and os.geteuid() == 0:
-                raise
-            return self.skipTest(str(no_way))
-
     def test_a_daemon_that_is_not_ready_when_the_script_is_told_to_end(self):
         with tempfile.TemporaryDirectory() as folder:
             programs, files, told = Path(folder, "programs"), Path(folder, "files"), Path(folder, "told")
@@ -65,7 +58,7 @@ class LeavesNothing(unittest.TestCase):
                 keepers.extend(keeper.pid for keeper in self.keepers.values())
                 raise KeyboardInterrupt
 
-        self.namespaces().close()
+        namespaces(self).close()
         with self.assertRaises(KeyboardInterrupt):
             Interrupted()
         self.assertNotEqual(keepers, [])
@@ -73,7 +66,7 @@ class LeavesNothing(unittest.TestCase):
             self.assertRaises(ProcessLookupError, os.kill, keeper, 0)
 
     def test_namespaces_whose_script_is_killed(self):
-        self.namespaces().close()
+        namespaces(self).close()
         code = "import jadc2_fleet as f; n = f.Namespaces(); print(*(k.pid for k in n.keepers.values()), flush=True); input()"
         with subprocess.Popen([sys.executable, "-B", "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as script:
             keepers = [os.pidfd_open(int(pid)) for pid in script.stdout.readline().split()]

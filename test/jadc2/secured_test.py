@@ -14,8 +14,8 @@ import sys
 import time
 import unittest
 
-from jadc2_fleet import FINDS, PATIENCE, RIGHTS, Fleet, Namespaces, Trouble, clean_environment, free_port
-from story import StoryTest
+from jadc2_fleet import FINDS, PATIENCE, RIGHTS, Fleet, clean_environment, free_port
+from story import StoryTest, namespaces
 
 PROGRAMS = sys.argv[1]
 # May watch, like the mission centre, but not strike.
@@ -41,13 +41,7 @@ class Story(StoryTest):
                 self.assertTrue(node.url.startswith("tls://"), node.url)
 
     def test_with_only_the_links_that_there_are(self):
-        try:
-            hosts = Namespaces()
-        except Trouble as no_way:
-            if os.environ.get("CI") == "true" and os.geteuid() == 0:
-                raise
-            self.skipTest(str(no_way))
-        with Fleet(PROGRAMS, hosts, rights=RIGHTS) as fleet:  # without `insecure`
+        with Fleet(PROGRAMS, namespaces(self), rights=RIGHTS) as fleet:  # without `insecure`
             self.run_story(fleet)
 
     def test_targets_are_found_as_without(self):
