@@ -29,7 +29,7 @@ void finds(sim::planted fault, sim::rule broken) {
     BOOST_TEST_MESSAGE(std::string{to_string(fault)} + " is found by seed " + std::to_string(seed));
 }
 
-/// The same activity, while nothing goes wrong and nobody has to hurry.
+/// The same activity, without faults, and with longer deadlines.
 sim::plan calm_plan_of(std::uint64_t seed) {
     using enum sim::deed;
     auto p = sim::make_plan(seed, sim::steps_of_a_seed);

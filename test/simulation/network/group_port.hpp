@@ -33,7 +33,7 @@ class group_port final : public core::group_port, public std::enable_shared_from
     [[nodiscard]] const endpoint& local() const noexcept { return local_; }
     /// A datagram has arrived at the host.
     void receive(const endpoint& from, const std::string& datagram, bool to_group);
-    /// With security, whoever seals for this port reports what the node sends and receives; otherwise, it does so.
+    /// With security, the port that seals for this one reports what the node sends and receives; otherwise, this one.
     void report_sent(std::string_view line);
     void report_received(const core::group_source& from, std::string_view line);
     void report_accepted(std::string_view member, std::string_view line);

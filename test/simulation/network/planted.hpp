@@ -53,7 +53,7 @@ BOOST_DEFINE_FIXED_ENUM_CLASS(planted, std::uint8_t,
                               forgery_taken,      ///< a line that is not sealed counts as that of a member
                               replay_taken,       ///< a repeated datagram is delivered again
                               group_replay_taken, ///< the same in the group
-                              stranger_admitted,  ///< a stream is opened to whoever states a member's name
+                              stranger_admitted,  ///< a stream is opened to anyone who states a member's name
                               removed_served,     ///< links to a removed member go on
                               rights_ignored,     ///< a node permits everything
                               roster_withheld,    ///< the newest roster is given to no node

@@ -15,7 +15,7 @@ namespace {
 /// The library's admission.
 class link_gate final : public stream_gate {
   public:
-    /// \param stranger a planted fault: whoever is refused is admitted under that name
+    /// \param stranger a planted fault: those who are refused are admitted under that name
     link_gate(std::shared_ptr<security::admission_terms> terms, std::string_view expected, planted fault,
               std::string stranger)
         : terms_(std::move(terms)), admission_(terms_, std::string{expected}), fault_(fault),
