@@ -91,6 +91,8 @@ class Stops(unittest.TestCase):
         """Even if no other callback waits; and without destroying what the callback may use."""
         with self.daemon.connect() as link:
             self.withdraw(link, self.begin(link, "blocks_when_stopped", ["alone"]))
+            # Otherwise the daemon may stop first, and call it as one of the plugin's that are left.
+            wait_until(lambda: self.count("blocked") == 1, "the callback blocks")
             self.assertEqual(link.ask("PULL sat1:quick"), '{"value":42}')
         code, took = self.daemon.stop()
         self.assertEqual(code, 0)

@@ -80,11 +80,13 @@ void register_stops(cles::registrar& to) {
         answer.fail(cles::errc::cancelled, "stopped");
     });
     to.on_delegate("blocks_when_stopped", [](const cles::request& asked, const cles::responder& answer) {
-        answer.on_stop([answer] {
+        const std::string file{asked.parameter(0)};
+        answer.on_stop([answer, file] {
             ++blocked_callbacks;
+            mark(file, "blocked");
             hang();
         });
-        mark(std::string{asked.parameter(0)}, "begun");
+        mark(file, "begun");
     });
 }
 
