@@ -325,6 +325,44 @@ BOOST_AUTO_TEST_CASE(flushed_output_is_consumed_even_if_the_socket_is_not_writab
     ::close(ends[1]);
 }
 
+// Also if one of them is gone meanwhile.
+BOOST_AUTO_TEST_CASE(all_links_of_a_socket_go_on_when_it_is_writable) {
+    asio::io_context io;
+    std::array<int, 2> ends{};
+    BOOST_REQUIRE(::socketpair(AF_UNIX, SOCK_DGRAM, 0, ends.data()) == 0);
+    const auto port = std::make_shared<cles::transport::udp_port>(udp::socket{io, udp::v4(), ends[0]});
+    std::vector<cles::link_ptr> links;
+    std::vector<std::shared_ptr<link_recorder>> events;
+    for (std::uint16_t number = 1; number <= 3; ++number) {
+        links.push_back(port->connect_link({asio::ip::address_v4::loopback(), number},
+                                           {.transport = "udp", .address = {}, .name = {}, .uid = {}}));
+        events.push_back(std::make_shared<link_recorder>());
+        links.back()->start(events.back());
+    }
+    while (links.front()->unsent() == 0) {
+        links.front()->output().append("one\n");
+        links.front()->flush();
+    }
+    for (const auto& each : links) {
+        each->output().append("more\n");
+        each->flush();
+        BOOST_TEST(each->unsent() > 0U);
+    }
+    links.front()->close();
+    links.erase(links.begin());
+    run_until(io, [&] {
+        std::array<char, 2000> text{};
+        while (::recv(ends[1], text.data(), text.size(), MSG_DONTWAIT) > 0) {
+        }
+        return events[1]->has('r') && events[2]->has('r');
+    });
+    for (const auto& each : links) {
+        BOOST_TEST(each->unsent() == 0U);
+        each->close();
+    }
+    ::close(ends[1]);
+}
+
 /// Marks what it has sealed with a number, and gives up lines that begin with '-'.
 class numbering_codec final : public cles::transport::datagram_codec {
   public:

@@ -6,6 +6,7 @@
 
 #include "api/security_part.hpp"
 #include "node/session/call.hpp"
+#include "transport/member_handler.hpp"
 
 #include <boost/asio/post.hpp>
 
@@ -220,7 +221,7 @@ class posted_updates final : public update_sink, public std::enable_shared_from_
         }
         if (!std::exchange(asked_, true)) {
             // Under the lock: once `close` returns, nothing is posted to an executor that may be gone.
-            boost::asio::post(executor_, [self = shared_from_this()] { self->drain(); });
+            transport::post_call<&posted_updates::drain>(executor_, shared_from_this());
         }
     }
     /// After this, nothing is posted. Call it on the executor.

@@ -6,6 +6,7 @@
 
 #include "transport/group_port.hpp"
 #include "transport/ip_interface.hpp"
+#include "transport/member_handler.hpp"
 #include "transport/transports.hpp"
 
 #include <boost/asio/execution/context.hpp>
@@ -78,19 +79,20 @@ void boottime_timer::wait() {
     if (!due_ || std::exchange(waiting_, true)) {
         return;
     }
-    timer_.async_wait(asio::posix::descriptor_base::wait_read,
-                      [self = shared_from_this()](boost::system::error_code code) {
-                          self->waiting_ = false;
-                          if (code || !self->due_) {
-                              return;
-                          }
-                          std::uint64_t times = 0;
-                          if (::read(self->timer_.native_handle(), &times, sizeof times) > 0) {
-                              self->due_();
-                          } else { // it was set again while this was pending
-                              self->wait();
-                          }
-                      });
+    transport::wait_call<&boottime_timer::on_due>(timer_, asio::posix::descriptor_base::wait_read, shared_from_this());
+}
+
+void boottime_timer::on_due(boost::system::error_code code) {
+    waiting_ = false;
+    if (code || !due_) {
+        return;
+    }
+    std::uint64_t times = 0;
+    if (::read(timer_.native_handle(), &times, sizeof times) > 0) {
+        due_();
+    } else { // it was set again while this was pending
+        wait();
+    }
 }
 
 void asio_environment::post(std::shared_ptr<core::task> next) { asio::post(executor_, posted_task{std::move(next)}); }

@@ -7,6 +7,7 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
+#include <boost/system/error_code.hpp>
 
 #include <functional>
 #include <map>
@@ -34,6 +35,7 @@ class boottime_timer final : public std::enable_shared_from_this<boottime_timer>
 
   private:
     void wait();
+    void on_due(boost::system::error_code code);
 
     boost::asio::posix::stream_descriptor timer_;
     std::function<void()> due_; // empty: stopped

@@ -4,11 +4,11 @@
 #include <cles/shared_reading.hpp>
 
 #include "protocol/request_line.hpp"
+#include "transport/member_handler.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/execution/context.hpp>
 #include <boost/asio/execution_context.hpp>
-#include <boost/asio/post.hpp>
 #include <boost/asio/query.hpp>
 #include <boost/system/system_error.hpp>
 
@@ -106,10 +106,10 @@ class group_receiver : public std::enable_shared_from_this<group_receiver> {
     /// itself from `source`; while it is the only one, the system drops that.
     [[gnu::cold]] void add(core::group_listener& listener, const core::group_source& source);
     /// Nothing more is delivered to it; may be called during delivery. With the last listener, the socket is closed.
-    void remove(const core::group_listener& listener);
+    [[gnu::cold]] void remove(const core::group_listener& listener);
 
-    [[nodiscard]] bool is_for(const asio::any_io_executor& executor, const core::network_interface& by,
-                              const udp::endpoint& group);
+    [[nodiscard, gnu::cold]] bool is_for(const asio::any_io_executor& executor, const core::network_interface& by,
+                                         const udp::endpoint& group);
 
   private:
     struct place {
@@ -125,8 +125,9 @@ class group_receiver : public std::enable_shared_from_this<group_receiver> {
         cles::detail::shared_reading reading{}; // of its body
     };
 
-    void filter();
+    [[gnu::cold]] void filter();
     void receive();
+    void on_readable(error_code code);
     void deliver();
     void continue_soon();
     [[nodiscard]] bool fetch();
@@ -201,17 +202,19 @@ void group_receiver::filter() {
 }
 
 void group_receiver::receive() {
-    socket_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
-        if (!code) {
-            self->more_ = true;
-            self->next_ = self->listeners_.size(); // their number may have changed
-            self->deliver();
-        }
-    });
+    wait_call<&group_receiver::on_readable>(socket_, udp::socket::wait_read, shared_from_this());
+}
+
+void group_receiver::on_readable(error_code code) {
+    if (!code) {
+        more_ = true;
+        next_ = listeners_.size(); // their number may have changed
+        deliver();
+    }
 }
 
 void group_receiver::continue_soon() {
-    asio::post(socket_.get_executor(), [self = shared_from_this()] { self->deliver(); });
+    post_call<&group_receiver::deliver>(socket_.get_executor(), shared_from_this());
 }
 
 // User handlers run inside. So each listener receives what has arrived in a posted function of its own, and what it
@@ -372,15 +375,17 @@ void group_port::wait_until_writable() {
         return;
     }
     waits_until_writable_ = true;
-    own_.async_wait(udp::socket::wait_write, [self = shared_from_this()](error_code code) {
-        self->waits_until_writable_ = false;
-        if (!code && self->owner_ != nullptr) {
-            self->send_rest();
-            if (self->unsent() == 0 && self->owner_ != nullptr) {
-                self->owner_->on_writable();
-            }
+    wait_call<&group_port::on_writable>(own_, udp::socket::wait_write, shared_from_this());
+}
+
+void group_port::on_writable(error_code code) {
+    waits_until_writable_ = false;
+    if (!code && owner_ != nullptr) {
+        send_rest();
+        if (unsent() == 0 && owner_ != nullptr) {
+            owner_->on_writable();
         }
-    });
+    }
 }
 
 void group_port::send_rest() {
@@ -410,12 +415,12 @@ void group_port::receive_own() {
     }
 }
 
-void group_port::wait_for_own() {
-    own_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
-        if (!code) {
-            self->deliver_own();
-        }
-    });
+void group_port::wait_for_own() { wait_call<&group_port::on_own>(own_, udp::socket::wait_read, shared_from_this()); }
+
+void group_port::on_own(error_code code) {
+    if (!code) {
+        deliver_own();
+    }
 }
 
 void group_port::deliver_own() {
@@ -427,7 +432,7 @@ void group_port::deliver_own() {
                 owner_->on_datagram({.from = from, .text = one.text, .request = nullptr, .to_group = false});
             }
         },
-        [this] { asio::post(own_.get_executor(), [self = shared_from_this()] { self->deliver_own(); }); });
+        [this] { post_call<&group_port::deliver_own>(own_.get_executor(), shared_from_this()); });
     if (all && own_.is_open()) {
         wait_for_own();
     }

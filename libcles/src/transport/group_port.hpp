@@ -8,6 +8,7 @@
 
 #include <boost/asio/any_io_executor.hpp>
 #include <boost/asio/ip/udp.hpp>
+#include <boost/system/error_code.hpp>
 
 #include <cstddef>
 #include <cstdint>
@@ -36,20 +37,22 @@ class group_port final : public core::group_port, public std::enable_shared_from
     [[gnu::cold]] group_port(const boost::asio::any_io_executor& executor, const core::network_interface& by,
                              const multicast_options& where);
 
-    void start(core::group_listener& owner) override;
+    [[gnu::cold]] void start(core::group_listener& owner) override;
     core::datagrams_done send(core::datagram_list all) override;
     void send_to(const core::group_source& to, std::string_view datagram) override;
-    void receive_own() override;
+    [[gnu::cold]] void receive_own() override;
     [[nodiscard]] std::size_t unsent() const noexcept override { return waiting_.size() - waiting_at_; }
-    void close() override;
+    [[gnu::cold]] void close() override;
     [[nodiscard]] const core::group_source& source() const noexcept override { return source_; }
 
     static constexpr std::size_t max_waiting = 1U << 16U;
 
   private:
-    void send_rest();
+    [[gnu::cold]] void send_rest();
     [[gnu::cold]] void wait_until_writable();
+    [[gnu::cold]] void on_writable(boost::system::error_code code);
     void wait_for_own();
+    void on_own(boost::system::error_code code);
     void deliver_own();
 
     udp::endpoint group_;

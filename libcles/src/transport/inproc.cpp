@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: BSL-1.0
+#include "transport/member_handler.hpp"
 #include "transport/transports.hpp"
 
 #include <boost/asio/any_io_executor.hpp>
@@ -84,21 +85,31 @@ class inproc_link final : public link, public std::enable_shared_from_this<inpro
   private:
     enum class state : std::uint8_t { fresh, open, finishing, closed };
 
+    /// What one end tells the other, besides lines.
+    struct notice {
+        void (*tell)(inproc_link& other, std::size_t bytes);
+        std::size_t bytes = 0;
+
+        void operator()(inproc_link& other) const { tell(other, bytes); }
+    };
+
     template <class F>
     void post_to_peer(F action);
     void receive(std::string lines);
     void consumed(std::size_t bytes);
-    void on_other_finished();
-    void on_other_closed();
+    [[gnu::cold]] void on_other_finished();
+    [[gnu::cold]] void on_other_closed();
     void hand_over();
     void hand_over_batch();
     void continue_later();
+    void go_on();
     bool next_text();
     void release(std::size_t bytes);
-    void discard_input();
+    [[gnu::cold]] void discard_input();
     [[gnu::cold]] void wait_for_peer_close();
+    [[gnu::cold]] void on_timeout(boost::system::error_code code);
     [[gnu::cold]] void lose_later();
-    void lose();
+    [[gnu::cold]] void lose();
     [[nodiscard]] bool drained() const noexcept { return read_at_ >= text_.size() && inbox_.empty(); }
     // This much may be in transit before it counts as unsent, like data in the buffers of a socket.
     [[nodiscard]] std::size_t excess_in_transit() const noexcept {
@@ -218,7 +229,7 @@ void inproc_link::receive(std::string lines) {
 // Notifies the other end that this much has been read.
 void inproc_link::release(std::size_t bytes) {
     if (bytes != 0 && state_ != state::closed) {
-        post_to_peer([bytes](inproc_link& other) { other.consumed(bytes); });
+        post_to_peer(notice{[](inproc_link& other, std::size_t read) { other.consumed(read); }, bytes});
     }
 }
 
@@ -305,14 +316,16 @@ void inproc_link::hand_over() {
 void inproc_link::continue_later() {
     if (!posted_) {
         posted_ = true;
-        asio::post(timeout_.get_executor(), [self = shared_from_this()] {
-            self->posted_ = false;
-            if (self->state_ == state::open) {
-                self->hand_over();
-            } else if (self->state_ == state::finishing) {
-                self->discard_input();
-            }
-        });
+        post_call<&inproc_link::go_on>(timeout_.get_executor(), shared_from_this());
+    }
+}
+
+void inproc_link::go_on() {
+    posted_ = false;
+    if (state_ == state::open) {
+        hand_over();
+    } else if (state_ == state::finishing) {
+        discard_input();
     }
 }
 
@@ -334,7 +347,7 @@ void inproc_link::finish() {
     flush();
     state_ = state::finishing;
     discard_input();
-    post_to_peer([](inproc_link& other) { other.on_other_finished(); });
+    post_to_peer(notice{[](inproc_link& other, std::size_t) { other.on_other_finished(); }});
     if (ended_ || peer_closed_) {
         lose_later();
     } else if (excess_in_transit() == 0) {
@@ -344,11 +357,13 @@ void inproc_link::finish() {
 
 void inproc_link::wait_for_peer_close() {
     timeout_.expires_after(bounds_.discard);
-    timeout_.async_wait([self = shared_from_this()](boost::system::error_code code) {
-        if (!code) {
-            self->lose();
-        }
-    });
+    wait_call<&inproc_link::on_timeout>(timeout_, shared_from_this());
+}
+
+void inproc_link::on_timeout(boost::system::error_code code) {
+    if (!code) {
+        lose();
+    }
 }
 
 void inproc_link::on_other_finished() {
@@ -371,9 +386,7 @@ void inproc_link::on_other_closed() {
     }
 }
 
-void inproc_link::lose_later() {
-    asio::post(timeout_.get_executor(), [self = shared_from_this()] { self->lose(); });
-}
+void inproc_link::lose_later() { post_call<&inproc_link::lose>(timeout_.get_executor(), shared_from_this()); }
 
 void inproc_link::lose() {
     if (state_ == state::closed) {
@@ -395,7 +408,7 @@ void inproc_link::close() {
     discard_input();
     owner_.reset();
     own_mailbox_->shut();
-    post_to_peer([](inproc_link& other) { other.on_other_closed(); });
+    post_to_peer(notice{[](inproc_link& other, std::size_t) { other.on_other_closed(); }});
 }
 
 // -- the transport -------------------------------------------------------------------------------------------------
@@ -448,7 +461,7 @@ class inproc_acceptor final : public acceptor, public std::enable_shared_from_th
     }
 
     // Called on any thread. Returns false if it has been shut.
-    bool admit(const std::shared_ptr<inproc_link>& near) {
+    [[gnu::cold]] bool admit(const std::shared_ptr<inproc_link>& near) {
         return mailbox_.use([&](const asio::any_io_executor& executor) {
             auto far = std::make_shared<inproc_link>(executor, to_string(where_), bounds_);
             inproc_link::join(near, far);
@@ -471,6 +484,28 @@ class inproc_acceptor final : public acceptor, public std::enable_shared_from_th
     std::function<void(link_ptr)> on_link_; // used on the executor only
 };
 
+/// The result of dialling, which is reported later.
+class dialled_link {
+  public:
+    dialled_link(std::shared_ptr<inproc_link> made, dial_callback done)
+        : made_(std::move(made)), done_(std::move(done)) {}
+
+    [[gnu::cold]] void report() {
+        const auto made = std::exchange(made_, nullptr);
+        if (const auto done = std::exchange(done_, nullptr)) {
+            done(made ? boost::system::error_code{} : asio::error::connection_refused, made);
+        } else if (made) {
+            made->close();
+        }
+    }
+    /// It is closed instead.
+    void give_up() { done_ = nullptr; }
+
+  private:
+    std::shared_ptr<inproc_link> made_; // null: refused
+    dial_callback done_;                // empty: given up
+};
+
 class inproc_transport final : public link_transport {
   public:
     [[nodiscard]] bool is_exposed(const url&) const override { return false; }
@@ -484,27 +519,21 @@ class inproc_transport final : public link_transport {
         return handle_of(std::move(listener));
     }
 
-    std::function<void()> dial(const asio::any_io_executor& executor, const url& where, const limits& bounds,
-                               dial_callback done) override {
+    [[gnu::cold]] std::function<void()> dial(const asio::any_io_executor& executor, const url& where,
+                                             const limits& bounds, dial_callback done) override {
         auto near = std::make_shared<inproc_link>(executor, to_string(where), bounds);
         const auto listener = all_inproc_listeners().find(where.host);
         if (!listener || !listener->admit(near)) {
             near->close();
             near.reset();
         }
-        auto given_up = std::make_shared<bool>(false);
-        asio::post(executor, [given_up, near, done = std::move(done)] {
-            if (*given_up) {
-                if (near) {
-                    near->close();
-                }
-            } else if (near) {
-                done({}, near);
-            } else {
-                done(asio::error::connection_refused, nullptr);
+        const auto result = std::make_shared<dialled_link>(std::move(near), std::move(done));
+        post_call<&dialled_link::report>(executor, result);
+        return [weak = std::weak_ptr{result}] { // the context owns the link, and may be destroyed first
+            if (const auto pending = weak.lock()) {
+                pending->give_up();
             }
-        });
-        return [given_up] { *given_up = true; };
+        };
     }
 };
 

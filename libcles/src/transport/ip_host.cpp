@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/ip_host.hpp"
 
+#include "transport/member_handler.hpp"
+
 #include <boost/asio/error.hpp>
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
@@ -83,15 +85,17 @@ void host_lookup::start(const url& where, std::chrono::milliseconds within, call
         return;
     }
     timeout_.expires_after(within);
-    timeout_.async_wait([self = shared_from_this()](error_code code) {
-        if (!code) {
-            self->end(asio::error::timed_out, {});
-        }
-    });
+    wait_call<&host_lookup::on_timeout>(timeout_, shared_from_this());
     resolver_.async_resolve(where.host, "",
                             [self = shared_from_this()](error_code code, asio::ip::tcp::resolver::results_type found) {
                                 self->end(code, addresses_of(found));
                             });
+}
+
+void host_lookup::on_timeout(error_code code) {
+    if (!code) {
+        end(asio::error::timed_out, {});
+    }
 }
 
 void host_lookup::end(error_code code, const std::vector<asio::ip::address>& found) {

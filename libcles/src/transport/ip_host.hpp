@@ -39,6 +39,7 @@ class host_lookup : public std::enable_shared_from_this<host_lookup> {
     void give_up();
 
   private:
+    void on_timeout(boost::system::error_code code);
     void end(boost::system::error_code code, const std::vector<boost::asio::ip::address>& found);
 
     boost::asio::ip::tcp::resolver resolver_; // an address is the same for TCP and UDP

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/stream_endpoint.hpp"
 
+#include "transport/member_handler.hpp"
+
 #include <boost/asio/error.hpp>
 
 #include <chrono>
@@ -19,16 +21,18 @@ stream_dialler::stream_dialler(const asio::any_io_executor& executor, const limi
 
 void stream_dialler::start(std::vector<stream_address> where) {
     where_ = std::move(where);
-    timeout_.async_wait([self = shared_from_this()](error_code code) {
-        if (!code) {
-            self->fail(asio::error::timed_out);
-        }
-    });
+    wait_call<&stream_dialler::on_timeout>(timeout_, shared_from_this());
     connect();
 }
 
+void stream_dialler::on_timeout(error_code code) {
+    if (!code) {
+        fail(asio::error::timed_out);
+    }
+}
+
 void stream_dialler::connect() {
-    socket_.async_connect(where_[tried_++], [self = shared_from_this()](error_code code) { self->on_connected(code); });
+    socket_.async_connect(where_[tried_++], member_handler::calling<&stream_dialler::on_connected>(shared_from_this()));
 }
 
 void stream_dialler::on_connected(error_code code) {
@@ -167,11 +171,13 @@ void stream_acceptor::accept() {
 
 void stream_acceptor::accept_later() {
     pause_.expires_after(std::chrono::milliseconds{100});
-    pause_.async_wait([self = shared_from_this()](error_code code) {
-        if (!code && self->acceptor_.is_open()) {
-            self->accept();
-        }
-    });
+    wait_call<&stream_acceptor::after_pause>(pause_, shared_from_this());
+}
+
+void stream_acceptor::after_pause(error_code code) {
+    if (!code && acceptor_.is_open()) {
+        accept();
+    }
 }
 
 } // namespace cles::transport

@@ -44,6 +44,7 @@ class stream_dialler : public std::enable_shared_from_this<stream_dialler> {
     void give_up();
 
   private:
+    void on_timeout(boost::system::error_code code);
     void connect();
     void on_connected(boost::system::error_code code);
     void make_link();
@@ -77,6 +78,7 @@ class stream_acceptor : public acceptor, public std::enable_shared_from_this<str
   private:
     void accept();
     void accept_later();
+    void after_pause(boost::system::error_code code);
     void hand_over(stream_socket socket);
 
     listening_socket acceptor_;

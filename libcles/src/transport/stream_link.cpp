@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "transport/stream_link.hpp"
 
+#include "transport/member_handler.hpp"
 #include "transport/transports.hpp"
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/error.hpp>
-#include <boost/asio/post.hpp>
 
 #include <algorithm>
 #include <utility>
@@ -39,11 +39,7 @@ void stream_link::start(std::shared_ptr<link_events> owner) {
     if (!codec_) {
         read();
     } else if (state_ == state::closed) { // it could not be opened
-        asio::post(socket_.get_executor(), [self = shared_from_this()] {
-            if (const auto told = std::exchange(self->owner_, nullptr)) {
-                told->on_lost(self->failure_);
-            }
-        });
+        post_call<&stream_link::report_failure>(socket_.get_executor(), shared_from_this());
     } else if (!opening_) {
         continue_later(); // the codec may have text already
     }
@@ -54,13 +50,21 @@ void stream_link::start(std::shared_ptr<link_events> owner) {
 void stream_link::open(std::function<void(error_code)> opened) {
     opened_ = std::move(opened);
     timeout_.expires_after(codec_->time_to_open());
-    timeout_.async_wait([self = shared_from_this()](error_code code) {
-        if (!code && self->opening_ && self->state_ == state::open) {
-            self->failure_ = asio::error::timed_out;
-            self->finish();
-        }
-    });
-    asio::post(socket_.get_executor(), [self = shared_from_this()] { self->continue_opening(); });
+    wait_call<&stream_link::on_opening_timeout>(timeout_, shared_from_this());
+    post_call<&stream_link::continue_opening>(socket_.get_executor(), shared_from_this());
+}
+
+void stream_link::on_opening_timeout(error_code code) {
+    if (!code && opening_ && state_ == state::open) {
+        failure_ = asio::error::timed_out;
+        finish();
+    }
+}
+
+void stream_link::report_failure() {
+    if (const auto told = std::exchange(owner_, nullptr)) {
+        told->on_lost(failure_);
+    }
 }
 
 void stream_link::continue_opening() {
@@ -87,7 +91,7 @@ void stream_link::on_opened() {
     codec_->describe(peer_);
     codec_->watch([weak = weak_from_this()](error_code why) {
         if (const auto self = weak.lock()) {
-            asio::post(self->socket_.get_executor(), [self, why] { self->fail(why); });
+            post_call<&stream_link::fail>(self->socket_.get_executor(), self, why);
         }
     });
     flush();
@@ -116,9 +120,12 @@ void stream_link::read() {
     }
     reading_ = true;
     const auto space = codec_ ? codec_->prepare() : input_.prepare();
+    read_into(asio::buffer(space.data(), space.size()));
+}
+
+void stream_link::read_into(asio::mutable_buffer space) {
     socket_.async_receive(
-        asio::buffer(space.data(), space.size()),
-        [self = shared_from_this()](error_code code, std::size_t count) { self->on_read(code, count); });
+        space, [self = shared_from_this()](error_code code, std::size_t count) { self->on_read(code, count); });
 }
 
 void stream_link::on_read(error_code code, std::size_t count) {
@@ -261,14 +268,16 @@ bool stream_link::hand_over_batch() {
 void stream_link::continue_later() {
     if (!posted_) {
         posted_ = true;
-        asio::post(socket_.get_executor(), [self = shared_from_this()] {
-            self->posted_ = false;
-            if (self->state_ == state::open) {
-                self->hand_over();
-            } else {
-                self->discard();
-            }
-        });
+        post_call<&stream_link::go_on>(socket_.get_executor(), shared_from_this());
+    }
+}
+
+void stream_link::go_on() {
+    posted_ = false;
+    if (state_ == state::open) {
+        hand_over();
+    } else {
+        discard();
     }
 }
 
@@ -331,7 +340,7 @@ void stream_link::clear_output() {
 
 // Reported later: the owner may be in the middle of something, and may read the explanation before that.
 void stream_link::lose_later(error_code why) {
-    asio::post(socket_.get_executor(), [self = shared_from_this(), why] { self->lose(why); });
+    post_call<&stream_link::lose>(socket_.get_executor(), shared_from_this(), why);
     output_.clear();
 }
 
@@ -508,16 +517,15 @@ void stream_link::release_input() {
 // -- ending --------------------------------------------------------------------------------------------------------
 
 void stream_link::watch_for_hangup() {
-    socket_.async_wait(socket_type::wait_error, [self = shared_from_this()](error_code code) {
-        if (!code && self->state_ != state::closed) {
-            self->on_error_condition();
-        }
-    });
+    wait_call<&stream_link::on_error_condition>(socket_, socket_type::wait_error, shared_from_this());
 }
 
 // It may be urgent data, which means nothing here. The condition persists, so this stops waiting; a write shows further
 // errors.
-void stream_link::on_error_condition() {
+void stream_link::on_error_condition(error_code code) {
+    if (code || state_ == state::closed) {
+        return;
+    }
     pollfd now{.fd = socket_.native_handle(), .events = 0, .revents = 0};
     if (::poll(&now, 1, 0) > 0 && (now.revents & (POLLERR | POLLHUP)) != 0) {
         lose(asio::error::connection_reset);
@@ -552,15 +560,17 @@ void stream_link::shut_down_output() {
     error_code ignored;
     socket_.shutdown(asio::socket_base::shutdown_send, ignored);
     timeout_.expires_after(bounds_.discard);
-    timeout_.async_wait([self = shared_from_this()](error_code code) {
-        if (!code) {
-            self->lose(asio::error::eof);
-        }
-    });
+    wait_call<&stream_link::on_discard_timeout>(timeout_, shared_from_this());
     if (ended_) {
-        asio::post(socket_.get_executor(), [self = shared_from_this()] { self->lose(asio::error::eof); });
+        post_call<&stream_link::lose>(socket_.get_executor(), shared_from_this(), asio::error::eof);
     } else if (!handing_) {
         discard();
+    }
+}
+
+void stream_link::on_discard_timeout(error_code code) {
+    if (!code) {
+        lose(asio::error::eof);
     }
 }
 
@@ -571,9 +581,7 @@ void stream_link::discard() {
     }
     reading_ = true;
     discarded_.resize(4096);
-    socket_.async_receive(asio::buffer(discarded_), [self = shared_from_this()](error_code code, std::size_t count) {
-        self->on_read(code, count);
-    });
+    read_into(asio::buffer(discarded_));
 }
 
 void stream_link::lose(error_code why) {

@@ -6,6 +6,7 @@
 #include "protocol/line.hpp"
 #include "transport/stream_codec.hpp"
 
+#include <boost/asio/buffer.hpp>
 #include <boost/asio/generic/stream_protocol.hpp>
 #include <boost/asio/steady_timer.hpp>
 
@@ -46,13 +47,13 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     [[nodiscard]] std::uint64_t sent() const noexcept override { return sent_; }
     [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
     void pause(bool stop) override;
-    void finish() override;
-    void close() override;
+    [[gnu::cold]] void finish() override;
+    [[gnu::cold]] void close() override;
     [[nodiscard]] std::size_t buffered() const noexcept override {
         return input_.capacity() + output_.capacity() + urgent_.capacity() + sending_.capacity() +
                (codec_ ? encoded_.capacity() + codec_->buffered() : 0);
     }
-    void shrink() override;
+    [[gnu::cold]] void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return peer_; }
     [[nodiscard]] std::string_view epoch() const noexcept override {
         return codec_ && !opening_ ? codec_->epoch() : std::string_view{};
@@ -62,13 +63,15 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     enum class state : std::uint8_t { open, finishing, discarding, closed };
 
     void read();
+    void read_into(boost::asio::mutable_buffer space);
     void on_read(boost::system::error_code code, std::size_t count);
     void hand_over();
     bool hand_over_batch();
     [[nodiscard]] std::uint64_t written() const noexcept { return sent_ + unsent(); }
     void continue_later();
+    void go_on();
     [[nodiscard]] bool decode();
-    void release_input();
+    [[gnu::cold]] void release_input();
     void put_urgent_first();
     void clear_output();
     [[gnu::cold]] void lose_later(boost::system::error_code why);
@@ -81,12 +84,15 @@ class stream_link final : public link, public std::enable_shared_from_this<strea
     [[gnu::cold]] void shut_down_output();
     [[gnu::cold]] void discard();
     [[gnu::cold]] void watch_for_hangup();
-    void on_error_condition();
-    void lose(boost::system::error_code why);
+    [[gnu::cold]] void on_error_condition(boost::system::error_code code);
+    [[gnu::cold]] void on_discard_timeout(boost::system::error_code code);
+    [[gnu::cold]] void lose(boost::system::error_code why);
     // With a codec:
-    void continue_opening();
+    [[gnu::cold]] void report_failure();
+    [[gnu::cold]] void on_opening_timeout(boost::system::error_code code);
+    [[gnu::cold]] void continue_opening();
     [[gnu::cold]] void on_opened();
-    void fail(boost::system::error_code why);
+    [[gnu::cold]] void fail(boost::system::error_code why);
 
     socket_type socket_;
     identity peer_;

@@ -2,11 +2,11 @@
 #include "transport/udp.hpp"
 
 #include "transport/ip_host.hpp"
+#include "transport/member_handler.hpp"
 #include "transport/transports.hpp"
 
 #include <boost/asio/error.hpp>
 #include <boost/asio/ip/v6_only.hpp>
-#include <boost/asio/post.hpp>
 
 #include <array>
 #include <utility>
@@ -83,27 +83,29 @@ void udp_port::receive() {
         return;
     }
     receiving_ = true;
-    socket_.async_wait(udp::socket::wait_read, [self = shared_from_this()](error_code code) {
-        if (code) {
-            self->receiving_ = false;
-        } else {
-            self->hand_over();
-        }
-    });
+    wait_call<&udp_port::on_readable>(socket_, udp::socket::wait_read, shared_from_this());
+}
+
+void udp_port::on_readable(error_code code) {
+    if (code) {
+        receiving_ = false;
+    } else {
+        hand_over();
+    }
 }
 
 // Counts as receiving until everything is delivered: a link that starts meanwhile must not start to wait.
 void udp_port::hand_over() {
     const bool all = arrived_.hand_over_in_turns(
-        socket_, [this](const receive_batch::datagram& one) { hand_over(one); },
-        [this] { asio::post(socket_.get_executor(), [self = shared_from_this()] { self->hand_over(); }); });
+        socket_, [this](const receive_batch::datagram& one) { take(one); },
+        [this] { post_call<&udp_port::hand_over>(socket_.get_executor(), shared_from_this()); });
     if (all) {
         receiving_ = false;
         receive();
     }
 }
 
-void udp_port::hand_over(const receive_batch::datagram& one) {
+void udp_port::take(const receive_batch::datagram& one) {
     if (codec_) {
         codec_->receive(one.from, one.text);
         return;
@@ -188,11 +190,7 @@ void udp_port::on_unanswered(const datagram_origin& with, bool lost) {
 void udp_port::on_removed(std::uint32_t member) {
     for (const auto& [origin, link] : links_) {
         if (origin.member == member) {
-            asio::post(socket_.get_executor(), [weak = link->weak_from_this()] {
-                if (const auto ended = weak.lock()) {
-                    ended->lose(asio::error::no_permission);
-                }
-            });
+            post_call<&udp_link::lose>(socket_.get_executor(), link->shared_from_this(), asio::error::no_permission);
         }
     }
 }
@@ -259,11 +257,17 @@ core::datagrams_done udp_port::send(const udp_link& to, std::string_view lines) 
 }
 
 void udp_port::wait_until_writable(std::weak_ptr<udp_link> link) {
-    socket_.async_wait(udp::socket::wait_write, [self = shared_from_this(), link = std::move(link)](error_code) {
-        if (const auto alive = link.lock()) {
-            alive->on_writable();
-        }
-    });
+    waiting_.push_back(std::move(link));
+    wait_call<&udp_port::on_writable>(socket_, udp::socket::wait_write, shared_from_this());
+}
+
+// For the first link that waits. Each waits on its own, so that another goes on if the owner of one throws.
+void udp_port::on_writable() {
+    const auto link = waiting_.front().lock();
+    waiting_.erase(waiting_.begin());
+    if (link) {
+        link->on_writable();
+    }
 }
 
 udp_link::udp_link(std::shared_ptr<udp_port> socket, datagram_origin peer, identity who)
@@ -278,11 +282,13 @@ void udp_link::start(std::shared_ptr<link_events> owner) {
     }
     port_->receive();
     if (!early_.empty()) {
-        asio::post(port_->executor(), [self = shared_from_this()] {
-            for (const auto& datagram : std::exchange(self->early_, {})) {
-                self->deliver(datagram);
-            }
-        });
+        post_call<&udp_link::deliver_early>(port_->executor(), shared_from_this());
+    }
+}
+
+void udp_link::deliver_early() {
+    for (const auto& datagram : std::exchange(early_, {})) {
+        deliver(datagram);
     }
 }
 
@@ -375,15 +381,7 @@ void udp_link::finish() {
         return;
     }
     flush();
-    asio::post(port_->executor(), [self = shared_from_this()] {
-        const auto owner = self->owner_;
-        if (self->port_ != nullptr) {
-            self->close();
-            if (owner) {
-                owner->on_lost(asio::error::eof);
-            }
-        }
-    });
+    post_call<&udp_link::lose>(port_->executor(), shared_from_this(), asio::error::eof);
 }
 
 void udp_link::shrink() {

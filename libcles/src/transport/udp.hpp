@@ -31,7 +31,7 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     udp_link& operator=(const udp_link&) = delete;
     ~udp_link() override;
 
-    void start(std::shared_ptr<link_events> owner) override;
+    [[gnu::cold]] void start(std::shared_ptr<link_events> owner) override;
     std::string& output() override { return output_; }
     [[nodiscard]] std::size_t datagram() const noexcept override { return protocol::datagram_bytes; }
     void flush() override;
@@ -42,10 +42,10 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     [[nodiscard]] std::uint64_t received() const noexcept override { return received_; }
     /// What arrives meanwhile is dropped: a datagram may be lost at any time.
     void pause(bool stop) override { paused_ = stop; }
-    void finish() override;
-    void close() override;
+    [[gnu::cold]] void finish() override;
+    [[gnu::cold]] void close() override;
     [[nodiscard]] std::size_t buffered() const noexcept override { return output_.capacity() + sending_.capacity(); }
-    void shrink() override;
+    [[gnu::cold]] void shrink() override;
     [[nodiscard]] const identity& peer() const noexcept override { return who_; }
     [[nodiscard]] std::string_view epoch() const noexcept override { return epoch_; }
     void check_peer(time_point since) override;
@@ -55,16 +55,17 @@ class udp_link final : public link, public std::enable_shared_from_this<udp_link
     /// Notes the epoch that the peer has stated. Returns whether it had stated another one.
     bool note_epoch(std::uint32_t epoch);
     /// The peer has restarted, and this is the only link of the socket.
-    void on_restart();
-    void on_unanswered(bool lost);
+    [[gnu::cold]] void on_restart();
+    [[gnu::cold]] void on_unanswered(bool lost);
     /// Ends, and informs the owner.
-    void lose(boost::system::error_code why);
+    [[gnu::cold]] void lose(boost::system::error_code why);
     /// Delivers what arrived in a datagram.
     void deliver(std::string_view datagram);
     /// The socket is writable again.
-    void on_writable();
+    [[gnu::cold]] void on_writable();
 
   private:
+    [[gnu::cold]] void deliver_early();
     void take_output();
     void send_rest();
 
@@ -97,12 +98,12 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     [[gnu::cold]] explicit udp_port(udp::socket socket, std::unique_ptr<datagram_codec> codec = nullptr);
 
     /// Listens: from now on, each new source becomes a link.
-    void start(std::function<void(link_ptr)> on_link) override;
+    [[gnu::cold]] void start(std::function<void(link_ptr)> on_link) override;
     /// The only link of a connected socket.
     [[gnu::cold]] link_ptr connect_link(const udp::endpoint& peer, identity who, std::uint32_t member = 0);
     /// Accepts no new sources.
-    void close() override;
-    [[nodiscard]] url local() const override;
+    [[gnu::cold]] void close() override;
+    [[nodiscard, gnu::cold]] url local() const override;
 
     // For its links.
     void receive();
@@ -115,8 +116,10 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     [[nodiscard]] udp::socket::executor_type executor() { return socket_.get_executor(); }
 
   private:
+    void on_readable(boost::system::error_code code);
     void hand_over();
-    void hand_over(const receive_batch::datagram& one);
+    void take(const receive_batch::datagram& one);
+    [[gnu::cold]] void on_writable();
     [[nodiscard]] udp_link* find(const udp::endpoint& sender, std::uint32_t member);
     [[gnu::cold]] std::shared_ptr<udp_link> accept(const udp::endpoint& sender, std::uint32_t member,
                                                    std::uint32_t epoch);
@@ -124,7 +127,7 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     [[nodiscard]] const udp::endpoint* address_of(const udp::endpoint& to) const noexcept {
         return connected_ ? nullptr : &to;
     }
-    void close_if_done();
+    [[gnu::cold]] void close_if_done();
 
     // datagram_codec::carrier
     void transmit(const udp::endpoint& to, std::string_view datagram) override;
@@ -142,16 +145,17 @@ class udp_port final : public acceptor, public std::enable_shared_from_this<udp_
     boost::unordered_flat_map<datagram_origin, udp_link*, datagram_origin::hash> links_; // links remove themselves
     udp_link* recent_ = nullptr; // usually the source of the previous datagram
     receive_batch arrived_;
-    std::unique_ptr<datagram_codec> codec_; // null: lines are sent as they are
-    std::string sealed_;                    // what is being sent
-    std::vector<std::uint16_t> sizes_;      // of the datagrams in it
+    std::vector<std::weak_ptr<udp_link>> waiting_; // for the socket to be writable
+    std::unique_ptr<datagram_codec> codec_;        // null: lines are sent as they are
+    std::string sealed_;                           // what is being sent
+    std::vector<std::uint16_t> sizes_;             // of the datagrams in it
     bool sealing_ = false;
 };
 
 /// As `link_transport::listen` and `dial`.
-std::unique_ptr<acceptor> listen_udp(const boost::asio::any_io_executor& executor, const url& where,
-                                     std::unique_ptr<datagram_codec> codec = nullptr);
-std::function<void()> dial_udp(const boost::asio::any_io_executor& executor, const url& where, const limits& bounds,
-                               dial_callback done, sealed_peer_maker peer = {});
+[[gnu::cold]] std::unique_ptr<acceptor> listen_udp(const boost::asio::any_io_executor& executor, const url& where,
+                                                   std::unique_ptr<datagram_codec> codec = nullptr);
+[[gnu::cold]] std::function<void()> dial_udp(const boost::asio::any_io_executor& executor, const url& where,
+                                             const limits& bounds, dial_callback done, sealed_peer_maker peer = {});
 
 } // namespace cles::transport
