@@ -9,7 +9,9 @@
 #include <boost/asio/strand.hpp>
 #include <boost/asio/thread_pool.hpp>
 
+#include <functional>
 #include <future>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
@@ -28,26 +30,37 @@ asio::any_io_executor one_at_a_time(asio::any_io_executor executor) {
 
 using strand = asio::strand<asio::any_io_executor>;
 
-// Runs `f` on the strand that was made of a pool, and waits for it; inline if there is none.
-template <class F>
-std::invoke_result_t<F> run_on(const strand* own, F f) {
-    if (own == nullptr || own->running_in_this_thread()) {
-        return f();
-    }
-    const auto pool = own->get_inner_executor();
+// Runs it on the strand that was made of a pool, and waits for it.
+[[gnu::cold]] void run_and_wait(const strand& own, std::function<void()> f) {
+    const auto pool = own.get_inner_executor();
     if (const auto* threads = pool.target<asio::thread_pool::executor_type>();
         threads != nullptr && threads->running_in_this_thread()) {
         throw error(errc::would_deadlock, "on a thread of the service's pool: call it on the service's own executor");
     }
-    std::packaged_task<std::invoke_result_t<F>()> task{std::move(f)};
-    auto result = task.get_future();
-    asio::post(*own, std::move(task));
-    return result.get();
+    std::packaged_task<void()> task{std::move(f)};
+    auto done = task.get_future();
+    asio::post(own, std::move(task));
+    done.get();
+}
+
+// The same; inline if there is no such strand.
+template <class F>
+std::invoke_result_t<F> run_on(const strand* own, F f) {
+    using result_type = std::invoke_result_t<F>;
+    if (own == nullptr || own->running_in_this_thread()) {
+        return f();
+    }
+    if constexpr (std::is_void_v<result_type>) {
+        run_and_wait(*own, std::ref(f));
+    } else {
+        std::optional<result_type> result;
+        run_and_wait(*own, [&] { result.emplace(f()); });
+        return *std::move(result);
+    }
 }
 
 // The same on a strand that is not used yet: inline if called on a thread of the pool.
-template <class F>
-void begin_on(const strand* own, F f) {
+[[gnu::cold]] void begin_on(const strand* own, std::function<void()> f) {
     if (own == nullptr) {
         f();
         return;
