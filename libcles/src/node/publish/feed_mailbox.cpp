@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
 #include <utility>
 
 namespace cles::core {
@@ -64,6 +65,16 @@ void feed_queue::forget(const kept_event& e) noexcept {
     }
 }
 
+// Moves those before it, usually none or a few. `std::deque` may also move the others, which takes 4 kB of code.
+std::deque<kept_event>::iterator feed_queue::remove(std::deque<kept_event>::iterator which) {
+    const auto before = which - entries_.begin();
+    for (; which != entries_.begin(); --which) {
+        *which = std::move(*std::prev(which));
+    }
+    entries_.pop_front();
+    return entries_.begin() + before;
+}
+
 // A gap before the value goes with it: one gap reports both. A `current` value is not an update, so nothing is missed
 // with it: what the publisher has sent since follows it.
 void feed_queue::drop_oldest_value() {
@@ -75,7 +86,7 @@ void feed_queue::drop_oldest_value() {
         const bool found = is_value(*e);
         shed_ += e->kind == feed_event::update ? 1 : e->missed;
         forget(*e);
-        e = entries_.erase(e);
+        e = remove(e);
         if (found) {
             return;
         }
@@ -90,7 +101,7 @@ void feed_queue::push(const detail::raw_event& event) {
         bytes_ += event.body.size();
     } else if (is_status_event(entries_.back()) &&
                std::ranges::count_if(entries_, is_status_event) > max_status_events) {
-        entries_.erase(std::ranges::find_if(entries_, is_status_event));
+        remove(std::ranges::find_if(entries_, is_status_event));
     }
     while (values_ > max_values_ || (bytes_ > max_bytes_ && values_ > 1)) {
         drop_oldest_value();

@@ -47,7 +47,9 @@ class feed_queue {
         return e.kind == feed_event::lost || e.kind == feed_event::rebound;
     }
     void forget(const kept_event& e) noexcept;
-    void drop_oldest_value();
+    /// Returns the one after it.
+    [[gnu::cold]] std::deque<kept_event>::iterator remove(std::deque<kept_event>::iterator which);
+    [[gnu::cold]] void drop_oldest_value();
 
     std::size_t max_values_;
     std::size_t max_bytes_;
@@ -76,7 +78,7 @@ class feed_mailbox {
     bool next(event_ptr operation);
     void pump();
     /// Cancels the waiting operation.
-    void cancel();
+    [[gnu::cold]] void cancel();
     /// The same, if it is this one.
     void cancel(const detail::pending_event* operation) {
         if (waiter_.get() == operation) {
@@ -84,7 +86,7 @@ class feed_mailbox {
         }
     }
     /// Closes it and returns the waiting operation, which the caller has to complete.
-    [[nodiscard]] event_ptr close();
+    [[nodiscard, gnu::cold]] event_ptr close();
     [[nodiscard]] bool closed() const noexcept { return closed_; }
     [[nodiscard]] bool has_waiter() const noexcept { return waiter_ != nullptr; }
 

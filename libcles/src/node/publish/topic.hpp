@@ -13,7 +13,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <deque>
+#include <list>
 #include <memory>
 #include <optional>
 #include <string>
@@ -127,7 +127,7 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     /// Binds a subscriber, or changes the terms of its binding.
     [[gnu::cold]] void bind(subscriber& target, binding::terms wanted);
     /// Returns false if it was not bound.
-    bool unbind(subscriber& target);
+    [[gnu::cold]] bool unbind(subscriber& target);
     [[nodiscard]] binding* find(const subscriber& target) noexcept;
     [[nodiscard]] bool is_bound() const noexcept { return !bindings_.empty(); }
     /// Sends all subscribers their pending updates, as far as they take them.
@@ -143,7 +143,7 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
         std::uint64_t ticket = 0; ///< for cancellation
     };
     /// Updates that wait for capacity, oldest first.
-    std::deque<waiter>& waiters() noexcept { return waiters_; }
+    std::list<waiter>& waiters() noexcept { return waiters_; }
 
   private:
     friend binding;
@@ -163,7 +163,7 @@ class topic : public boost::intrusive::list_base_hook<boost::intrusive::link_mod
     std::uint64_t slowest_ = 0;    // the last update that each has been sent
     std::uint64_t fits_until_ = 0; // the last number that fits into each one's `keep`
     std::uint32_t max_keep_ = 0;
-    std::deque<waiter> waiters_;
+    std::list<waiter> waiters_;
 };
 
 } // namespace cles::core

@@ -145,6 +145,19 @@ BOOST_AUTO_TEST_CASE(a_loss_is_reported_even_to_a_slow_caller) {
     BOOST_TEST(all.ends_with("car1 9 {}, car1 10 {}"), all);
 }
 
+BOOST_AUTO_TEST_CASE(of_many_losses_the_oldest_are_dropped_and_values_keep_their_places) {
+    cles::core::feed_queue queue{10, 1000};
+    push_update(queue, 1);
+    std::string expected = "car1 1 {}";
+    for (int i = 1; i <= 18; ++i) {
+        const auto why = std::to_string(i);
+        queue.push({.kind = feed_event::lost, .text = why});
+        expected += i <= 2 ? "" : ", lost " + why;
+    }
+    push_update(queue, 2);
+    BOOST_TEST(pop_all(queue) == expected + ", car1 2 {}");
+}
+
 BOOST_AUTO_TEST_CASE(a_delivery_may_push_and_pop) {
     cles::core::feed_queue queue{10, 1000};
     push_update(queue, 1);
