@@ -107,7 +107,7 @@ bool read_json(json_reader& r, T& value) {
 
 namespace detail {
 
-[[noreturn]] void throw_broken_text(const json_writer& w);
+[[noreturn, gnu::cold]] void throw_broken_text(const json_writer& w);
 
 /// \throws cles::error with `conversion` if text that is not UTF-8 was written
 inline void require_utf8(const json_writer& w) {

@@ -16,12 +16,16 @@
 namespace cles {
 namespace {
 
+[[noreturn]] void refuse(std::string_view name, const std::string& value, const std::string& least,
+                         const std::string& most, const char* unit) {
+    throw error(errc::invalid_option,
+                "limits." + std::string{name} + " is " + value + unit + ": must be " + least + " to " + most + unit);
+}
+
 template <class T>
 void refuse_outside(std::string_view name, T value, T least, T most, const char* unit) {
     if (value < least || value > most) {
-        throw error(errc::invalid_option, "limits." + std::string{name} + " is " + std::to_string(value) + unit +
-                                              ": must be " + std::to_string(least) + " to " + std::to_string(most) +
-                                              unit);
+        refuse(name, std::to_string(value), std::to_string(least), std::to_string(most), unit);
     }
 }
 

@@ -25,7 +25,7 @@ class completion_drain final : public task, public std::enable_shared_from_this<
 
     void put(completion due);
     void run() override;
-    void discard() noexcept override;
+    [[gnu::cold]] void discard() noexcept override;
 
   private:
     void post();

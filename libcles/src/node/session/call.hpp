@@ -55,9 +55,9 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
 
     /// The result. A request to publish publishes its body first; if that throws, the call fails.
     void done(std::string_view json);
-    void fail(protocol::failure why);
+    [[gnu::cold]] void fail(protocol::failure why);
     /// Fails it, and notifies the handler that nobody waits.
-    void abort(protocol::failure why);
+    [[gnu::cold]] void abort(protocol::failure why);
     /// Returns false if nobody waits for progress (any more).
     bool progress(double fraction, std::string_view json);
     /// `callback` runs once, if anything but the handler ends the call; at once if that has happened.
@@ -65,7 +65,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     /// Removes and returns the `on_stop` callback.
     std::function<void()> forget_on_stop() noexcept { return std::exchange(on_stop_, nullptr); }
     /// Logs a handler's message with the request's id and, until the call ends, the peer's address.
-    void write_log(log_level level, std::string_view text) const;
+    [[gnu::cold]] void write_log(log_level level, std::string_view text) const;
     /// Reserves this much more memory until the handler releases the call. False if there is none.
     [[nodiscard]] bool hold_more(std::size_t bytes) noexcept { return held_.try_resize(held_.size() + bytes); }
     /// Whether there is memory for a reply of this size to wait for the peer.
@@ -86,11 +86,11 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     /// Ends the call: anything the handler still reports is ignored.
     void detach() noexcept;
     /// Notifies the handler that nobody waits.
-    void stop();
+    [[gnu::cold]] void stop();
 
   private:
     task_sink& end();
-    void on_deadline(time_point now) override;
+    [[gnu::cold]] void on_deadline(time_point now) override;
 
     std::shared_ptr<node_state> node_; // the handler may outlive the service
     task_sink* owner_;

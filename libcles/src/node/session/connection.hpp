@@ -31,9 +31,9 @@ class connection final : public link_events,
 
     /// `number` is unique within the service.
     [[gnu::cold]] connection(std::shared_ptr<local_node> host, link_ptr carrier, origin from, std::uint64_t number);
-    ~connection() override;
+    [[gnu::cold]] ~connection() override;
 
-    void start();
+    [[gnu::cold]] void start();
     [[nodiscard]] core::session& session() noexcept { return session_; }
     [[nodiscard]] origin from() const noexcept { return from_; }
     [[nodiscard]] std::uint64_t number() const noexcept { return number_; }
@@ -47,21 +47,21 @@ class connection final : public link_events,
     /// \pre it is a stream or a source
     [[nodiscard]] link_monitor& monitor() noexcept { return *monitor_; }
     /// Closes the link at once; `on_lost` is not called.
-    void abandon(std::string_view why);
+    [[gnu::cold]] void abandon(std::string_view why);
     /// Sends a BIND for `feed`, which receives the updates from then on.
     [[gnu::cold]] void bind(feed_machine& feed, protocol::outgoing_request request, time_point deadline,
                             detail::pending_ptr operation);
-    void unbind(feed_machine& feed);
+    [[gnu::cold]] void unbind(feed_machine& feed);
     /// Whether the peer's reply to BIND names the update that it holds; empty until the peer has been asked.
     [[nodiscard]] std::optional<bool> marks() const noexcept { return marks_; }
     void set_marks(bool does) noexcept { marks_ = does; }
 
     // link_events
     void on_line(std::string_view line) override;
-    void on_overlong(std::string_view head) override;
-    void on_cut(std::string_view rest) override;
+    [[gnu::cold]] void on_overlong(std::string_view head) override;
+    [[gnu::cold]] void on_cut(std::string_view rest) override;
     void on_batch() override;
-    void on_end() override;
+    [[gnu::cold]] void on_end() override;
     [[gnu::cold]] void on_lost(boost::system::error_code why) override;
     void on_writable() override;
     [[gnu::cold]] void on_restart() override;
@@ -82,8 +82,8 @@ class connection final : public link_events,
     void wake() override;
     [[nodiscard]] bool is_behind() const override;
     void pause(bool stop) override;
-    void finish() override;
-    void close() override;
+    [[gnu::cold]] void finish() override;
+    [[gnu::cold]] void close() override;
     void retire() override { usable_ = false; }
     void check_peer(time_point since) override { link_->check_peer(since); }
 
@@ -108,19 +108,19 @@ class connection final : public link_events,
     void rethrow_handler_exception();
     // link_monitor::owner
     [[gnu::cold]] void on_silence() override;
-    void on_probe() override;
-    void evict() override;
+    [[gnu::cold]] void on_probe() override;
+    [[gnu::cold]] void evict() override;
 
     [[gnu::cold]] void on_stall(time_point now);
     void schedule_buffer_release();
-    void on_idle(time_point now);
+    [[gnu::cold]] void on_idle(time_point now);
     void send_output();
     [[nodiscard]] bool may_serve_more();
     void serve_more();
     void update_backpressure();
-    void close_after_flush(std::string_view why);
+    [[gnu::cold]] void close_after_flush(std::string_view why);
     [[gnu::cold]] void end(std::string_view why);
-    void lose_feeds(std::string_view why);
+    [[gnu::cold]] void lose_feeds(std::string_view why);
 
     std::shared_ptr<local_node> host_;
     link_ptr link_;

@@ -94,7 +94,7 @@ class dedup final : private deadline {
 /// Filters requests that arrive by datagram: those that must not run twice need an id, and repeats are recognised.
 class datagram_requests {
   public:
-    datagram_requests(node_state& host, line_sink& out, reply_writer& replies);
+    [[gnu::cold]] datagram_requests(node_state& host, line_sink& out, reply_writer& replies);
 
     /// Whether the request is to be served. False if it has been handled: refused, or recognised as a repeat.
     bool admit(const protocol::request_line& request);
@@ -134,7 +134,7 @@ class reflection_limit {
     };
 
     bucket* find_or_make(std::string_view address, time_point now);
-    void forget_full(time_point now);
+    [[gnu::cold]] void forget_full(time_point now);
 
     string_map<bucket> buckets_;
     time_point tidied_{};

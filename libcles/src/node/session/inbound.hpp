@@ -24,20 +24,20 @@ namespace cles::core {
 /// replies to the link's output; other handlers become calls. Only `on_request` and `serve_more` start handlers.
 class inbound final : private task_sink {
   public:
-    inbound(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer);
+    [[gnu::cold]] inbound(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer);
     inbound(const inbound&) = delete;
     inbound& operator=(const inbound&) = delete;
-    ~inbound();
+    [[gnu::cold]] ~inbound();
 
     /// A valid request; `line` is its text.
     void on_request(std::string_view line, const protocol::request_line& request, time_point now);
     /// A line that is not a valid request.
-    void on_malformed(const protocol::malformed_request& what);
+    [[gnu::cold]] void on_malformed(const protocol::malformed_request& what);
     /// A line over the limit: it is answered, then a stream ends.
-    void on_overlong(std::string_view head);
+    [[gnu::cold]] void on_overlong(std::string_view head);
     /// The peer sends no more: requests with an id are cancelled, the others are still answered, then the link
     /// finishes.
-    void end();
+    [[gnu::cold]] void end();
     /// The link is lost.
     [[gnu::cold]] void lose();
     /// From now on, new and waiting requests are answered with `busy`. Running ones still complete.
@@ -78,10 +78,10 @@ class inbound final : private task_sink {
     [[nodiscard]] bool must_wait(reply_target where) const noexcept {
         return where.id == 0 && where.wanted && ordered_.must_wait();
     }
-    void refuse_in_turn(reply_target where, const protocol::failure& why);
+    [[gnu::cold]] void refuse_in_turn(reply_target where, const protocol::failure& why);
     [[gnu::cold]] void withdraw(std::uint64_t id);
     /// The peer has broken the protocol: it gets what has been written, and then the link ends.
-    void break_off();
+    [[gnu::cold]] void break_off();
     void finish_if_done();
 
     // task_sink

@@ -33,7 +33,7 @@ class ordered_requests {
     /// Passes those whose turn it is to `run`, but not more than one pass may.
     void serve(const serve_function& run);
     /// Forgets all of them. Returns the call that is running, if any.
-    std::shared_ptr<call> clear() noexcept;
+    [[gnu::cold]] std::shared_ptr<call> clear() noexcept;
 
     /// The call that the others wait for; null if there is none.
     [[nodiscard]] const std::shared_ptr<call>& running() const noexcept { return running_; }

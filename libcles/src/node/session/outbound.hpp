@@ -54,10 +54,10 @@ class outbound {
     /// if it has ended.
     [[gnu::cold]] bool cancel(std::uint64_t id);
     /// Discards a request and its operation, without notifying anyone.
-    void drop(std::uint64_t id);
+    [[gnu::cold]] void drop(std::uint64_t id);
     void on_reply(const protocol::reply_line& reply);
     /// A reply over the line limit.
-    void on_overlong(const protocol::reply_line& reply);
+    [[gnu::cold]] void on_overlong(const protocol::reply_line& reply);
     /// The peer has restarted. Requests that it may have run fail, except PULL and BIND, which are sent again.
     [[gnu::cold]] void on_restart(time_point now);
     /// Fails all pending requests with the peer's refusal of the link as a whole: it has started none of them.
@@ -88,7 +88,7 @@ class outbound {
     /// The maximum size of a request, with its LF.
     [[nodiscard]] std::size_t longest() const noexcept;
     [[nodiscard]] bool has_memory_for(const protocol::outgoing_request& request);
-    void on_due(entry& e, time_point now);
+    [[gnu::cold]] void on_due(entry& e, time_point now);
     [[gnu::cold]] void resend(entry& e, time_point now);
     void rearm(std::unique_ptr<entry> e, time_point due);
     std::unique_ptr<entry> take(std::uint64_t id);

@@ -90,7 +90,7 @@ class reply_writer {
     }
     /// Sends a reply with this body; empty means {}. `head`: adverbs before it, if the request had an id.
     void done(reply_target where, std::string_view body, std::string_view head = {});
-    void fail(reply_target where, const protocol::failure& why);
+    [[gnu::cold]] void fail(reply_target where, const protocol::failure& why);
     void fail(const protocol::request_line& r, const protocol::failure& why) { fail(reply_target{r}, why); }
     void fail(const protocol::request_line& r, errc code, std::string message) {
         fail(reply_target{r}, {.code = code, .message = std::move(message)});

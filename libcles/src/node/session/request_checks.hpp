@@ -17,18 +17,18 @@ namespace cles::core {
 
 // -- failures that refuse requests ---------------------------------------------------------------------------------
 
-protocol::failure busy(std::string message);
+[[gnu::cold]] protocol::failure busy(std::string message);
 /// The memory limit is reached, of the node or of this peer.
-protocol::failure no_memory(const node_state& n);
-protocol::failure no_such_task(const node_state& n, const protocol::request_line& request);
+[[gnu::cold]] protocol::failure no_memory(const node_state& n);
+[[gnu::cold]] protocol::failure no_such_task(const node_state& n, const protocol::request_line& request);
 /// A line over the limit. `datagram`: the maximum size of one, 0 for a stream.
-protocol::failure overlong(const node_state& n, std::size_t datagram);
+[[gnu::cold]] protocol::failure overlong(const node_state& n, std::size_t datagram);
 /// `busy` if the node runs as many handlers as it may, else nothing.
 std::optional<protocol::failure> no_capacity_to_run(const node_state& n);
 /// The failure once the handler has run: `too_large` says so, since repeating the request would repeat its effect.
-protocol::failure after_run(protocol::failure why);
+[[gnu::cold]] protocol::failure after_run(protocol::failure why);
 
-std::string failure_text(const protocol::failure& why);
+[[gnu::cold]] std::string failure_text(const protocol::failure& why);
 
 // -- checks before a request is served -----------------------------------------------------------------------------
 
@@ -57,10 +57,10 @@ std::optional<protocol::failure> refusal_reason(const node_state& n, const ident
                                                 const protocol::request_line& request);
 
 /// The reply of a node that shuts down to new requests.
-protocol::failure shutting_down(const node_state& n);
+[[gnu::cold]] protocol::failure shutting_down(const node_state& n);
 
 /// Appends the reply to a link beyond the limit, and its LF.
-void append_link_refusal(std::string& out, const node_state& n, std::uint64_t id = 0);
+[[gnu::cold]] void append_link_refusal(std::string& out, const node_state& n, std::uint64_t id = 0);
 
 /// The id in "cles/cancel/<id>"; nothing for other nouns or an invalid id.
 std::optional<std::uint64_t> cancelled_id(const protocol::noun_view& noun);

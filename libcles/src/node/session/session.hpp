@@ -16,16 +16,16 @@ namespace cles::core {
 /// input; the output goes to the line sink.
 class session {
   public:
-    session(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer);
+    [[gnu::cold]] session(std::shared_ptr<node_state> host, line_sink& out, subscriber& updates, const identity& peer);
 
     void on_line(std::string_view line, time_point now);
-    void on_overlong(std::string_view head);
+    [[gnu::cold]] void on_overlong(std::string_view head);
     /// The peer has ended in the middle of this line.
-    void on_cut(std::string_view rest);
+    [[gnu::cold]] void on_cut(std::string_view rest);
     /// The peer sends no more.
-    void on_end();
+    [[gnu::cold]] void on_end();
     /// The link is gone; `why` is the reason.
-    void on_lost(std::string_view why);
+    [[gnu::cold]] void on_lost(std::string_view why);
 
     /// Whether no state is kept for the peer, and no reply or update is expected from it.
     [[nodiscard]] bool is_idle() const noexcept {
@@ -33,11 +33,11 @@ class session {
     }
     /// Sends the last line of this node, which leaves, and ends the link. Everything that it started for the peer has
     /// been answered. Does nothing over datagrams.
-    void send_leave_notice();
+    [[gnu::cold]] void send_leave_notice();
     /// States the version of this node's roster.
-    void send_hello();
+    [[gnu::cold]] void send_hello();
     /// Answers a line with `busy`, and does nothing else.
-    void reject(std::string_view line);
+    [[gnu::cold]] void reject(std::string_view line);
     [[nodiscard]] inbound& serving() noexcept { return inbound_; }
     [[nodiscard]] outbound& asking() noexcept { return outbound_; }
     [[nodiscard]] subscriptions& bound() noexcept { return subscriptions_; }
@@ -46,10 +46,10 @@ class session {
 
   private:
     [[nodiscard]] bool is_datagram() const noexcept { return out_.datagram() != 0; }
-    void refuse(std::string_view text, const char* why);
+    [[gnu::cold]] void refuse(std::string_view text, const char* why);
     void on_reply(std::string_view line);
-    void note_refusal(std::string_view line);
-    void lose_requests(std::string_view why);
+    [[gnu::cold]] void note_refusal(std::string_view line);
+    [[gnu::cold]] void lose_requests(std::string_view why);
     [[gnu::cold]] void on_leaving();
     void on_update(const subscriptions::match& found);
 

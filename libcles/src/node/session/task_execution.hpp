@@ -65,7 +65,7 @@ class task_registry {
 };
 
 /// \throws cles::error with `invalid_name` if the name of a task or the like is not valid
-void check_name(std::string_view name, std::string_view of);
+[[gnu::cold]] void check_name(std::string_view name, std::string_view of);
 
 /// Receives the outcome of a request that a task of this node serves: from its `task_execution` if the handler replies
 /// at once, else from its `call`. Usually serves the link on which the request arrived. The call has ended by then, so
