@@ -58,15 +58,46 @@ void next_withdrawal::operator()() const {
     }
 }
 
-void dispatch_next(std::shared_ptr<feed_control> control, event_ptr operation) {
-    const auto executor = control->executor();
-    asio::dispatch(executor, [control = std::move(control), operation = std::move(operation)]() mutable {
+void begin_next(const std::shared_ptr<feed_control>& control, event_ptr operation, bool hop) {
+    if (!hop) {
         control->next(std::move(operation));
-    });
+        return;
+    }
+    // The operation may end on the other thread before this returns, and `control` with it.
+    const auto executor = control->executor();
+    asio::dispatch(executor,
+                   [kept = control, operation = std::move(operation)]() mutable { kept->next(std::move(operation)); });
 }
 
-void dispatch_close(std::shared_ptr<feed_control> control, const asio::any_io_executor& service) {
-    asio::dispatch(service, [control = std::move(control)] { control->close(); });
+feed_owner::feed_owner(std::shared_ptr<feed_control> control, bool elsewhere)
+    : control_(std::move(control)), executor_(control_->executor()), elsewhere_(elsewhere) {}
+
+feed_owner::feed_owner(feed_owner&& other) noexcept
+    // NOLINTNEXTLINE(performance-move-constructor-init)
+    : control_(std::move(other.control_)), executor_(other.executor_), elsewhere_(other.elsewhere_) {}
+
+feed_owner& feed_owner::operator=(feed_owner&& other) noexcept {
+    if (this != &other) {
+        close();
+        control_ = std::move(other.control_);
+        executor_ = other.executor_;
+        elsewhere_ = other.elsewhere_;
+    }
+    return *this;
+}
+
+next_source feed_owner::source() const {
+    return {control_, control_ ? asio::any_io_executor{} : executor_, elsewhere_};
+}
+
+void feed_owner::close() {
+    if (auto control = std::exchange(control_, nullptr)) {
+        if (elsewhere_) {
+            asio::dispatch(executor_, [control = std::move(control)] { control->close(); });
+        } else {
+            control->close();
+        }
+    }
 }
 
 // --- Results ---

@@ -5,8 +5,9 @@
     header_cost_test.py --compiler CXX --headers DIR --define NAME... --scratch DIR
 
 `registrar.hpp` and the headers for plugins include no Asio. `service.hpp` has few lines beyond those of the standard
-library and of Asio that its interface needs, as the preprocessor counts them on this machine. Of a request that a
-coroutine awaits, a program compiles only what depends on the type of the result: how it is read.
+library and of Asio that its interface needs, as the preprocessor counts them on this machine. Of a request or a feed that
+a coroutine awaits, a program compiles only what depends on the type of the result: how it is read. A service on an
+`io_context` does not have its users compile Asio's executors.
 """
 
 import argparse
@@ -30,6 +31,25 @@ boost::asio::awaitable<int> ask(cles::service& node) {
     const auto pulled = co_await node.async_pull<reading>("car0:speed");
     const auto pushed = co_await node.async_push<reading>("car0:speed", pulled, cles::call_options{});
     co_return pushed.value;
+}
+
+boost::asio::awaitable<int> follow(cles::service& node) {
+    co_await node.async_update("speed", reading{});
+    auto feed = co_await node.async_bind<reading>("car0:speed");
+    const auto item = co_await feed.async_next();
+    co_await node.async_close(std::chrono::milliseconds{1});
+    co_return item.value.value;
+}
+"""
+
+CALLING = """
+#include <cles/service.hpp>
+
+#include <boost/asio/io_context.hpp>
+
+void ask(boost::asio::io_context& io) {
+    cles::service node{io, {.name = "me"}};
+    node.async_pull<int>("car0:speed", [](boost::system::error_code, int) {});
 }
 """
 
@@ -88,10 +108,20 @@ def main() -> int:
     functions = compiler.functions_of(AWAITING)
     if not any("read_result" in name for name in functions):
         failures.append("a program that awaits requests reads no result: this test does not recognise it")
-    typed = [name for name in functions if "7reading" in name and ("_operation" in name or "completion" in name)]
-    if typed:
-        failures.append(f"{len(typed)} functions of operations are compiled for each type of an awaited result, first "
-                        f"{typed[0]}")
+    operations = [name for name in functions
+                  if ("7reading" in name or "13error_code" in name) and
+                  any(part in name for part in ("_operation", "10completion", "_call", "13awaited_event"))]
+    if operations:
+        failures.append(f"{len(operations)} functions of operations are compiled for what a coroutine awaits, first "
+                        f"{operations[0]}")
+
+    functions = compiler.functions_of(CALLING)
+    if not any("reply_operation" in name for name in functions):
+        failures.append("a program with a callback has no operation: this test does not recognise it")
+    executors = [name for name in functions if "any_executor" in name and "basic_executor_type" in name]
+    if executors:
+        failures.append(f"{len(executors)} functions of Asio's executors are compiled for a service on an io_context, first "
+                        f"{executors[0]}")
 
     print("\n".join([*failures, f"{len(light)} headers without Asio; service.hpp: {all_lines} lines, {needed} of them of the "
                                 f"standard library and of Asio"]))

@@ -71,6 +71,9 @@ inline constexpr outcome outcome_of<boost::asio::consign_t<T, V...>> = outcome_o
 template <class Token>
 inline constexpr bool throws = outcome_of<Token> == outcome::exception;
 
+template <class Token>
+inline constexpr bool is_default_token = std::is_same_v<std::remove_cvref_t<Token>, boost::asio::use_awaitable_t<>>;
+
 /// The return type of the completion signature for `deferred`. It selects the specialisation of `async_result` below,
 /// which returns a `deferred_operation`.
 struct put_off;

@@ -9,9 +9,14 @@
 
 #include <boost/asio/associated_cancellation_slot.hpp>
 #include <boost/asio/async_result.hpp>
+#include <boost/asio/awaitable.hpp>
+#include <boost/asio/use_awaitable.hpp>
+#include <boost/version.hpp>
 
 #include <cstdint>
+#include <exception>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -62,11 +67,8 @@ struct next_withdrawal {
     void operator()() const;
 };
 
-/// `control->next`, on the service's executor.
-void dispatch_next(std::shared_ptr<feed_control> control, event_ptr operation);
-/// `control->close`, on the service's executor.
-void dispatch_close(std::shared_ptr<feed_control> control, const boost::asio::any_io_executor& service);
-
+/// `control->next`; `hop`: on the service's executor, which is not the caller's.
+void begin_next(const std::shared_ptr<feed_control>& control, event_ptr operation, bool hop);
 /// Reads an event's body. False if it is not JSON; if it does not fit T, sets `code` and `why` instead.
 template <class T>
 bool read_body(const raw_event& event, T& value, boost::system::error_code& code, std::string& why) {
@@ -142,6 +144,91 @@ class event_operation final : public pending_event {
     completion<Throws, Handler> complete_;
 };
 
+/// Where an awaited event is read to.
+struct event_target {
+    void* value;
+    bool (*read)(const raw_event& event, void* value, boost::system::error_code& code, std::string& why);
+};
+
+/// Reads an awaited event into an optional `feed_item<T>`. Always into a new item: what is not JSON may have filled the
+/// last one in part.
+template <class T>
+bool read_event(const raw_event& event, void* value, boost::system::error_code& code, std::string& why) {
+    return fill(event, static_cast<std::optional<feed_item<T>>*>(value)->emplace(), code, why);
+}
+
+/// What an `async_next` needs of its feed, which may be moved or closed before the operation starts.
+struct next_source {
+    std::shared_ptr<feed_control> control; ///< null if the feed is not open
+    boost::asio::any_io_executor fallback; ///< of the feed, if it is not open
+    bool elsewhere;
+};
+
+inline constexpr std::string_view not_open = "the feed is not open";
+
+/// Starts an `async_next` of an open feed. \tparam Operation made from the handler, the service's executor and the
+/// arguments
+template <class Operation, class Handler, class... A>
+void start_next(const next_source& from, Handler handler, const A&... arguments) {
+    const auto& control = from.control;
+    const auto slot = boost::asio::get_associated_cancellation_slot(handler);
+    auto* operation = make_operation<Operation>(std::move(handler), control->executor(), arguments...);
+    const bool hop = from.elsewhere || operation->elsewhere();
+    connect_slot(slot, next_withdrawal{control, operation, hop ? control->executor() : boost::asio::any_io_executor{}});
+    begin_next(control, event_ptr{operation}, hop);
+}
+
+/// An `async_next` that a coroutine awaits, as Asio awaits operations. Refers to memory of the coroutine.
+struct awaited_next {
+    const next_source& from;
+    event_target target;
+
+    template <boost::asio::completion_token_for<void(std::exception_ptr)> Token>
+    auto operator()(Token&& token) {
+        return boost::asio::async_initiate<Token, void(std::exception_ptr)>(
+            [this](auto handler) { this->start(std::move(handler)); }, token);
+    }
+
+  private:
+    template <class Handler>
+    void start(Handler handler);
+};
+
+/// Awaits an event with the default token; as `reply_coroutine`.
+template <class T>
+struct next_coroutine {
+    static boost::asio::awaitable<feed_item<T>> run(next_source from);
+};
+template <class T>
+boost::asio::awaitable<feed_item<T>> next_coroutine<T>::run(next_source from) {
+    std::optional<feed_item<T>> item;
+    awaited_next next{from, {&item, read_event<T>}};
+    co_await std::move(next); // NOLINT(performance-move-const-arg): Asio awaits rvalues
+    co_return *std::move(item);
+}
+
+// The library contains this, as what service.hpp declares so.
+extern template struct next_coroutine<json_text>;
+
+/// Owns a feed's control, for a feed of any type: closes it when destroyed.
+class feed_owner {
+  public:
+    feed_owner() = default;
+    feed_owner(std::shared_ptr<feed_control> control, bool elsewhere);
+    feed_owner(feed_owner&& other) noexcept;            ///< the other keeps its executor
+    feed_owner& operator=(feed_owner&& other) noexcept; ///< closes what it owned
+    ~feed_owner() { close(); }
+
+    [[nodiscard]] bool is_open() const noexcept { return control_ != nullptr; }
+    [[nodiscard]] next_source source() const;
+    void close();
+
+  private:
+    std::shared_ptr<feed_control> control_;
+    boost::asio::any_io_executor executor_; // kept when the feed is closed
+    bool elsewhere_ = false;                // it was passed to a handler on another executor
+};
+
 } // namespace detail
 
 template <class T>
@@ -172,7 +259,7 @@ class bind_operation final : public binding {
         : complete_(std::move(handler), service), diagnostics_(diagnostics) {}
 
     verdict offer(std::string_view) override {
-        feed<T> bound{take_control(), complete_.elsewhere()};
+        feed<T> bound{feed_owner{take_control(), complete_.elsewhere()}};
         end_operation(this, complete_, {}, {}, std::move(bound));
         return verdict::completed;
     }
@@ -201,6 +288,8 @@ class bind_operation final : public binding {
 /// and reported as a gap. When the publisher is lost, the feed reports it once and binds again by itself, with a
 /// backoff of 100 ms to 5 s. Destroying the feed unbinds.
 ///
+/// A moved-from feed keeps its executor, on which its `async_next` fails.
+///
 /// Use it on the executor on which the handler of its `async_bind` was called (the service's, or the handler's own),
 /// with one `async_next` at a time. It may outlive the service, and then fails with `stopped`.
 template <class T>
@@ -209,24 +298,7 @@ class feed {
     using value_type = T;
 
     feed() = default;
-    explicit feed(std::shared_ptr<detail::feed_control> control, bool elsewhere = false)
-        : control_(std::move(control)), executor_(control_->executor()), elsewhere_(elsewhere) {}
-    /// A moved-from feed keeps its executor, on which its `async_next` fails.
-    feed(feed&& other) noexcept
-        // NOLINTNEXTLINE(performance-move-constructor-init)
-        : control_(std::move(other.control_)), executor_(other.executor_), elsewhere_(other.elsewhere_) {}
-    feed& operator=(feed&& other) noexcept {
-        if (this != &other) {
-            close();
-            control_ = std::move(other.control_);
-            executor_ = other.executor_;
-            elsewhere_ = other.elsewhere_;
-        }
-        return *this;
-    }
-    feed(const feed&) = delete;
-    feed& operator=(const feed&) = delete;
-    ~feed() { close(); }
+    explicit feed(detail::feed_owner owner) noexcept : owner_(std::move(owner)) {}
 
     /// Waits for the next event. An update that does not convert to T fails with `conversion`; the next call continues
     /// with the event after it. Cancellation (terminal, partial or total) does not change the feed. If the feed is not
@@ -234,48 +306,40 @@ class feed {
     /// or on Asio's system executor if the feed was never bound.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_next(Token&& token = {}) {
-        constexpr bool with_exceptions = detail::throws<std::remove_cvref_t<Token>>;
-        return boost::asio::async_initiate<Token, detail::signature_for<Token, feed_item<T>>>(
-            [control = control_, elsewhere = elsewhere_,
-             fallback = control_ ? boost::asio::any_io_executor{} : executor_](auto handler) {
-                if (!control) {
-                    detail::fail_later<with_exceptions>(std::move(handler), fallback, errc::closed,
-                                                        "the feed is not open", feed_item<T>{});
-                    return;
-                }
-                using operation_type = detail::event_operation<T, with_exceptions, decltype(handler)>;
-                const auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                auto* operation = detail::make_operation<operation_type>(std::move(handler), control->executor());
-                const bool hop = elsewhere || operation->elsewhere();
-                detail::connect_slot(
-                    slot, detail::next_withdrawal{control, operation,
-                                                  hop ? control->executor() : boost::asio::any_io_executor{}});
-                if (hop) {
-                    detail::dispatch_next(control, detail::event_ptr{operation});
-                } else {
-                    control->next(detail::event_ptr{operation});
-                }
-            },
-            token);
-    }
-
-    /// Unbinds. A pending `async_next` fails with `cancelled`, soon, but never inside this call.
-    void close() {
-        if (auto control = std::exchange(control_, nullptr)) {
-            if (elsewhere_) {
-                detail::dispatch_close(std::move(control), executor_);
-            } else {
-                control->close();
-            }
+        if constexpr (detail::is_default_token<Token>) {
+            return detail::next_coroutine<T>::run(owner_.source());
+        } else {
+            return boost::asio::async_initiate<Token, detail::signature_for<Token, feed_item<T>>>(
+                [from = owner_.source()](auto handler) {
+                    constexpr bool with_exceptions = detail::throws<std::remove_cvref_t<Token>>;
+                    if (!from.control) {
+                        detail::fail_later<with_exceptions>(std::move(handler), from.fallback, errc::closed,
+                                                            detail::not_open, feed_item<T>{});
+                        return;
+                    }
+                    using operation_type = detail::event_operation<T, with_exceptions, decltype(handler)>;
+                    detail::start_next<operation_type>(from, std::move(handler));
+                },
+                token);
         }
     }
 
-    [[nodiscard]] bool is_open() const noexcept { return control_ != nullptr; }
+    /// Unbinds. A pending `async_next` fails with `cancelled`, soon, but never inside this call.
+    void close() { owner_.close(); }
+
+    [[nodiscard]] bool is_open() const noexcept { return owner_.is_open(); }
 
   private:
-    std::shared_ptr<detail::feed_control> control_;
-    boost::asio::any_io_executor executor_; // kept when the feed is closed
-    bool elsewhere_ = false;                // it was passed to a handler on another executor
+    detail::feed_owner owner_;
 };
 
 } // namespace cles
+
+// The library contains this, so that its users need not compile it. Later versions of Asio than this name the handler
+// differently.
+#if BOOST_VERSION < 108900
+extern template void cles::detail::awaited_next::start(
+    boost::asio::detail::awaitable_async_op_handler<void(std::exception_ptr), boost::asio::any_io_executor> handler);
+#else
+#include <cles/awaited_event.hpp>
+#endif

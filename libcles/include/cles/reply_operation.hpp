@@ -42,6 +42,10 @@ pending::verdict read_result(std::string_view json, T& value, boost::system::err
     return judge_unread(reader, json, code, why, what);
 }
 
+/// What a result of type T is read into.
+template <class T>
+using reply_carrier = std::conditional_t<comes_wrapped<T>, wrapped<T>, T>;
+
 template <class T, bool Throws, class Handler>
 class reply_operation final : public pending {
   public:
@@ -57,8 +61,7 @@ class reply_operation final : public pending {
             }
             finish(code, why);
         } else {
-            using carrier = std::conditional_t<comes_wrapped<T>, wrapped<T>, T>;
-            carrier value{};
+            reply_carrier<T> value{};
             if (read_result(json, value, code, why) == verdict::malformed) {
                 return verdict::malformed;
             }
@@ -103,63 +106,10 @@ struct reply_target {
     std::string* diagnostics;
 };
 
-/// The memory for a result of type T.
+/// Reads an awaited result into a `reply_carrier<T>`.
 template <class T>
-class reply_value {
-  public:
-    [[nodiscard]] reply_target target(std::string* diagnostics) noexcept { return {&carrier_, read, diagnostics}; }
-    [[nodiscard]] T& get() noexcept {
-        if constexpr (comes_wrapped<T>) {
-            return carrier_.value;
-        } else {
-            return carrier_;
-        }
-    }
-
-  private:
-    using carrier = std::conditional_t<comes_wrapped<T>, wrapped<T>, T>;
-
-    static pending::verdict read(std::string_view json, void* value, boost::system::error_code& code,
-                                 std::string& why) {
-        return read_result(json, *static_cast<carrier*>(value), code, why);
-    }
-
-    carrier carrier_{};
-};
-
-/// A pending request of a coroutine. Its type does not depend on that of the result, which is read into the coroutine's
-/// memory. The handler owns the coroutine.
-template <class Handler>
-class awaited_operation final : public pending {
-  public:
-    awaited_operation(Handler handler, const boost::asio::any_io_executor& service, const reply_target& target)
-        : complete_(std::move(handler), service), target_(target) {}
-
-    verdict offer(std::string_view json) override {
-        boost::system::error_code code;
-        std::string why;
-        if (target_.read(json, target_.value, code, why) == verdict::malformed) {
-            return verdict::malformed;
-        }
-        finish(code, why);
-        return verdict::completed;
-    }
-    void fail(boost::system::error_code code, std::string_view message) override {
-        finish(code, std::string{message}); // the view may refer to memory of the handler
-    }
-    void discard() noexcept override { discard_operation(this, complete_); }
-    [[nodiscard]] bool elsewhere() const noexcept { return complete_.elsewhere(); }
-
-  private:
-    void finish(boost::system::error_code code, const std::string& message) {
-        if (code && target_.diagnostics != nullptr) {
-            *target_.diagnostics = message;
-        }
-        end_operation(this, complete_, code, message);
-    }
-
-    completion<true, Handler> complete_;
-    reply_target target_;
-};
+pending::verdict read_reply(std::string_view json, void* value, boost::system::error_code& code, std::string& why) {
+    return read_result(json, *static_cast<reply_carrier<T>*>(value), code, why);
+}
 
 } // namespace cles::detail

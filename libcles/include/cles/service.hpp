@@ -46,6 +46,10 @@
 flags of pkg-config's cles define it"
 #endif
 
+namespace boost::asio {
+class io_context;
+}
+
 namespace cles {
 
 namespace detail {
@@ -191,15 +195,22 @@ struct reply_coroutine {
 template <class T, class Options>
 boost::asio::awaitable<T> reply_coroutine<T, Options>::run(service& from, request_kind kind, short_text noun,
                                                            outgoing_body body, Options options) {
-    reply_value<T> value;
+    reply_carrier<T> value{};
     const call_options& chosen = options;
-    awaited_request request{from, {kind, noun.view(), body}, chosen, value.target(chosen.diagnostics_)};
+    awaited_request request{from, {kind, noun.view(), body}, chosen, {&value, read_reply<T>, chosen.diagnostics_}};
     co_await std::move(request); // NOLINT(performance-move-const-arg): Asio awaits rvalues
-    co_return std::move(value.get());
+    if constexpr (comes_wrapped<T>) {
+        co_return std::move(value.value);
+    } else {
+        co_return std::move(value);
+    }
 }
 
-template <class Token>
-inline constexpr bool is_default_token = std::is_same_v<std::remove_cvref_t<Token>, boost::asio::use_awaitable_t<>>;
+/// Awaits a binding with the default token; as `reply_coroutine`.
+template <class T>
+struct bind_coroutine {
+    static boost::asio::awaitable<feed<T>> run(service& from, std::string noun, bind_options options);
+};
 
 } // namespace detail
 
@@ -238,6 +249,7 @@ class service : public registrar {
     /// `insecure_listen`, `invalid_option` (limits, gossip), or the system's code if an address or interface is not
     /// available (the message names it)
     service(boost::asio::any_io_executor executor, const service_options& options);
+    service(boost::asio::io_context& context, const service_options& options);
     template <std::derived_from<boost::asio::execution_context> Context>
     service(Context& context, const service_options& options)
         : service(boost::asio::any_io_executor{context.get_executor()}, options) {}
@@ -269,13 +281,11 @@ class service : public registrar {
     /// Cancellation ends the wait, but new requests are still not started.
     template <class Token = boost::asio::use_awaitable_t<>>
     auto async_close(std::chrono::milliseconds limit, Token&& token = {}) {
-        return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
-            [this](auto handler, std::chrono::milliseconds at_most) {
-                auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                start_close(detail::about_to_start(operation, slot), at_most);
-            },
-            token, limit);
+        if constexpr (detail::is_default_token<Token>) {
+            return await_close(limit);
+        } else {
+            return initiate_plain(&service::start_close, std::forward<Token>(token), limit);
+        }
     }
     /// Ends all listeners, links and feeds. Operations fail with `stopped`, and running handlers are notified to stop.
     /// Replies and updates that are already queued are sent first, as far as the peer accepts them at once. Idempotent.
@@ -309,13 +319,12 @@ class service : public registrar {
     /// published.
     template <class T, class Token = boost::asio::use_awaitable_t<>>
     auto async_update(std::string_view noun, const T& value, Token&& token = {}) {
-        return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
-            [this](auto handler, const std::string& path, const detail::outgoing_body& json) {
-                auto slot = boost::asio::get_associated_cancellation_slot(handler);
-                auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
-                start_update(detail::about_to_start(operation, slot), path, json);
-            },
-            token, std::string{noun}, converted([&] { return to_json(value); }));
+        if constexpr (detail::is_default_token<Token>) {
+            return await_update(std::string{noun}, converted([&] { return to_json(value); }));
+        } else {
+            return initiate_plain(&service::start_update, std::forward<Token>(token), std::string{noun},
+                                  converted([&] { return to_json(value); }));
+        }
     }
 
     /// Sends any request, as a command of the language: "PULL car0:localization", "PUSH car0:notice {\"text\":\"hi\"}".
@@ -391,11 +400,17 @@ class service : public registrar {
     }
     template <class T = json_text, class Token = boost::asio::use_awaitable_t<>>
     auto async_bind(std::string_view noun, const bind_options& options, Token&& token = {}) {
-        return boost::asio::async_initiate<Token, detail::signature_for<Token, feed<T>>>(
-            [this](auto handler, const std::string& target, const bind_options& chosen) {
-                this->template start_bind<T, Token>(std::move(handler), target, chosen);
-            },
-            token, std::string{noun}, options);
+        if constexpr (detail::is_default_token<Token>) {
+            return detail::bind_coroutine<T>::run(*this, std::string{noun}, options);
+        } else {
+            return boost::asio::async_initiate<Token, detail::signature_for<Token, feed<T>>>(
+                [this](auto handler, const std::string& target, const bind_options& chosen) {
+                    using operation_type =
+                        detail::bind_operation<T, detail::throws<std::remove_cvref_t<Token>>, decltype(handler)>;
+                    this->template start_bind<operation_type>(std::move(handler), target, chosen);
+                },
+                token, std::string{noun}, options);
+        }
     }
 
     /// The blocking form, for programs without coroutines: runs the context until the reply arrives. Only for an
@@ -451,14 +466,32 @@ class service : public registrar {
         }
     }
 
-    template <class T, class Token, class Handler>
-    void start_bind(Handler handler, const std::string& noun, const bind_options& options) {
-        using operation_type = detail::bind_operation<T, detail::throws<std::remove_cvref_t<Token>>, Handler>;
+    template <class Operation, class Handler, class... A>
+    void start_bind(Handler handler, const std::string& noun, const bind_options& options, A&... arguments) {
         auto slot = boost::asio::get_associated_cancellation_slot(handler);
         auto* operation =
-            detail::make_operation<operation_type>(std::move(handler), get_executor(), options.diagnostics_);
+            detail::make_operation<Operation>(std::move(handler), get_executor(), options.diagnostics_, arguments...);
         start_bind({detail::binding_ptr{operation}, operation->elsewhere(), detail::slot_ref{slot}}, noun, options);
     }
+
+    /// Initiates an operation without a result, which `begin` starts.
+    template <class Token, class... A>
+    auto initiate_plain(void (service::*begin)(detail::starting<detail::pending_ptr>, const A&...), Token&& token,
+                        std::type_identity_t<A>... arguments) {
+        return boost::asio::async_initiate<Token, detail::signature_for<Token>>(
+            [this, begin](auto handler, const A&... kept) {
+                auto slot = boost::asio::get_associated_cancellation_slot(handler);
+                auto* operation = make_operation<void, Token>(std::move(handler), nullptr);
+                (this->*begin)(detail::about_to_start(operation, slot), kept...);
+            },
+            token, std::move(arguments)...);
+    }
+
+    // With the default token, compiled in the library.
+    boost::asio::awaitable<void> await_update(std::string noun, detail::outgoing_body json);
+    boost::asio::awaitable<void> await_close(std::chrono::milliseconds limit);
+    boost::asio::awaitable<void> await_bind(const std::string& noun, const bind_options& options,
+                                            detail::feed_owner& bound);
 
     void publish(std::string_view noun, const std::function<void(json_writer&)>& write);
 
@@ -466,7 +499,7 @@ class service : public registrar {
     // They start the operation on the service's executor, now or later, and connect its slot.
     void start(starting what, const detail::outgoing& request, const call_options& options);
     void start_update(starting what, const std::string& noun, const detail::outgoing_body& json);
-    void start_close(starting what, std::chrono::milliseconds limit);
+    void start_close(starting what, const std::chrono::milliseconds& limit);
     void start_bind(detail::starting<detail::binding_ptr> what, const std::string& noun, const bind_options& options);
     template <class Start>
     void start_here(const detail::slot_ref& slot, const Start& start);
@@ -478,25 +511,31 @@ class service : public registrar {
     [[nodiscard]] bool on_strand() const noexcept;
 
     friend detail::awaited_request;
+    template <class T>
+    friend struct detail::bind_coroutine;
 
     std::shared_ptr<detail::engine> engine_;
     bool pooled_; ///< whether it has made a strand of a pool
 };
 
-template <class Handler>
-void detail::awaited_request::start(Handler handler) {
-    auto slot = boost::asio::get_associated_cancellation_slot(handler);
-    auto* operation = make_operation<awaited_operation<Handler>>(std::move(handler), from.get_executor(), target);
-    from.start(about_to_start(operation, slot), request, options);
+template <class T>
+boost::asio::awaitable<feed<T>> detail::bind_coroutine<T>::run(service& from, std::string noun, bind_options options) {
+    feed_owner bound;
+    co_await from.await_bind(noun, options, bound);
+    co_return feed<T>{std::move(bound)};
 }
 
-// The library contains these, so that its users need not compile them. Later versions of Asio than this name the
-// handler differently.
-#if BOOST_VERSION < 108900
-extern template void detail::awaited_request::start(
-    boost::asio::detail::awaitable_async_op_handler<void(std::exception_ptr), boost::asio::any_io_executor> handler);
-#endif
+// The library contains these, so that its users need not compile them.
 extern template struct detail::reply_coroutine<json_text, call_options>;
 extern template struct detail::reply_coroutine<json_text, std::reference_wrapper<const call_options>>;
+extern template struct detail::bind_coroutine<json_text>;
 
 } // namespace cles
+
+// As for awaited_next in feed.hpp.
+#if BOOST_VERSION < 108900
+extern template void cles::detail::awaited_request::start(
+    boost::asio::detail::awaitable_async_op_handler<void(std::exception_ptr), boost::asio::any_io_executor> handler);
+#else
+#include <cles/awaited_operation.hpp>
+#endif

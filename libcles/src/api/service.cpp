@@ -130,6 +130,9 @@ service::service(asio::any_io_executor executor, const service_options& options)
     }
 }
 
+service::service(asio::io_context& context, const service_options& options)
+    : service(asio::any_io_executor{context.get_executor()}, options) {}
+
 service::~service() { engine_->stop(); }
 
 const std::string& service::name() const noexcept { return engine_->node().name; }
@@ -239,7 +242,7 @@ void service::start_update(starting what, const std::string& noun, const detail:
     }
 }
 
-void service::start_close(starting what, std::chrono::milliseconds limit) {
+void service::start_close(starting what, const std::chrono::milliseconds& limit) {
     if (hops(what.elsewhere)) {
         start_elsewhere(what.slot, [limit, operation = std::move(what.operation)](detail::engine& inside) mutable {
             return inside.close(limit, std::move(operation));
@@ -307,12 +310,5 @@ std::string service::request(std::string_view command, const call_options& optio
     }
     return std::move(result->body);
 }
-
-#if BOOST_VERSION < 108900
-template void detail::awaited_request::start(
-    asio::detail::awaitable_async_op_handler<void(std::exception_ptr), asio::any_io_executor> handler);
-#endif
-template struct detail::reply_coroutine<json_text, call_options>;
-template struct detail::reply_coroutine<json_text, std::reference_wrapper<const call_options>>;
 
 } // namespace cles
