@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: BSL-1.0
 
+# gold links programs with sanitizers in half the time. Not every system has it.
+if(CLES_SANITIZE)
+    include(CheckLinkerFlag)
+    check_linker_flag(CXX "-fuse-ld=gold" CLES_LINKER_GOLD)
+endif()
+
 # cles_target_sanitizers(target): instruments the target as CLES_SANITIZE says. Nothing recovers: the first finding ends
 # the program, so that no test passes over one.
 function(cles_target_sanitizers target)
@@ -31,6 +37,9 @@ function(cles_target_sanitizers target)
     target_compile_options(${target} PRIVATE ${flags} ${quiet})
     # A program that links an instrumented library needs the runtime, too.
     target_link_options(${target} PUBLIC ${flags})
+    if(CLES_LINKER_GOLD)
+        target_link_options(${target} PRIVATE -fuse-ld=gold)
+    endif()
 
     get_target_property(type ${target} TYPE)
     if(type STREQUAL "EXECUTABLE" AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND "address" IN_LIST CLES_SANITIZE)
