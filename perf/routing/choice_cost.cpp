@@ -26,7 +26,7 @@ struct system_time final : core::clock {
 /// Other nodes, which report what they offer, and receive no requests.
 struct telling final : core::next_hop {
     std::uint64_t send(const cles::protocol::outgoing_request& r, cles::time_point, cles::detail::pending_ptr reply,
-                       core::outbound::progress_function) override {
+                       core::outbound::progress_function, std::string_view) override {
         asked.emplace_back(r.target(), std::move(reply));
         return asked.size();
     }

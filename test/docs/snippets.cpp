@@ -46,6 +46,10 @@ struct own_pool {
     std::uint32_t waiting = 0;
     std::uint32_t busy = 0;
 };
+void the_links_of_a_node(cles::service_options& options) {
+    options.gossip = cles::gossip({"tcp://10.0.2.2:25370"}, {"car1", "recon"}); // seeds, links
+}
+
 void a_load(cles::service_options& options, const own_pool& pool);
 std::string plan_a_way(position there);
 void a_task_to_repeat(cles::registrar& tasks);

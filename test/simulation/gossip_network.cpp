@@ -75,11 +75,11 @@ class gossip_network::member final : public place,
     }
     [[nodiscard]] std::size_t others() const override { return others_known.size(); }
 
-    void ask(std::uint64_t ticket, std::string_view at, std::string_view since, std::string_view describe) override {
+    void ask(std::uint64_t ticket, std::string_view at, const core::table_question& what) override {
         post(at, {.what = message::kind::ask,
                   .ticket = ticket,
-                  .text = std::string{since},
-                  .describe = std::string{describe}});
+                  .text = std::string{what.since},
+                  .describe = std::string{what.describe}});
         // If no reply arrives, the link's own code reports that at the deadline.
         net.deliver(net.time_.now() + core::gossip::limit, host(),
                     {.what = message::kind::failure, .to_run = run_number, .ticket = ticket});

@@ -40,7 +40,7 @@ class recorded_next_hop final : public core::next_hop {
     };
 
     std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
-                       core::outbound::progress_function progress) override {
+                       core::outbound::progress_function progress, std::string_view) override {
         auto made = std::make_unique<sent>();
         made->ticket = ++last_ticket_;
         made->node = r.target();

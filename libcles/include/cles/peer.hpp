@@ -40,6 +40,9 @@ struct peer {
     peer_state state = peer_state::live;
     node_load load;
     std::string tasks; ///< a digest of its tasks, which changes when they do
+    std::string via{}; ///< the neighbour through which requests reach it; empty: they are sent straight to it
+    /// How many links away it is; 0: no route leads to it.
+    unsigned hops = 1;
 };
 
 } // namespace cles

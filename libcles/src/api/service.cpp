@@ -168,7 +168,7 @@ void service::set_gossip(const gossip_options& how) {
 }
 
 std::vector<peer> service::peers() const {
-    return run_on(strand_of(pooled_, get_executor()), [this] { return engine_->node().peers.list(engine_->now()); });
+    return run_on(strand_of(pooled_, get_executor()), [this] { return engine_->node().list_peers(engine_->now()); });
 }
 
 void service::stop() { engine_->stop(); }

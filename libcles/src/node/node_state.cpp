@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/node_state.hpp"
 
+#include "node/membership/gossip.hpp"
 #include "node/security_protocol.hpp"
 
 #include <utility>
@@ -32,6 +33,14 @@ node_load node_state::load_now() const noexcept {
     } catch (...) { // as if there were no function
     }
     return {.running = static_cast<std::uint32_t>(counts.handlers_running - counts.routed)};
+}
+
+std::vector<peer> node_state::list_peers(time_point now) const {
+    auto all = peers.list(now);
+    if (gossip_responder != nullptr) {
+        gossip_responder->reach().add_routes(all);
+    }
+    return all;
 }
 
 void node_state::write_log(log_level level, const log_entry& what) const noexcept {

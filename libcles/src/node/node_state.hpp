@@ -91,6 +91,8 @@ struct node_state {
     std::uint64_t next_id = 1;                        ///< of the requests that this node sends
     router* active_router = nullptr;                  ///< serves requests for `any`, `all` and other nodes; null: none
 
+    /// The other nodes, with the routes to them.
+    [[nodiscard]] std::vector<peer> list_peers(time_point now) const;
     // These do not let exceptions of the user's functions out.
     [[nodiscard]] node_load load_now() const noexcept;
     void write_log(log_level level, const log_entry& what) const noexcept;

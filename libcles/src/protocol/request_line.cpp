@@ -97,6 +97,8 @@ constexpr std::array known_adverbs{
                  [](std::string_view v, request_line& r) { return (r.since = v).size() <= max_since; }},
     known_adverb{"describe", on(verb::pull),
                  [](std::string_view v, request_line& r) { return is_epoch_list(r.describe = v); }},
+    known_adverb{"routes", on(verb::pull),
+                 [](std::string_view v, request_line& r) { return parse_routes_question(r.routes = v).has_value(); }},
     known_adverb{"mark", on(verb::bind),
                  [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }}};
 
@@ -183,6 +185,15 @@ void append_adverb(std::string& out, std::string_view key, std::uint64_t value) 
 }
 
 } // namespace
+
+std::optional<routes_question> parse_routes_question(std::string_view text) noexcept {
+    const auto dot = text.find('.');
+    const auto distance = dot < 3 ? parse_number(text.substr(0, dot)) : std::nullopt;
+    if (!distance || *distance == 0 || *distance > max_hops || !is_name(text.substr(dot + 1))) {
+        return {};
+    }
+    return routes_question{static_cast<unsigned>(*distance), text.substr(dot + 1)};
+}
 
 bool parse_request(std::string_view line, request_line& out, malformed_request& error) {
     if (parse_parts(line, out, error.why)) {

@@ -93,7 +93,7 @@ void run(std::string_view input) {
         require(table.size() <= most_peers, "the table is bounded", line);
         std::string json;
         json_writer w{json};
-        core::write_peers(w, table, now);
+        core::write_peers(w, table.list(now), {});
         require(is_valid_json(json), "the list of nodes is JSON", json);
     }
     deadlines.expire(now + std::chrono::hours{1});

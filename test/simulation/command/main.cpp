@@ -2,6 +2,7 @@
 // Simulates seeds, or plans that are read from files, and reports violations; or measures gossip among many nodes
 // (README.md of the folder above).
 #include "simulation/gossip_network.hpp"
+#include "simulation/mesh.hpp"
 #include "simulation/world/simulate.hpp"
 
 #include <boost/describe/enum_from_string.hpp>
@@ -87,6 +88,30 @@ int run(const options& o) {
     if (!o.print) {
         std::cout << failed << " of " << (o.files.empty() ? o.seeds : o.files.size()) << " failed\n";
     }
+    return failed == 0 ? 0 : 1;
+}
+
+// -- meshes --------------------------------------------------------------------------------------------------------
+
+struct mesh_options {
+    std::uint64_t seed = 1;
+    std::uint64_t seeds = 10;
+    mesh_setup setup{.nodes = 40};
+};
+
+int simulate_meshes(const mesh_options& o) {
+    std::uint64_t failed = 0;
+    for (auto seed = o.seed; seed < o.seed + o.seeds; ++seed) {
+        const auto r = simulate_mesh(seed, o.setup);
+        for (const auto& v : r.violations) {
+            std::cout << "seed " << seed << ": " << to_string(v.broken) << ": " << v.what << '\n';
+        }
+        failed += r.violations.empty() ? 0 : 1;
+        std::cout << "seed " << seed << ": shortest routes after " << r.converged.count() << " ms, another way after "
+                  << r.rerouted.count() << " ms at most, " << r.answered << " of " << r.asked
+                  << " requests answered, over " << r.longest << " links at most" << std::endl;
+    }
+    std::cout << failed << " of " << o.seeds << " failed\n";
     return failed == 0 ? 0 : 1;
 }
 
@@ -201,6 +226,18 @@ int main(int argc, char** argv) {
     program.add_flag("--bench", given.bench, "Tells how much was simulated");
     program.add_option("files", given.files, "Plans in files, instead of seeds");
     gossip_options many;
+    mesh_options sparse;
+    auto* mesh = program.add_subcommand("mesh", "Simulates nodes that reach each other through others");
+    mesh->add_option("--nodes", sparse.setup.nodes, "How many")->capture_default_str()->check(CLI::Range(2, 5000));
+    mesh->add_option("--degree", sparse.setup.mean_degree, "The mean number of links of a node")
+        ->capture_default_str()
+        ->check(CLI::Range(2, 16));
+    mesh->add_option("--cuts", sparse.setup.cuts, "Links that are lost")->capture_default_str();
+    mesh->add_option("--crashes", sparse.setup.crashes, "Nodes that crash")->capture_default_str();
+    mesh->add_option("--requests", sparse.setup.requests, "After each change")->capture_default_str();
+    mesh->add_flag("!--undeclared", sparse.setup.declared, "The nodes have to find out which links there are");
+    mesh->add_option("--seed", sparse.seed, "The first")->capture_default_str();
+    mesh->add_option("--seeds", sparse.seeds, "How many")->capture_default_str();
     auto* gossip = program.add_subcommand("gossip", "Measures gossip among many nodes");
     gossip->add_option("--nodes", many.nodes, "How many")->capture_default_str();
     gossip
@@ -212,7 +249,7 @@ int main(int argc, char** argv) {
         ->check(CLI::IsMember({"start", "short-cut", "long-cut", "weather"}));
     CLI11_PARSE(program, argc, argv);
     try {
-        return *gossip ? measure_gossip(many) : run(given);
+        return *gossip ? measure_gossip(many) : *mesh ? simulate_meshes(sparse) : run(given);
     } catch (const std::exception& e) {
         std::cerr << "cles_simulation: " << e.what() << '\n';
         return 2;

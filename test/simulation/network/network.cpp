@@ -105,6 +105,10 @@ void network::listen(endpoint where, const std::shared_ptr<place>& at, const lim
 }
 
 void network::dial(const std::shared_ptr<place>& from, endpoint to, const limits& bounds, on_dialled done) {
+    if (connected_ && !connected_(from->host(), to.host)) {
+        from->later({}, [done = std::move(done)] { done(make_error_code(errc::unavailable), nullptr); });
+        return;
+    }
     if (!reaches(from->host(), to.host)) {
         from->later(bounds.connect, [done = std::move(done)] { done(make_error_code(errc::unavailable), nullptr); });
         return;
@@ -240,7 +244,7 @@ void network::inspect(const endpoint& from, std::string_view datagram) {
 }
 
 void network::carry(unsigned from, unsigned to, dice& chance, std::string_view datagram, const delivery& deliver) {
-    if (!reaches(from, to) || chance.chance(weather_.lost)) {
+    if (!reaches(from, to) || (connected_ && !connected_(from, to)) || chance.chance(weather_.lost)) {
         watcher_.saw("net", "loses", secured_ ? "a sealed datagram" : datagram);
         return;
     }

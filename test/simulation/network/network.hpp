@@ -78,6 +78,8 @@ class network {
     void part(unsigned a, unsigned b, time_point until);
     /// Nothing that one host sends reaches the other; the opposite direction works.
     void mute(unsigned from, unsigned to, time_point until);
+    /// Only these hosts are connected; the others refuse to be dialled.
+    void connect_only(std::function<bool(unsigned a, unsigned b)> connected) { connected_ = std::move(connected); }
     /// All faults end.
     void calm();
     [[nodiscard]] bool reaches(unsigned from, unsigned to) const;
@@ -150,6 +152,7 @@ class network {
     std::map<std::pair<unsigned, unsigned>, dice> chances_;
     planted fault_;
     weather weather_;
+    std::function<bool(unsigned a, unsigned b)> connected_; // empty: all are
     bool stormy_ = false;
     bool secured_ = false;
     eavesdropper eavesdropper_;

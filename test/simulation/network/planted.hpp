@@ -48,6 +48,8 @@ BOOST_DEFINE_FIXED_ENUM_CLASS(planted, std::uint8_t,
                               way_repeats,        ///< a router forwards each request twice
                               queue_boundless,    ///< a daemon's queue exceeds its limit
                               stuck_unnoticed,    ///< stuck workers are not detected
+                              links_ignored,      ///< the nodes of a mesh state no `links`
+                              route_withheld,     ///< a node of a mesh forwards nothing
                               urgent_lost,        ///< a stream loses urgent lines
                               finish_resets,      ///< a link that finishes is reset
                               forgery_taken,      ///< a line that is not sealed counts as that of a member

@@ -26,7 +26,7 @@ constexpr seconds by_announcements{20};
 constexpr seconds meeting{6};
 constexpr seconds links_end_within{1}; // of a removed member, or one without the right
 constexpr milliseconds back_within{300};
-constexpr milliseconds look_every{250};
+constexpr milliseconds roster_look_every{250};
 
 /// The possible changes of the roster, in the order of their numbers in a plan.
 enum change : unsigned { rotate, remove_one, add_one, fork, fewer_requests, fewer_offers, change_count };
@@ -297,7 +297,7 @@ class securing_part final : public securing {
                 check_version(*n);
             }
         }
-        world_.time().at(world_.time().now() + look_every, [this] { look_at_all(); });
+        world_.time().at(world_.time().now() + roster_look_every, [this] { look_at_all(); });
     }
 
     void expect_newest(const char* when) {

@@ -67,6 +67,7 @@ node_run::node_run(network& net, unsigned host, unsigned run, std::string name, 
                                    .peers = std::move(how.peers),
                                    .insecure = true,
                                    .multicast = {.interface = how.multicast ? "net0" : ""},
+                                   .gossip = std::move(how.gossip),
                                    .routing = how.routing})),
       told_(local_->discovery().membership_watcher()) {
     local_->node().peers.watch(this);

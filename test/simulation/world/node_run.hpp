@@ -51,6 +51,7 @@ class node_run final : public place, private core::membership::watcher {
         std::shared_ptr<simulated_security> security{}; ///< null: none
         /// Where others are, by name.
         std::map<std::string, std::string> peers{};
+        gossip_options gossip{};
     };
 
     node_run(network& net, unsigned host, unsigned run, std::string name, options how);

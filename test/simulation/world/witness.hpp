@@ -40,6 +40,8 @@ BOOST_DEFINE_FIXED_ENUM_CLASS(rule, std::uint8_t,
                               rosters_advance,  ///< a node never returns to an older roster
                               back_soon,        ///< a node that has restarted is soon asked and received again
                               nonces_differ,    ///< no two datagrams are sealed with the same nonce and key
+                              routes_found,     ///< after the faults have ended, all routes are the shortest
+                              links_kept,       ///< no link is opened that a node's `links` forbid
                               sent_once,   ///< the group gets each update once, and again only for a new subscriber
                               first_soon,  ///< a new subscriber in the group soon receives the last update
                               same_trace); ///< a seed always produces the same trace

@@ -200,6 +200,10 @@ BOOST_AUTO_TEST_CASE(known_adverbs_are_accepted_within_their_bounds) {
          {"00000000", "5f3a09c1", "ffffffff"},
          {"5F3A09C1", "5f3a09c", "5f3a09c11", "5f3a09cg"}},
         {"PULL a:b", "since", {"0", "5f3a09c1.42", max_since}, {too_long_since}},
+        {"PULL a:b",
+         "routes",
+         {"1.car1", "16.a"},
+         {"0.car1", "17.car1", "1", "1.", ".car1", "a.car1", "1.a,b", "001.car1"}},
         {"PULL a:b", "describe", {"5f3a09c1", "5f3a09c1,00000000"}, {"5f3a09c1,", ",5f3a09c1", "5F3A09C1", "1", "x"}},
         {"PULL a:b", "via", {"car1", "car1,car2,x.y-z_0"}, {",", "car1,", ",car1", "car1,,car2", "c%r", "c~r"}},
     };

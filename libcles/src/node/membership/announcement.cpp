@@ -46,6 +46,18 @@ bool read_signed(json_reader& r, std::vector<std::string>& out) {
     return good && (bytes <= 2 * task_registry::max_signed_names || r.fail("the list of signed tasks is too long"));
 }
 
+// None may be skipped: the node would be asked by others than it allows.
+bool read_links(json_reader& r, std::vector<std::string>& out) {
+    out.clear();
+    const bool good = read_texts(r, [&out](std::string_view node) {
+        if (out.size() <= max_links) {
+            out.emplace_back(node);
+        }
+    });
+    return good && ((out.size() <= max_links && std::ranges::all_of(out, protocol::is_name)) ||
+                    r.fail("'links' is a list of up to 16 names"));
+}
+
 bool read_digest(json_reader& r, std::string& out) {
     if (!r.read(out)) {
         return false;
@@ -111,6 +123,7 @@ bool read_announcement_member(json_reader& r, std::string_view key, announcement
            : key == "sources"     ? read_sources(r, out.sources)
            : key == "roster"      ? read_count(r, out.roster)
            : key == "signed"      ? read_signed(r, out.signed_tasks)
+           : key == "links"       ? read_links(r, out.links)
                                   : r.skip();
 }
 
@@ -156,7 +169,14 @@ void append_announcement_body(std::string& out, const announcement& said, std::s
         write_member(w, "roster", said.roster);
     }
     write_signed_member(w, said.signed_tasks);
+    write_links_member(w, said.links);
     w.end_object();
+}
+
+void write_links_member(json_writer& w, const std::vector<std::string>& nodes) {
+    if (!nodes.empty()) {
+        write_member(w, "links", nodes);
+    }
 }
 
 void write_signed_member(json_writer& w, const std::vector<std::string>& tasks) {

@@ -30,6 +30,7 @@ inline constexpr std::chrono::milliseconds interval_per_node{10}; ///< in a larg
 inline constexpr std::size_t max_endpoints = 16;
 inline constexpr std::size_t max_endpoint = 128;
 inline constexpr std::size_t max_digest = 64;
+inline constexpr std::size_t max_links = 16;
 inline constexpr std::size_t max_sources = multicast_options::most_interfaces;
 
 /// The maximum time between two announcements of a node that knows this many others.
@@ -55,6 +56,7 @@ struct announcement {
     std::vector<group_source> sources{};
     std::uint32_t roster = 0;                              ///< the version of its roster; 0: the node is not secured
     std::vector<std::string> signed_tasks{};               ///< tasks whose updates it signs
+    std::vector<std::string> links{};                      ///< the only nodes it may have links to; empty: all
     std::shared_ptr<const signed_announcement> original{}; ///< null: it is not signed
 };
 
@@ -81,6 +83,8 @@ inline constexpr std::string_view load_path = "cles/load";
 
 // Members that several kinds of entries have.
 
+/// Writes the list of nodes, unless it is empty.
+void write_links_member(json_writer& w, const std::vector<std::string>& nodes);
 /// Writes the list of signed tasks, unless it is empty.
 void write_signed_member(json_writer& w, const std::vector<std::string>& tasks);
 void write_load_member(json_writer& w, const node_load& load);

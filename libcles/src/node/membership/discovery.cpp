@@ -11,6 +11,7 @@
 #include "node/security_protocol.hpp"
 #include "node/session/reserved_tasks.hpp"
 #include "port/node_security.hpp"
+#include "protocol/grammar.hpp"
 
 #include <algorithm>
 #include <utility>
@@ -90,13 +91,29 @@ void discovery::join(multicast_group& through) {
     group_->set_listener(this);
 }
 
+void discovery::check_links(const std::vector<std::string>& nodes) const {
+    if (nodes.size() > max_links) {
+        throw error(errc::invalid_option, "'links' has " + std::to_string(nodes.size()) + " names; at most 16 fit");
+    }
+    for (const auto& name : nodes) {
+        if (!protocol::is_name(name) || protocol::is_reserved_target(name)) {
+            throw error(errc::invalid_name, "in 'links', " + protocol::quoted(name) + " is not a node's name");
+        }
+        if (name == host_.node().name) {
+            throw error(errc::invalid_option, "'links' contains the node itself, '" + name + "'");
+        }
+    }
+}
+
 void discovery::gossip(const gossip_options& how) {
     if (!gossip_ && how.part == nullptr) {
-        if (!how.seeds.empty()) {
-            throw error(errc::invalid_option, "gossip_options with seeds must be created by cles::gossip({seeds})");
+        if (!how.seeds.empty() || !how.links.empty()) {
+            throw error(errc::invalid_option,
+                        "gossip_options with seeds or links must be created by cles::gossip(seeds, links)");
         }
         return;
     }
+    check_links(how.links);
     for (const auto& seed : how.seeds) {
         const auto where = parse_url(seed);
         if (!host_.environment().has_transport(where.scheme)) {
@@ -105,9 +122,11 @@ void discovery::gossip(const gossip_options& how) {
     }
     if (gossip_) {
         gossip_->set_seeds(how.seeds, host_.now());
+        gossip_->reach().allow_only(how.links);
         return;
     }
     gossip_ = how.part->make(host_, seed_);
+    gossip_->reach().allow_only(how.links);
     gossip_->set_seeds(how.seeds, host_.now());
     host_.node().gossip_responder = gossip_.get(); // from now on it answers the gossip requests of others
     start();
@@ -198,7 +217,8 @@ void discovery::announce(std::chrono::milliseconds interval, bool leaving) {
                       .leaving = leaving,
                       .pool = node.peers.pool(),
                       .roster = node.security ? node.security->roster_version() : 0,
-                      .signed_tasks = node.security ? node.tasks.signed_tasks() : std::vector<std::string>{}};
+                      .signed_tasks = node.security ? node.tasks.signed_tasks() : std::vector<std::string>{},
+                      .links = gossip_ ? gossip_->reach().allowed() : std::vector<std::string>{}};
     if (node.security) {
         announce_signed(said);
         return;
@@ -353,11 +373,17 @@ void discovery::on_peer(std::string_view node, membership::change what, std::str
     case membership::change::moved: host_.post_log(log_level::info, name + " is now" + place); break;
     case membership::change::silent: host_.post_log(log_level::debug, name + " is no longer received"); break;
     case membership::change::returned: host_.post_log(log_level::debug, name + " is received again"); break;
-    case membership::change::left: host_.post_log(log_level::info, name + " has left"); break;
+    case membership::change::left:
+        host_.post_log(log_level::info, name + " has left");
+        if (gossip_) {
+            gossip_->reach().on_new_incarnation(name);
+        }
+        break;
     case membership::change::gone:
         host_.post_log(log_level::info, name + " is gone");
         if (gossip_) {
             gossip_->on_gone(node, where, host_.now());
+            gossip_->reach().on_new_incarnation(name);
         }
         break;
     case membership::change::clash:
@@ -392,6 +418,9 @@ void discovery::follow_incarnation(const std::string& name) {
         std::erase_if(incarnations_, [&](const auto& run) { return !host_.node().peers.address_of(run.first); });
     }
     if (is_new || another) {
+        if (gossip_) {
+            gossip_->reach().on_new_incarnation(name);
+        }
         host_.feeds().on_new_incarnation(name, another);
         if (group_ != nullptr) {
             group_->feeds().on_new_incarnation(name, host_.now());
@@ -404,6 +433,11 @@ void discovery::follow_incarnation(const std::string& name) {
 void discovery::probe(std::uint64_t ticket, const std::string& url) {
     // In a fleet, only the node that has the name can answer.
     const std::string name{host_.node().security ? host_.node().peers.probed_name(ticket) : std::string_view{}};
+    if (gossip_ && gossip_->reach().is_beyond(host_.node().peers.probed_name(ticket))) { // it cannot be asked from here
+        host_.post_while_running(
+            [ticket](local_node& alive) { alive.node().peers.on_probed(ticket, {}, alive.now()); });
+        return;
+    }
     const auto use_later = [ticket, url, name](local_node& host, const peer_answer& answer) {
         auto found = answer.refused ? probe_outcome{}
                      : answer.code  ? failed_probe(answer.code)

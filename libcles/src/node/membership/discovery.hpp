@@ -168,6 +168,7 @@ class discovery final : private announcement_listener, private membership::watch
     [[nodiscard]] std::string unknown_reason() const;
 
   private:
+    void check_links(const std::vector<std::string>& nodes) const;
     void begin();
     void announce(std::chrono::milliseconds interval) override;
     void announce(std::chrono::milliseconds interval, bool leaving);

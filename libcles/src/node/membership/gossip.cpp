@@ -14,14 +14,12 @@ using std::chrono::milliseconds;
 
 constexpr std::size_t max_bootstraps = 4;
 
-bool can_be_asked(const membership::member& k) noexcept { return !k.suspect && !k.where.empty(); }
-
 } // namespace
 
 gossip::gossip(self who, client& out, membership& others, counters& counts, deadline_queue& deadlines, std::size_t most,
                std::uint32_t seed, const node_security* security)
     : self_(std::move(who)), out_(out), others_(others), counts_(counts), deadlines_(deadlines), security_(security),
-      jitter_(seed), seeds_(seed * 3 + 1), lost_(most, seed * 5 + 2) {}
+      jitter_(seed), seeds_(seed * 3 + 1), lost_(most, seed * 5 + 2), reach_(self_.name, out, others, most) {}
 
 void gossip::start(time_point now) {
     started_ = true;
@@ -81,17 +79,25 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
     }
     peer_table table;
     const bool good = read(json, others_.max_peers() * 2 + 2, table);
-    auto found = apply(table, observed_source::at(c->url), c->sent, now);
+    const bool allowed = table.node.empty() || reach_.allows(table.node);
+    auto found = allowed ? apply(table, observed_source::at(c->url), c->sent, now) : learned{};
     if (!good) {
         on_failure(ticket, now);
         return;
     }
     c->failures = 0;
     c->ticket = 0;
+    if (allowed && !table.node.empty()) {
+        if (security_ == nullptr) { // otherwise the name is only claimed
+            others_.prefer_address(table.node, c->url);
+        }
+        reach_.on_reply(table, c->sent);
+        push_routes(now);
+    }
     if (table.node == self_.name && table.epoch == self_.epoch) {
         seeds_.on_self(c->url);
         end(*c, true, now);
-    } else if (table.pool != others_.pool() && !table.node.empty()) {
+    } else if (!allowed || (table.pool != others_.pool() && !table.node.empty())) {
         end(*c, true, now);
     } else if (table.next.empty()) {
         c->since = "0";
@@ -154,6 +160,10 @@ void gossip::on_failure(std::uint64_t ticket, time_point now) {
     }
     ++counts_.tables_failed;
     c->ticket = 0;
+    if (!c->node.empty()) {
+        reach_.lose(std::string{c->node}, now);
+        push_routes(now);
+    }
     if (++c->failures >= max_failures || c->as == part::bootstrap) {
         end(*c, true, now);
     } else {
@@ -166,13 +176,24 @@ void gossip::on_failure(std::uint64_t ticket, time_point now) {
 void gossip::write_delta(json_writer& w, const table_question& asked, std::size_t longest, time_point now) {
     last_asked_ = now;
     ++counts_.tables_told;
-    core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now);
+    const auto question = protocol::parse_routes_question(asked.routes);
+    if (!question) {
+        core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now);
+        return;
+    }
+    reach_.on_question(*question, now);
+    core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now,
+                      [&](const delta_entry& item) { return reach_.advert_of(item, question->by); });
 }
 
 bool gossip::on_pushed_table(std::string_view json, const observed_source& by, time_point now) {
     peer_table table;
     const bool good = read(json, max_pushed_entries, table);
     auto found = apply(table, by, now, now);
+    if (contacts_.find_node(table.node) != nullptr) {
+        reach_.on_pushed(table);
+        push_routes(now);
+    }
     if (started_ && !found.newcomer.empty() && !unknown_peer_) {
         unknown_peer_ = std::move(found.newcomer);
         deadlines_.arm(*this, now);
@@ -235,9 +256,56 @@ membership::verdict gossip::apply_signed(const peer_report& report, const observ
 
 void gossip::on_gone(std::string_view node, std::string_view where, time_point now) { lost_.add(node, where, now); }
 
+// -- routes --------------------------------------------------------------------------------------------------------
+
+// At once, so that a lost link is known as soon as the messages arrive, instead of after a turn for each node on the
+// way.
+void gossip::push_routes(time_point now) {
+    const auto nodes = reach_.take_unsent(now);
+    if (nodes.empty() || reach_.need(now) == 0) {
+        return;
+    }
+    for (auto& c : contacts_) {
+        if (c.node.empty() || !reach_.is_usable(c.node)) {
+            continue;
+        }
+        std::vector<peer_table::route> routes;
+        for (const auto& node : nodes) {
+            if (routes.size() >= max_pushed_routes) { // the others are asked for anyway
+                break;
+            }
+            const auto item = others_.entry_of(node);
+            if (const auto advert = item ? reach_.advert_of(*item, c.node) : std::nullopt) {
+                routes.push_back({item->epoch, *advert});
+            }
+        }
+        if (!routes.empty()) {
+            std::string table;
+            json_writer w{table};
+            write_routes(w, self_.name, routes);
+            out_.push(c.url, table);
+        }
+    }
+}
+
+// A neighbour that does not reply for that long is not used for now: there may be another way.
+void gossip::notice_silence(time_point now) {
+    for (const auto& c : contacts_) {
+        if (c.ticket != 0 && !c.node.empty() && reach_.need(now) != 0 && now - c.sent >= reach_.silence()) {
+            reach_.lose(std::string{c.node}, now);
+        }
+    }
+}
+
+bool gossip::can_be_asked(const membership::member& k, time_point now) const {
+    return !k.suspect && reach_.may_ask(k.node, now);
+}
+
 // -- selection -----------------------------------------------------------------------------------------------------
 
 void gossip::on_deadline(time_point now) {
+    reach_.review(now);
+    notice_silence(now);
     review(now);
     for (auto& c : contacts_) {
         if (c.ticket == 0 && c.next <= now) {
@@ -245,6 +313,7 @@ void gossip::on_deadline(time_point now) {
         }
     }
     send_own_entry_if_not_asked(now);
+    push_routes(now);
     follow(now);
 }
 
@@ -269,7 +338,7 @@ void gossip::drop_unresponsive(time_point now) {
         const auto known = others_.find_member(c.node);
         // Nodes chosen while few were known would be the same for all, and changes would come only from them.
         const bool had_its_time = c.until <= now || (c.as == part::chosen && others_.size() >= 2 * c.among);
-        if (!known || !can_be_asked(*known) || c.failures >= max_failures || (had_its_time && c.ticket == 0)) {
+        if (!known || !can_be_asked(*known, now) || c.failures >= max_failures || (had_its_time && c.ticket == 0)) {
             end(c, c.failures != 0, now);
         } else {
             c.url = known->where;
@@ -280,9 +349,9 @@ void gossip::drop_unresponsive(time_point now) {
 void gossip::choose_successor(time_point now) {
     std::optional<membership::member> next;
     auto name = self_.name;
-    for (std::size_t i = 0; i < others_.size(); ++i) {
+    for (std::size_t i = 0; i < others_.size() && reach_.allowed().empty(); ++i) { // otherwise all are asked
         const auto k = others_.next_member(name);
-        if (can_be_asked(*k) && !contacts_.rests(k->node, now) && !announce_only_.contain(*k, now)) {
+        if (can_be_asked(*k, now) && !contacts_.rests(k->node, now) && !announce_only_.contain(*k, now)) {
             next = k;
             break;
         }
@@ -315,14 +384,37 @@ void gossip::choose_successor(time_point now) {
 void gossip::choose_at_random(time_point now) {
     constexpr int tries = 8; // the next turn comes soon
     const auto size = others_.size();
-    for (int i = 0; i < tries && size != 0 && contacts_.count(part::chosen) < random_contacts; ++i) {
+    if (reach_.need(now) > 1) {
+        choose_neighbours(now);
+    }
+    for (int i = 0;
+         i < tries && size != 0 && reach_.allowed().empty() && contacts_.count(part::chosen) < random_contacts; ++i) {
         const auto k = others_.at(jitter_.below(size));
-        if (can_be_asked(k) && contacts_.find_node(k.node) == nullptr && !announce_only_.contain(k, now) &&
+        if (can_be_asked(k, now) && contacts_.find_node(k.node) == nullptr && !announce_only_.contain(k, now) &&
             (size <= random_contacts + 1 || !contacts_.rests(k.node, now))) {
             const auto stay = interval() * intervals_of_stay;
             auto& c = contacts_.add(part::chosen, k.node, k.where, now);
             c.until = now + stay - jitter_.quarter_of(stay);
             c.among = size;
+        }
+    }
+}
+
+// All that can be asked, because the shortest route may lead through any of them.
+void gossip::choose_neighbours(time_point now) {
+    const auto add = [&](const membership::member& k) {
+        if (contacts_.count(part::chosen) < max_neighbours && can_be_asked(k, now) &&
+            contacts_.find_node(k.node) == nullptr && !announce_only_.contain(k, now)) {
+            contacts_.add(part::chosen, k.node, k.where, now).among = others_.size();
+        }
+    };
+    if (reach_.allowed().empty()) {
+        others_.for_each(add);
+        return;
+    }
+    for (const auto& name : reach_.allowed()) {
+        if (const auto known = others_.find_member(name)) {
+            add(*known);
         }
     }
 }
@@ -338,13 +430,14 @@ void gossip::contact_bootstraps(time_point now) {
     if (unknown_peer_) {
         const auto known = others_.find_member(*unknown_peer_);
         unknown_peer_.reset();
-        if (known && can_be_asked(*known) && contacts_.find_node(known->node) == nullptr) {
+        if (known && can_be_asked(*known, now) && contacts_.find_node(known->node) == nullptr) {
             contacts_.add(part::bootstrap, known->node, known->where, now);
         }
     }
     if (now >= next_search_) {
         next_search_ = now + until_next_search();
-        if (const auto lost = lost_.any(others_, now); lost && contacts_.find_node(lost->name) == nullptr) {
+        if (const auto lost = lost_.any(others_, now);
+            lost && contacts_.find_node(lost->name) == nullptr && reach_.allows(lost->name)) {
             contacts_.add(part::bootstrap, lost->name, lost->url, now);
         }
     }
@@ -359,7 +452,9 @@ void gossip::call(contact& c, time_point now) {
     ++counts_.tables_asked;
     c.sent = now;
     c.ticket = ++last_ticket_;
-    out_.ask(c.ticket, c.url, c.since, c.describe);
+    const auto need = reach_.need(now);
+    const auto routes = need == 0 ? std::string{} : std::to_string(need) + "." + self_.name;
+    out_.ask(c.ticket, c.url, {.since = c.since, .describe = c.describe, .routes = routes});
 }
 
 void gossip::send_own_entry(contact& c, time_point now) {
@@ -388,7 +483,7 @@ void gossip::send_own_entry_if_not_asked(time_point now) {
 }
 
 void gossip::postpone(contact& c, time_point now) {
-    const bool few = others_.size() <= random_contacts + 1;
+    const bool few = others_.size() <= random_contacts + 1 && reach_.need(now) == 0;
     const auto pause = interval() / (few ? turns_among_few : turns_per_interval);
     c.next = now + pause - jitter_.quarter_of(pause);
 }
@@ -415,10 +510,15 @@ void gossip::follow(time_point now) {
         due = std::min(due, *seed);
     }
     for (const auto& c : contacts_) {
-        due = std::min(due, c.ticket == 0 ? c.next : c.sent + limit * 2);
+        due = std::min(due, c.ticket == 0                                       ? c.next
+                            : reach_.need(now) != 0 && reach_.is_usable(c.node) ? c.sent + reach_.silence()
+                                                                                : c.sent + limit * 2);
     }
     const bool wanting = contacts_.count(part::chosen) + contacts_.count(part::successor) <
                          std::min<std::size_t>(random_contacts + 1, announce_only_.count_gossiping(others_, now));
+    if (reach_.has_unsent()) {
+        due = std::min(due, reach_.next_push());
+    }
     if (wanting) {
         due = std::min(due, now + interval() / turns_per_interval);
     }

@@ -9,6 +9,7 @@
 #include "node/membership/gossip_contacts.hpp"
 #include "node/membership/membership.hpp"
 #include "node/membership/peer_table.hpp"
+#include "node/membership/reachability.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 
 #include <chrono>
@@ -27,21 +28,20 @@ class local_node;
 
 /// Decides which nodes are asked for their tables, and when (docs/protocol.md, "Gossip"): the successor by name, so
 /// that each node is asked by some node; two random nodes, so that changes spread fast; and from time to time a lost
-/// node.
+/// node. Where some nodes have no link to each other, all neighbours are asked, for routes too ("Routes").
 ///
 /// What the rest of the node calls is virtual, so that a program that does not take part in gossip does not link it.
 class gossip : private deadline {
   public:
     /// Sends the requests. The outcome of a ticket is reported to `on_answer`, `on_description` or `on_failure`, never
     /// from inside the call.
-    class client {
+    class client : public reachability::listener {
       public:
         client() = default;
         client(const client&) = delete;
         client& operator=(const client&) = delete;
-        /// `PULL self:cles/peers since=... describe=...` at `url`; without `describe` if it is empty.
-        virtual void ask(std::uint64_t ticket, std::string_view url, std::string_view since,
-                         std::string_view describe) = 0;
+        /// `PULL self:cles/peers since=... describe=... routes=...` at `url`, without those that are empty.
+        virtual void ask(std::uint64_t ticket, std::string_view url, const table_question& what) = 0;
         /// `PULL self:cles` at `url`.
         virtual void ask_description(std::uint64_t ticket, std::string_view url) = 0;
         /// `PUSH self:cles/peers` at `url`; the outcome is not reported.
@@ -59,10 +59,12 @@ class gossip : private deadline {
     static constexpr std::chrono::milliseconds limit{2'000}; ///< for a reply
     static constexpr unsigned max_failures = 2;              ///< in a row, before the node is replaced
     static constexpr int turns_per_interval = 8;
-    static constexpr int turns_among_few = 4;           ///< if all others are asked
-    static constexpr int intervals_of_rest = 2;         ///< after a failure
-    static constexpr int intervals_of_stay = 30;        ///< of a random node
-    static constexpr std::size_t bytes_a_second = 4096; ///< average for tables that are always sent whole
+    static constexpr int turns_among_few = 4;            ///< if all others are asked
+    static constexpr int intervals_of_rest = 2;          ///< after a failure
+    static constexpr int intervals_of_stay = 30;         ///< of a random node
+    static constexpr std::size_t bytes_a_second = 4096;  ///< average for tables that are always sent whole
+    static constexpr std::size_t max_neighbours = 16;    ///< that are asked for routes
+    static constexpr std::size_t max_pushed_routes = 32; ///< at once: they fit into a datagram
 
     struct self {
         std::string name;
@@ -81,6 +83,8 @@ class gossip : private deadline {
     /// Leaves, and stops asking.
     virtual void stop(time_point now);
     virtual void set_seeds(const std::vector<std::string>& urls, time_point now);
+    /// By which neighbour each node is reached.
+    [[nodiscard]] reachability& reach() noexcept { return reach_; }
 
     void on_answer(std::uint64_t ticket, std::string_view json, time_point now);
     void on_description(std::uint64_t ticket, std::string_view json, time_point now);
@@ -110,6 +114,9 @@ class gossip : private deadline {
     membership::verdict apply(const peer_report& report, const observed_source& by, time_point asked, time_point now);
     membership::verdict apply_signed(const peer_report& report, const observed_source& by, time_point asked,
                                      time_point now);
+    void push_routes(time_point now);
+    [[nodiscard]] bool can_be_asked(const membership::member& k, time_point now) const;
+    void notice_silence(time_point now);
     bool read(std::string_view json, std::size_t max_entries, peer_table& table) const;
 
     void on_deadline(time_point now) override;
@@ -117,6 +124,7 @@ class gossip : private deadline {
     void drop_unresponsive(time_point now);
     void choose_successor(time_point now);
     void choose_at_random(time_point now);
+    void choose_neighbours(time_point now);
     void contact_bootstraps(time_point now);
     void call(contact& c, time_point now);
     void send_own_entry(contact& c, time_point now);
@@ -141,6 +149,7 @@ class gossip : private deadline {
     lost_nodes lost_;
     gossip_contacts contacts_;
     announce_only_nodes announce_only_;
+    reachability reach_;
     std::optional<std::string> unknown_peer_; // sent its own entry, and is to be asked
     time_point next_search_{};
     time_point next_successor_ = time_point::min();

@@ -24,10 +24,13 @@ class gossip_driver final : private gossip::client, public gossip {
           host_(host) {}
 
   private:
-    void ask(std::uint64_t ticket, std::string_view url, std::string_view since, std::string_view describe) override {
-        auto adverbs = "since=" + std::string{since};
-        if (!describe.empty()) {
-            adverbs.append(" describe=").append(describe);
+    void ask(std::uint64_t ticket, std::string_view url, const table_question& what) override {
+        auto adverbs = "since=" + std::string{what.since};
+        if (!what.describe.empty()) {
+            adverbs.append(" describe=").append(what.describe);
+        }
+        if (!what.routes.empty()) {
+            adverbs.append(" routes=").append(what.routes);
         }
         send(url, {.verb = verb::pull, .noun = "self:cles/peers", .adverbs = adverbs},
              reply_to(ticket, &gossip::on_answer));
@@ -42,6 +45,18 @@ class gossip_driver final : private gossip::client, public gossip {
     // Posted, because the last reply may have just arrived on this link.
     void release(std::string_view url) override {
         host_.post_while_running([url = std::string{url}](local_node& host) { host.peer_channels().release(url); });
+    }
+
+    [[nodiscard]] bool forwards() const override { return host_.node().active_router != nullptr; }
+    // Posted, because they may be called from inside the channels.
+    void on_route_lost(std::string_view node, std::string_view address) override {
+        host_.post_while_running([node = std::string{node}, address = std::string{address}](local_node& host) {
+            host.feeds().on_route_lost(node, address);
+        });
+    }
+    void on_route_changed(std::string_view node) override {
+        host_.post_while_running(
+            [node = std::string{node}](local_node& host) { host.peer_channels().on_route_changed(node); });
     }
 
     void on_stated_roster(std::string_view node, std::uint32_t version) override {
@@ -74,12 +89,12 @@ class gossip_driver final : private gossip::client, public gossip {
 
 namespace cles {
 
-gossip_options gossip(std::vector<std::string> seeds) {
+gossip_options gossip(std::vector<std::string> seeds, std::vector<std::string> links) {
     static constexpr detail::gossip_part part{
         [](core::local_node& node, std::uint32_t seed) -> std::unique_ptr<core::gossip> {
             return std::make_unique<core::gossip_driver>(node, seed);
         }};
-    return {.seeds = std::move(seeds), .part = &part};
+    return {.seeds = std::move(seeds), .links = std::move(links), .part = &part};
 }
 
 } // namespace cles

@@ -88,7 +88,8 @@ void incarnation::apply(const sighting& w, std::uint64_t& numbers) {
     const bool placed = apply_endpoints(w);
     const bool describes = w.seq != 0 || !w.announced.tasks.empty();
     if (placed || is_significant_load_change(w.announced.load) || announced.roster != w.announced.roster ||
-        (describes && (announced.tasks != w.announced.tasks || announced.signed_tasks != w.announced.signed_tasks))) {
+        (describes && (announced.tasks != w.announced.tasks || announced.signed_tasks != w.announced.signed_tasks ||
+                       announced.links != w.announced.links))) {
         described_revision = ++numbers;
         service_us = w.announced.load.service_us;
     }
@@ -101,6 +102,7 @@ void incarnation::apply(const sighting& w, std::uint64_t& numbers) {
     if (describes) {
         announced.tasks = w.announced.tasks;
         announced.signed_tasks = w.announced.signed_tasks;
+        announced.links = w.announced.links;
     }
     if (!w.is_from_gossip()) {
         announced.sources = w.announced.sources;

@@ -125,7 +125,7 @@ bool membership::has_news(const announcement& own) const noexcept {
     }
     const auto& last = own_->announced;
     return last.endpoints != own.endpoints || last.tasks != own.tasks || last.roster != own.roster ||
-           last.leaving != own.leaving || last.signed_tasks != own.signed_tasks ||
+           last.leaving != own.leaving || last.signed_tasks != own.signed_tasks || last.links != own.links ||
            own_->is_significant_load_change(own.load);
 }
 
@@ -567,6 +567,43 @@ std::optional<std::string_view> membership::address_of(std::string_view node) co
     return at == peers_.end() ? std::nullopt : std::optional{at->second.owner.where()};
 }
 
+time_point membership::last_seen(std::string_view node) const noexcept {
+    const auto at = peers_.find(node);
+    return at == peers_.end() ? time_point::min() : at->second.owner.last_seen;
+}
+
+const std::string* membership::owner_of(std::uint32_t epoch) const noexcept {
+    const auto* const found = by_epoch_.find(epoch);
+    return found != nullptr && found->second.owner.epoch == epoch ? &found->first : nullptr;
+}
+
+void membership::prefer_address(std::string_view node, std::string_view url) {
+    const auto at = peers_.find(node);
+    if (at == peers_.end()) {
+        return;
+    }
+    auto& all = at->second.owner.endpoints;
+    const auto scheme = url.substr(0, url.find(':') + 1);
+    if (at->second.owner.from != group_source{} || all.empty() || all.front() == url ||
+        !all.front().starts_with(scheme)) {
+        return;
+    }
+    std::erase(all, url);
+    all.emplace(all.begin(), url);
+    notify(at->first, change::moved, url);
+}
+
+void membership::touch(std::string_view node) {
+    if (node == own_name_ && own_) {
+        own_->revision = ++revision_;
+        return;
+    }
+    if (const auto at = peers_.find(node); at != peers_.end()) {
+        at->second.owner.revision = ++revision_;
+        freshen(*at);
+    }
+}
+
 const std::vector<std::string>* membership::endpoints_of(std::string_view node) const noexcept {
     const auto at = peers_.find(node);
     return at == peers_.end() ? nullptr : &at->second.owner.endpoints;
@@ -651,6 +688,13 @@ std::optional<delta_entry> membership::description_of(std::uint32_t epoch) const
     }
     const auto& [name, e] = *found;
     return delta_entry::of(delta_entry::kind::description, name, e.owner, e.state());
+}
+
+std::optional<delta_entry> membership::entry_of(std::string_view node) const {
+    const auto at = peers_.find(node);
+    return at == peers_.end() ? std::nullopt
+                              : std::optional{delta_entry::of(delta_entry::kind::heartbeat, at->first, at->second.owner,
+                                                              at->second.state())};
 }
 
 std::vector<peer> membership::list(time_point now) const {

@@ -127,6 +127,14 @@ class membership final : private deadline {
     /// The URL at which the node is reached; nothing if it is unknown, empty if none of its addresses is usable from
     /// here. Valid until the next change.
     [[nodiscard]] std::optional<std::string_view> address_of(std::string_view node) const noexcept;
+    /// When the node last announced itself; the earliest time if it is unknown.
+    [[nodiscard]] time_point last_seen(std::string_view node) const noexcept;
+    /// The node of that incarnation; null if it is unknown, or not the owner of its name.
+    [[nodiscard]] const std::string* owner_of(std::uint32_t epoch) const noexcept;
+    /// The node has replied at that URL: it is used instead of an address of the same kind that others have reported.
+    void prefer_address(std::string_view node, std::string_view url);
+    /// Reports the node again to those that ask for changes.
+    void touch(std::string_view node);
     /// All such URLs, the preferred one first; null if it is unknown.
     [[nodiscard]] const std::vector<std::string>* endpoints_of(std::string_view node) const noexcept;
     /// The number of other nodes.
@@ -159,6 +167,8 @@ class membership final : private deadline {
     [[nodiscard]] std::vector<delta_entry> deltas_since(std::uint64_t revision, time_point now) const;
     /// The full entry of an incarnation; nothing if it is unknown, or reported in full anyway.
     [[nodiscard]] std::optional<delta_entry> description_of(std::uint32_t epoch) const;
+    /// The same for the owner of a name.
+    [[nodiscard]] std::optional<delta_entry> entry_of(std::string_view node) const;
     /// The newest revision.
     [[nodiscard]] std::uint64_t latest_revision() const noexcept { return revision_; }
 

@@ -66,6 +66,7 @@ void write_entry(json_writer& w, const delta_entry& item, time_point now, std::s
         write_load_member(w, said->load);
         write_member(w, "tasks", said->tasks);
         write_signed_member(w, said->signed_tasks);
+        write_links_member(w, said->links);
     }
     w.end_object();
 }
@@ -85,10 +86,11 @@ void write_heartbeat(json_writer& w, const delta_entry& item, time_point now) {
 struct page {
     std::string peers = "[";
     std::string beats = "{";
+    std::string routes = "{";
     std::uint64_t next = 0;
     bool more = false;
 
-    [[nodiscard]] std::size_t size() const noexcept { return peers.size() + beats.size(); }
+    [[nodiscard]] std::size_t size() const noexcept { return peers.size() + beats.size() + routes.size(); }
 };
 
 // Adds the requested descriptions. Those of unchanged nodes go first, because their revision was already sent.
@@ -109,22 +111,39 @@ void describe(std::vector<delta_entry>& items, const membership& others, std::st
     }
 }
 
-page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::size_t longest, time_point now) {
+void write_route(json_writer& w, std::uint32_t epoch, const route_advert& how) {
+    w.plain_key(protocol::epoch_text(epoch));
+    w.begin_array();
+    w.value(how.seq);
+    if (how.hops) {
+        w.value(std::uint64_t{*how.hops});
+    }
+    w.end_array();
+}
+
+page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::size_t longest,
+             const route_function& route_of, time_point now) {
     page p;
     json_writer peers{p.peers}; // both write after the opening bracket
     json_writer beats{p.beats};
+    json_writer routes{p.routes};
     for (const auto& item : items) {
         const auto peers_before = p.peers.size();
         const auto beats_before = p.beats.size();
+        const auto routes_before = p.routes.size();
         const bool first = &item == &items.front();
         if (item.what == delta_entry::kind::heartbeat) {
             write_heartbeat(beats, item, now);
         } else {
             write_entry(peers, item, now, max_endpoints);
         }
+        if (const auto route = route_of ? route_of(item) : std::nullopt) {
+            write_route(routes, item.epoch, *route);
+        }
         if (p.size() > longest && !first) {
             p.peers.resize(peers_before);
             p.beats.resize(beats_before);
+            p.routes.resize(routes_before);
             p.more = true;
             break;
         }
@@ -144,6 +163,7 @@ page page_of(const std::vector<delta_entry>& items, std::uint64_t latest, std::s
     }
     p.peers.push_back(']');
     p.beats.push_back('}');
+    p.routes.push_back('}');
     return p;
 }
 
@@ -261,10 +281,43 @@ bool read_heartbeats(json_reader& r, std::size_t most, peer_table& out) {
     });
 }
 
+bool read_route(json_reader& r, route_advert& out) {
+    if (!r.begin_array() || !r.next_element() || !r.read(out.seq)) {
+        return false;
+    }
+    if (r.next_element()) {
+        std::uint32_t hops = 0;
+        if (!read_count(r, hops)) {
+            return false;
+        }
+        out.hops = hops;
+        while (r.next_element()) { // values of later versions
+            r.skip();
+        }
+    }
+    return r.ok();
+}
+
+bool read_routes(json_reader& r, std::size_t most, peer_table& out) {
+    return read_members(r, [&](std::string_view key) {
+        const auto epoch = protocol::parse_epoch(key);
+        if (!epoch || most == 0) {
+            return r.skip();
+        }
+        --most;
+        peer_table::route found{.epoch = *epoch, .advert = {}};
+        if (!read_route(r, found.advert)) {
+            return false;
+        }
+        out.routes.push_back(found);
+        return true;
+    });
+}
+
 } // namespace
 
 void write_delta(json_writer& w, const table_owner& who, const membership& others, const table_question& asked,
-                 std::size_t longest, time_point now) {
+                 std::size_t longest, time_point now, const route_function& route_of) {
     std::uint64_t sent = 0;
     if (asked.since.size() > 9 && asked.since.starts_with(who.epoch) && asked.since[8] == '.') {
         sent = protocol::parse_number(asked.since.substr(9)).value_or(0);
@@ -276,7 +329,7 @@ void write_delta(json_writer& w, const table_owner& who, const membership& other
     describe(items, others, asked.describe, sent);
     const auto available = std::min(longest, table_page);
     const auto for_items = available > bytes_for_head ? available - bytes_for_head : 0;
-    const auto p = page_of(items, others.latest_revision(), for_items, now);
+    const auto p = page_of(items, others.latest_revision(), for_items, route_of, now);
     w.begin_object();
     write_member(w, "node", who.node);
     write_member(w, "epoch", who.epoch);
@@ -287,6 +340,10 @@ void write_delta(json_writer& w, const table_owner& who, const membership& other
     w.raw(p.peers);
     w.plain_key("beats");
     w.raw(p.beats);
+    if (route_of) {
+        w.plain_key("routes");
+        w.raw(p.routes);
+    }
     write_member(w, "next", std::string{who.epoch} + "." + std::to_string(p.next));
     if (p.more) {
         write_member(w, "more", true);
@@ -304,6 +361,20 @@ void write_own_entry(json_writer& w, const incarnation& own, time_point now) {
     w.end_object();
 }
 
+void write_routes(json_writer& w, std::string_view node, const std::vector<peer_table::route>& routes) {
+    w.begin_object();
+    write_member(w, "node", node);
+    w.plain_key("peers");
+    w.raw("[]");
+    w.plain_key("routes");
+    w.begin_object();
+    for (const auto& [epoch, advert] : routes) {
+        write_route(w, epoch, advert);
+    }
+    w.end_object();
+    w.end_object();
+}
+
 bool read_table(std::string_view json, std::size_t max_entries, std::chrono::milliseconds usual, peer_table& out,
                 entry_form form) {
     out = {};
@@ -311,14 +382,15 @@ bool read_table(std::string_view json, std::size_t max_entries, std::chrono::mil
     bool has_peers = false;
     const bool good = read_members(r, [&](std::string_view key) {
         has_peers = has_peers || key == "peers";
-        return key == "peers"   ? read_entries(r, max_entries, usual, form, out)
-               : key == "beats" ? read_heartbeats(r, max_entries, out)
-               : key == "node"  ? r.read(out.node)
-               : key == "epoch" ? r.read(out.epoch)
-               : key == "pool"  ? r.read(out.pool)
-               : key == "next"  ? r.read(out.next)
-               : key == "more"  ? r.read(out.more)
-                                : r.skip();
+        return key == "peers"    ? read_entries(r, max_entries, usual, form, out)
+               : key == "beats"  ? read_heartbeats(r, max_entries, out)
+               : key == "routes" ? read_routes(r, max_entries, out)
+               : key == "node"   ? r.read(out.node)
+               : key == "epoch"  ? r.read(out.epoch)
+               : key == "pool"   ? r.read(out.pool)
+               : key == "next"   ? r.read(out.next)
+               : key == "more"   ? r.read(out.more)
+                                 : r.skip();
     });
     return good && has_peers;
 }
@@ -338,21 +410,25 @@ bool read_description(std::string_view json, std::chrono::milliseconds usual, pe
     return good && has_epoch && is_of_a_node(out);
 }
 
-void write_peers(json_writer& w, const membership& others, time_point now) {
+void write_peers(json_writer& w, const std::vector<peer>& all, std::string_view pool) {
     w.begin_object();
     w.plain_key("peers");
     w.begin_array();
-    for (const auto& p : others.list(now)) {
+    for (const auto& p : all) {
         w.begin_object();
         write_member(w, "node", p.node);
-        if (!others.pool().empty()) {
-            write_member(w, "pool", others.pool());
+        if (!pool.empty()) {
+            write_member(w, "pool", pool);
         }
         write_endpoints_member(w, p.endpoints, p.endpoints.size());
         write_member(w, "epoch", p.epoch);
         write_member(w, "age_ms", p.age.count());
         write_member(w, "state", to_string(p.state));
         write_load_member(w, p.load);
+        if (p.hops != 1) {
+            write_member(w, "hops", std::uint64_t{p.hops});
+            write_member(w, "via", p.via);
+        }
         w.end_object();
     }
     w.end_array();

@@ -6,10 +6,13 @@
 
 #include "node/membership/announcement.hpp"
 #include "node/membership/membership.hpp"
+#include "node/membership/route_table.hpp"
 
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -19,17 +22,18 @@
 namespace cles::core {
 
 /// Writes the reply to `PULL self:cles/peers`.
-void write_peers(json_writer& w, const membership& others, time_point now);
+void write_peers(json_writer& w, const std::vector<peer>& all, std::string_view pool);
 
 /// The maximum size of a reply on a stream, in bytes.
 inline constexpr std::size_t table_page = 32 * 1024;
 /// The maximum number of entries that count in a table sent without a request.
 inline constexpr std::size_t max_pushed_entries = 64;
 
-/// The adverbs of `PULL self:cles/peers since=... describe=...`.
+/// The adverbs of `PULL self:cles/peers since=... describe=... routes=...`.
 struct table_question {
     std::string_view since;
     std::string_view describe{}; ///< epochs, separated by commas
+    std::string_view routes{};   ///< how far the need for routes spreads, and who asks: "8.car1"
 };
 
 /// The node that replies.
@@ -37,9 +41,13 @@ struct table_owner {
     std::string_view node;
     std::string_view epoch; ///< as text
 };
-/// Writes what has changed, in at most `longest` bytes including the head of the reply.
+/// What is advertised for an entry, if anything.
+using route_function = std::function<std::optional<route_advert>(const delta_entry&)>;
+
+/// Writes what has changed, in at most `longest` bytes including the head of the reply. `route_of`: empty if no routes
+/// are asked for.
 void write_delta(json_writer& w, const table_owner& who, const membership& others, const table_question& asked,
-                 std::size_t longest, time_point now);
+                 std::size_t longest, time_point now, const route_function& route_of = {});
 
 /// Writes the body of `PUSH self:cles/peers` with this node's own entry.
 void write_own_entry(json_writer& w, const incarnation& own, time_point now);
@@ -53,8 +61,16 @@ struct peer_table {
     bool more = false;
     std::vector<peer_report> reports;
     std::vector<peer_heartbeat> beats;
+    struct route {
+        std::uint32_t epoch = 0;
+        route_advert advert;
+    };
+    std::vector<route> routes;   ///< from the node that replies
     std::size_t bad_entries = 0; ///< that could not be read, and were skipped
 };
+
+/// Writes the body of `PUSH self:cles/peers` with routes that have changed.
+void write_routes(json_writer& w, std::string_view node, const std::vector<peer_table::route>& routes);
 
 /// How the entries of tables are written.
 enum class entry_form : std::uint8_t {

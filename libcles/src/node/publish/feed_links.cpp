@@ -324,6 +324,24 @@ void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
     }
 }
 
+void feed_links::on_route_lost(std::string_view node, std::string_view address) {
+    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> moved; // a completion may close others
+    for (auto& feed : feeds_) {
+        const auto& e = feed.entry();
+        if (feed.is_bound() && feed.target() == node && e.terms.at.empty() && e.at == address) {
+            moved.emplace_back(&feed, e.handle);
+        }
+    }
+    for (const auto& [feed, handle] : moved) {
+        const auto alive = handle.lock();
+        if (alive && feed->is_bound()) {
+            unbind(*feed);
+            feed->on_lost("the route to " + std::string{node} + " has changed", host_.now());
+            feed->expedite(host_.now());
+        }
+    }
+}
+
 void feed_links::on_security_changed() {
     std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> refused; // a completion may close others
     for (auto& feed : feeds_) {

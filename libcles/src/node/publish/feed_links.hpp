@@ -34,6 +34,8 @@ class feed_links final : public core::feed_host {
     /// The node has a new incarnation: feeds that wait to bind there do so at once. `replaced`: feeds that are still
     /// bound to the previous incarnation are bound again.
     void on_new_incarnation(std::string_view node, bool replaced);
+    /// Updates of the node no longer arrive by the link to `address`: feeds of it bind by another.
+    void on_route_lost(std::string_view node, std::string_view address);
     /// The roster or the rules have changed: ends the bindings that are no longer permitted.
     void on_security_changed();
     /// Closes all feeds.

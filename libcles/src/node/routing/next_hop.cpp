@@ -156,12 +156,12 @@ class peer_next_hop : public next_hop {
     explicit peer_next_hop(local_node& host) noexcept : host_(host) {}
 
     std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
-                       outbound::progress_function progress) override {
+                       outbound::progress_function progress, std::string_view via) override {
         if (host_.stopped()) {
             host_.fail_later(std::move(reply), errc::stopped, {});
             return 0;
         }
-        return host_.peer_channels().send(r.target(), {}, r, deadline, std::move(reply), std::move(progress));
+        return host_.peer_channels().send(r.target(), {}, r, deadline, std::move(reply), std::move(progress), via);
     }
     void cancel(std::uint64_t ticket) override { host_.cancel(ticket); }
     std::shared_ptr<void> bind(std::string_view node, std::string_view path, std::string_view adverbs,

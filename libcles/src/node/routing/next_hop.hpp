@@ -41,8 +41,9 @@ class next_hop {
 
     /// Sends a request to the node that its noun names, and gives it an id. The operation never completes inside the
     /// call. Returns a ticket for `cancel`.
+    /// `via`: the nodes that have forwarded the request before; it is not sent to them.
     virtual std::uint64_t send(const protocol::outgoing_request& r, time_point deadline, detail::pending_ptr reply,
-                               outbound::progress_function progress) = 0;
+                               outbound::progress_function progress, std::string_view via) = 0;
     /// Cancels a request in progress: its operation completes with `cancelled`, inside the call.
     virtual void cancel(std::uint64_t ticket) = 0;
 

@@ -2,6 +2,7 @@
 #include "node/routing/peer_channels.hpp"
 
 #include "node/local_node.hpp"
+#include "node/membership/gossip.hpp"
 #include "node/publish/feed_machine.hpp"
 #include "protocol/grammar.hpp"
 
@@ -36,7 +37,7 @@ std::shared_ptr<connection> peer_channel::usable_link(const feed_machine* feed) 
 }
 
 void peer_channel::send(const protocol::outgoing_request& r, time_point deadline, time_point now,
-                        detail::pending_ptr operation, outbound::progress_function progress) {
+                        detail::pending_ptr operation, outbound::progress_function progress, bool anywhere) {
     if (const auto c = usable_link()) {
         c->session().asking().send(r, deadline, now, std::move(operation), std::move(progress));
         return;
@@ -56,6 +57,7 @@ void peer_channel::send(const protocol::outgoing_request& r, time_point deadline
     w->memory = std::move(held);
     w->operation = std::move(operation);
     w->progress = std::move(progress);
+    w->anywhere = anywhere;
     host_->deadlines().arm(*w, deadline);
     requests_.push_back(std::move(w));
     dial();
@@ -128,6 +130,7 @@ void peer_channel::on_dialled(boost::system::error_code code, link_ptr made) {
     const auto keep = shared_from_this();
     give_up_ = nullptr;
     if (code) {
+        host_->peer_channels().on_unreachable(*this);
         fail(code, "cannot connect to " + address_ + ": " + code.message());
     } else {
         const auto c = host_->connections().adopt(std::move(made), connection::origin::dialled);
@@ -165,10 +168,36 @@ void peer_channel::hand_over(peer_channel& channel) {
     }
     channel.requests_.splice(channel.requests_.end(), requests_);
     channel.feeds_.splice(channel.feeds_.end(), feeds_);
-    if (const auto c = channel.usable_link()) {
-        channel.serve_waiting(c);
+    channel.serve_or_dial();
+}
+
+void peer_channel::reroute(const std::function<peer_channel*(std::string_view target)>& channel_to) {
+    for (auto next = requests_.begin(); next != requests_.end();) {
+        const auto here = next++;
+        auto* const channel = (*here)->anywhere ? channel_to((*here)->request.target()) : nullptr;
+        if (channel != nullptr && channel != this) {
+            (*here)->owner = channel;
+            channel->requests_.splice(channel->requests_.end(), requests_, here);
+            channel->serve_or_dial();
+        }
+    }
+    for (auto next = feeds_.begin(); next != feeds_.end();) {
+        const auto here = next++;
+        const auto& feed = *here->feed;
+        auto* const channel = feed.entry().terms.at.empty() ? channel_to(feed.target()) : nullptr;
+        if (channel != nullptr && channel != this) {
+            here->feed->entry().at = channel->address();
+            channel->feeds_.splice(channel->feeds_.end(), feeds_, here);
+            channel->serve_or_dial();
+        }
+    }
+}
+
+void peer_channel::serve_or_dial() {
+    if (const auto c = usable_link()) {
+        serve_waiting(c);
     } else {
-        channel.dial();
+        dial();
     }
 }
 
@@ -231,7 +260,7 @@ std::string_view peer_channels::name_to_check(std::string_view target, std::stri
 
 bool peer_channels::is_by_datagram(std::string_view node) const {
     try {
-        return address_of(node).starts_with("udp://");
+        return place_of(node).address.starts_with("udp://");
     } catch (const error&) { // it is not known
         return false;
     }
@@ -258,10 +287,10 @@ std::string peer_channels::tls_address_of(std::string_view node) const {
 peer_channel* peer_channels::to(std::string_view target, std::string_view at, bool urgent,
                                 boost::system::error_code& code, std::string& why) {
     if (!at.empty() || urgent) {
-        return find(target, at, urgent, code, why);
+        return find({.target = target, .at = at, .urgent = urgent}, code, why);
     }
     if (recent_ == nullptr || recent_target_ != target) {
-        recent_ = find(target, at, false, code, why);
+        recent_ = find({.target = target}, code, why);
         recent_target_ = target;
     }
     return recent_;
@@ -269,16 +298,17 @@ peer_channel* peer_channels::to(std::string_view target, std::string_view at, bo
 
 std::uint64_t peer_channels::send(std::string_view target, std::string_view at, protocol::outgoing_request r,
                                   time_point deadline, detail::pending_ptr operation,
-                                  outbound::progress_function progress) {
+                                  outbound::progress_function progress, std::string_view via) {
     boost::system::error_code code;
     std::string why;
-    auto* channel = to(target, at, r.carried.urgent, code, why);
+    auto* channel = via.empty() ? to(target, at, r.carried.urgent, code, why)
+                                : find({.target = target, .at = at, .urgent = r.carried.urgent, .via = via}, code, why);
     if (channel == nullptr) {
         host_.fail_later(std::move(operation), code, std::move(why), std::move(progress));
         return 0;
     }
     r.id = host_.draw_id();
-    channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress));
+    channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress), at.empty());
     return r.id;
 }
 
@@ -286,7 +316,7 @@ void peer_channels::send_to_node(std::string_view name, std::string_view at, pro
                                  time_point deadline, detail::pending_ptr operation) {
     boost::system::error_code code;
     std::string why;
-    auto* channel = find(name, at, false, code, why, name);
+    auto* channel = find({.target = name, .at = at, .expected = name}, code, why);
     if (channel == nullptr) {
         host_.fail_later(std::move(operation), code, std::move(why), {});
         return;
@@ -295,52 +325,100 @@ void peer_channels::send_to_node(std::string_view name, std::string_view at, pro
     channel->send(r, deadline, host_.now(), std::move(operation), {});
 }
 
-std::string peer_channels::address_of(std::string_view target) const {
+peer_channels::place peer_channels::place_of(std::string_view target, std::string_view via) const {
     const auto& own_name = host_.node().name;
     const auto& listeners = host_.listeners();
     const bool routed = host_.node().active_router != nullptr && protocol::is_reserved_target(target);
     if (target == "self" || target == own_name || routed) {
-        return "inproc://" + listeners.self_endpoint();
+        return {"inproc://" + listeners.self_endpoint(), own_name};
     }
     if (const auto configured = directory_.find(target); configured != directory_.end()) {
-        return configured->second;
+        return {configured->second, std::string{target}};
     }
     // With security, the other end would take this node for itself.
     if (const auto endpoint = listeners.shared_endpoint(target);
         !host_.node().security && host_.environment().is_open(endpoint)) {
-        return "inproc://" + endpoint;
+        return {"inproc://" + endpoint, std::string{target}};
     }
     if (protocol::is_reserved_target(target)) {
         throw error(errc::no_target, "'" + std::string{target} +
                                          "' needs a node that routes: give this one cles::routing() as "
                                          "service_options::routing, or set call_options::at to the URL of another");
     }
-    const auto unknown = own_name + " cannot find '" + std::string{target} + "': ";
+    if (auto found = discovered_place_of(target, via)) {
+        return std::move(*found);
+    }
     const auto& discovery = host_.discovery();
-    const auto& peers = host_.node().peers;
-    if (const auto heard = peers.address_of(target); heard && !discovery.expects_more_of(target)) {
-        if (const auto second = peers.conflicting_endpoint_of(target)) {
-            throw error(errc::no_target, "two nodes have the name '" + std::string{target} + "', at " +
-                                             std::string{*heard} + " and at " + std::string{*second} +
-                                             ": give the URL of one");
-        }
-        if (heard->empty()) {
-            throw error(errc::no_target, unknown + "it has announced no address that is reachable from here");
-        }
-        return std::string{*heard};
-    }
     if (discovery.expects_more()) {
-        return std::string{undiscovered}.append(target);
+        return {std::string{undiscovered}.append(target), std::string{target}};
     }
-    throw error(errc::no_target, unknown + discovery.unknown_reason() + "give its URL");
+    throw error(errc::no_target, own_name + " cannot find '" + std::string{target} +
+                                     "': " + discovery.unknown_reason() + "give its URL");
 }
 
-peer_channel* peer_channels::find(std::string_view target, std::string_view at, bool urgent,
-                                  boost::system::error_code& code, std::string& why, std::string_view expected) {
+std::optional<peer_channels::place> peer_channels::discovered_place_of(std::string_view target,
+                                                                       std::string_view via) const {
+    const auto& peers = host_.node().peers;
+    const auto known = peers.address_of(target);
+    if (!known || host_.discovery().expects_more_of(target)) {
+        return {};
+    }
+    if (const auto second = peers.conflicting_endpoint_of(target)) {
+        throw error(errc::no_target, "two nodes have the name '" + std::string{target} + "', at " +
+                                         std::string{*known} + " and at " + std::string{*second} +
+                                         ": give the URL of one");
+    }
+    auto* const routes = host_.node().gossip_responder;
+    auto hop = routes != nullptr ? routes->reach().next_hop_to(target, via) : std::string{target};
+    const auto where = hop == target ? known : peers.address_of(hop);
+    if (!where || where->empty()) {
+        const auto reason =
+            known->empty() || routes == nullptr
+                ? " cannot find '" + std::string{target} + "': it has announced no address that is reachable from here"
+                : " has no link to '" + std::string{target} + "', and knows no route to it";
+        throw error(errc::no_target, host_.node().name + reason);
+    }
+    return place{std::string{*where}, std::move(hop)};
+}
+
+void peer_channels::on_unreachable(peer_channel& channel) {
+    auto* const routes = host_.node().gossip_responder;
+    if (routes == nullptr) {
+        return;
+    }
+    routes->reach().on_unreachable(channel.address(), host_.now());
+    reroute(channel);
+}
+
+void peer_channels::on_route_changed(std::string_view node) {
+    on_address_changed(node);
+    const auto where = host_.node().peers.address_of(node);
+    std::vector<std::shared_ptr<peer_channel>> waiting; // those may create others
+    for (const auto& [key, channel] : channels_) {
+        if (where && channel->address() == *where && channel->is_opening()) {
+            waiting.push_back(channel);
+        }
+    }
+    for (const auto& channel : waiting) {
+        reroute(*channel);
+    }
+}
+
+void peer_channels::reroute(peer_channel& channel) {
+    recent_ = nullptr;
+    channel.reroute([this](std::string_view target) {
+        boost::system::error_code code;
+        std::string why;
+        return find({.target = target}, code, why);
+    });
+}
+
+peer_channel* peer_channels::find(const destination& to, boost::system::error_code& code, std::string& why) {
+    const auto& [target, at, urgent, expected, via] = to;
     try {
-        const auto address = at.empty() ? address_of(target) : std::string{at};
+        auto [address, node] = at.empty() ? place_of(target, via) : place{std::string{at}, std::string{target}};
         const bool waits = at.empty() && address.starts_with(undiscovered);
-        const auto name = expected.empty() ? name_to_check(target, at, address) : expected;
+        const auto name = expected.empty() ? name_to_check(node, at, address) : expected;
         const auto key = address + name_suffix(name) + (urgent && !waits ? std::string{urgent_suffix} : std::string{});
         if (const auto found = channels_.find(key); found != channels_.end()) {
             return found->second.get();

@@ -40,8 +40,9 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     using ready_function =
         std::function<void(const std::shared_ptr<connection>&, boost::system::error_code, std::string_view)>;
     /// Sends a request on an open link, or as soon as there is one; see `outbound::send`.
+    /// `anywhere`: the request is for the node that its noun names, wherever that is reached.
     void send(const protocol::outgoing_request& r, time_point deadline, time_point now, detail::pending_ptr operation,
-              outbound::progress_function progress);
+              outbound::progress_function progress, bool anywhere = false);
     /// Cancels a request that waits for its link. Returns false if there is none with that id.
     bool cancel(std::uint64_t id);
     /// Calls `ready` with a link on which the feed's noun is not bound yet; no longer after `forget`.
@@ -49,6 +50,8 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     void forget(const feed_machine& feed);
     /// Moves what waits here to another channel.
     void hand_over(peer_channel& channel);
+    /// Moves what waits here for a node, and not for this address, to the channel that `channel_to` returns for it.
+    void reroute(const std::function<peer_channel*(std::string_view target)>& channel_to);
     /// Fails what waits here, because there is no link.
     void fail(boost::system::error_code code, std::string_view message);
     /// `c` was lost or can no longer be used.
@@ -59,6 +62,8 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     void stop();
 
     [[nodiscard]] const std::string& address() const noexcept { return address_; }
+    /// Whether a link is being opened.
+    [[nodiscard]] bool is_opening() const noexcept { return static_cast<bool>(give_up_); }
     /// Whether it can be removed without loss.
     [[nodiscard]] bool idle() const noexcept {
         return links_.empty() && requests_.empty() && feeds_.empty() && !give_up_;
@@ -77,6 +82,7 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
         detail::pending_ptr operation;
         memory_reservation memory;
         outbound::progress_function progress;
+        bool anywhere = false;
     };
     struct waiting_feed {
         feed_machine* feed;
@@ -87,6 +93,7 @@ class peer_channel : public std::enable_shared_from_this<peer_channel> {
     /// An open link, on which `feed` can be bound if it is not null.
     [[nodiscard]] std::shared_ptr<connection> usable_link(const feed_machine* feed = nullptr) const;
     void dial();
+    void serve_or_dial();
     void on_dialled(boost::system::error_code code, link_ptr made);
     void serve_waiting(const std::shared_ptr<connection>& c);
     void fail(waiting_requests::iterator which, errc code, std::string_view message);
@@ -114,14 +121,18 @@ class peer_channels {
     peer_channel* to(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
                      std::string& why);
     /// Sends a request to a target, or to `at` if it is not empty, and gives it an id. Without a channel that leads
-    /// there, the operation fails later. Returns the id, or 0.
+    /// there, the operation fails later. Returns the id, or 0. `via`: nodes that have forwarded the request.
     std::uint64_t send(std::string_view target, std::string_view at, protocol::outgoing_request r, time_point deadline,
-                       detail::pending_ptr operation, outbound::progress_function progress);
+                       detail::pending_ptr operation, outbound::progress_function progress, std::string_view via = {});
     /// The same at an address where only the node of that name is to answer.
     void send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r, time_point deadline,
                       detail::pending_ptr operation);
     /// The address of the node has become known, unknown, or another.
     void on_address_changed(std::string_view node);
+    /// Requests for the node are sent elsewhere: moves those that wait for a link.
+    void on_route_changed(std::string_view node);
+    /// No link could be opened to the channel's address: moves what can be sent by another route.
+    void on_unreachable(peer_channel& channel);
     /// Resolves or fails the names that wait for discovery.
     void on_discovery_grace_over();
 
@@ -143,13 +154,26 @@ class peer_channels {
     void stop();
 
   private:
-    [[nodiscard]] std::string address_of(std::string_view target) const;
+    /// Where requests for a target are sent, and the node that answers there, which may be one on the way.
+    struct place {
+        std::string address;
+        std::string node;
+    };
+    [[nodiscard]] place place_of(std::string_view target, std::string_view via = {}) const;
+    [[nodiscard]] std::optional<place> discovered_place_of(std::string_view target, std::string_view via) const;
     url checked_url(std::string_view where) const;
     [[nodiscard]] std::string_view name_to_check(std::string_view target, std::string_view at,
                                                  std::string_view address) const;
-    /// `expected`: the name of the node that must answer at `at`, if any.
-    peer_channel* find(std::string_view target, std::string_view at, bool urgent, boost::system::error_code& code,
-                       std::string& why, std::string_view expected = {});
+    /// What a request is sent by.
+    struct destination {
+        std::string_view target;
+        std::string_view at{}; ///< empty: wherever the target is
+        bool urgent = false;
+        std::string_view expected{}; ///< the node that must answer at `at`, if any
+        std::string_view via{};
+    };
+    void reroute(peer_channel& channel);
+    peer_channel* find(const destination& to, boost::system::error_code& code, std::string& why);
 
     local_node& host_;
     std::map<std::string, std::string, std::less<>> directory_;                  // the configured URLs, by node

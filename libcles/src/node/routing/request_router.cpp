@@ -85,7 +85,7 @@ std::uint64_t request_router::send(const protocol::request_line& r, std::string_
     const auto noun = std::string{node}.append(":").append(r.noun.path);
     const auto adverbs = forwarded_adverbs(r, node_->name, requester);
     return out_.send({.verb = r.verb, .noun = noun, .carried = r.carried(), .adverbs = adverbs, .body = r.body}, due,
-                     detail::pending_ptr{new subrequest(std::move(then))}, std::move(progress));
+                     detail::pending_ptr{new subrequest(std::move(then))}, std::move(progress), r.via);
 }
 
 void request_router::cancel(const attempt& part) {

@@ -236,7 +236,7 @@ void service_registry::ask(time_point now) {
             }
         };
         out_.send({.verb = verb::pull, .noun = n.name + ":cles"}, now + answer_within,
-                  detail::pending_ptr{new subrequest(std::move(then))}, {});
+                  detail::pending_ptr{new subrequest(std::move(then))}, {}, {});
     }
     follow();
 }

@@ -74,9 +74,9 @@ void serve_peers(node_state& host, reply_writer& replies, const protocol::reques
     const auto now = host.time.now();
     replies.write(r, [&](json_writer& w) {
         if (r.since.empty() || host.gossip_responder == nullptr) {
-            write_peers(w, host.peers, now);
+            write_peers(w, host.list_peers(now), host.peers.pool());
         } else {
-            host.gossip_responder->write_delta(w, {r.since, r.describe}, replies.longest(), now);
+            host.gossip_responder->write_delta(w, {r.since, r.describe, r.routes}, replies.longest(), now);
         }
     });
 }

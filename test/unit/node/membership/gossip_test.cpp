@@ -19,8 +19,8 @@ using namespace std::chrono_literals;
 struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
     fixture() { others.watch(this); }
 
-    void ask(std::uint64_t ticket, std::string_view url, std::string_view since, std::string_view describe) override {
-        asks.push_back({ticket, std::string{url}, std::string{since}, std::string{describe}});
+    void ask(std::uint64_t ticket, std::string_view url, const cles::core::table_question& what) override {
+        asks.push_back({ticket, std::string{url}, std::string{what.since}, std::string{what.describe}});
     }
     void ask_description(std::uint64_t ticket, std::string_view url) override {
         whos.push_back({ticket, std::string{url}, {}, {}});

@@ -33,7 +33,7 @@ BOOST_AUTO_TEST_CASE(format_matches_the_protocol) {
     clock.advance(250ms);
     std::string out;
     cles::json_writer w{out};
-    write_peers(w, table, clock.now());
+    cles::core::write_peers(w, table.list(clock.now()), {});
     BOOST_TEST(out == R"({"peers":[{"node":"car1","endpoints":["tcp://10.0.0.7:1"],"epoch":"5f3a09c1","age_ms":250,)"
                       R"("state":"live","load":{"queued":1,"running":2,"workers":3}}]})");
 }
@@ -41,7 +41,7 @@ BOOST_AUTO_TEST_CASE(format_matches_the_protocol) {
 BOOST_AUTO_TEST_CASE(is_empty_without_other_nodes) {
     std::string out;
     cles::json_writer w{out};
-    write_peers(w, table, clock.now());
+    cles::core::write_peers(w, table.list(clock.now()), {});
     BOOST_TEST(out == R"({"peers":[]})");
 }
 

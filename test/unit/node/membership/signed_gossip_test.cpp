@@ -30,7 +30,7 @@ struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
         });
     }
 
-    void ask(std::uint64_t, std::string_view, std::string_view, std::string_view) override {}
+    void ask(std::uint64_t, std::string_view, const cles::core::table_question&) override {}
     void ask_description(std::uint64_t, std::string_view) override {}
     void push(std::string_view, std::string_view) override {}
     void release(std::string_view) override {}

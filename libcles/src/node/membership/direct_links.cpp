@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/direct_links.hpp"
+
+#include <algorithm>
+
+namespace cles::core {
+namespace {
+
+bool contains(const std::vector<std::string>& names, std::string_view name) {
+    return names.empty() || std::ranges::find(names, name) != names.end();
+}
+
+} // namespace
+
+bool direct_links::allows(std::string_view node, const membership& others) const {
+    const auto* const said = others.announcement_of(node);
+    return contains(allowed_, node) && (said == nullptr || contains(said->links, own_name_));
+}
+
+bool direct_links::is_lost(const failure& f, std::string_view node, const membership& others) const {
+    return f.alive || others.last_seen(node) > f.first;
+}
+
+bool direct_links::reaches(std::string_view node, const membership& others) const {
+    const auto where = others.address_of(node);
+    if (!where || where->empty() || !allows(node, others)) {
+        return false;
+    }
+    const auto failed = failed_.find(node);
+    return failed == failed_.end() || !is_lost(failed->second, node, others);
+}
+
+bool direct_links::is_lost_since(std::string_view node, const membership& others, time_point before) const {
+    const auto failed = failed_.find(node);
+    return failed != failed_.end() && failed->second.first <= before && is_lost(failed->second, node, others);
+}
+
+bool direct_links::may_try(std::string_view node, const membership& others, time_point now) const {
+    const auto where = others.address_of(node);
+    if (!where || where->empty() || !allows(node, others)) {
+        return false;
+    }
+    const auto failed = failed_.find(node);
+    return failed == failed_.end() || failed->second.next <= now || !is_lost(failed->second, node, others);
+}
+
+bool direct_links::on_failure(std::string_view node, time_point now) {
+    const auto [at, is_new] = failed_.try_emplace(std::string{node});
+    if (is_new) {
+        at->second.first = now;
+    }
+    if (at->second.next <= now || is_new) { // otherwise it is the same attempt
+        at->second.next = now + at->second.pause.take(max_pause);
+    }
+    return is_new;
+}
+
+std::vector<std::string> direct_links::doubtful(time_point before) const {
+    std::vector<std::string> found;
+    for (const auto& [node, f] : failed_) {
+        if (!f.alive && f.first <= before) {
+            found.push_back(node);
+        }
+    }
+    return found;
+}
+
+void direct_links::on_alive(std::string_view node) {
+    if (const auto at = failed_.find(node); at != failed_.end()) {
+        at->second.alive = true;
+    }
+}
+
+std::vector<std::string> direct_links::take_lost(const membership& others) {
+    std::vector<std::string> found;
+    for (auto& [node, f] : failed_) {
+        if (!f.is_reported && is_lost(f, node, others)) {
+            f.is_reported = true;
+            found.push_back(node);
+        }
+    }
+    return found;
+}
+
+bool direct_links::on_success(std::string_view node) {
+    const auto at = failed_.find(node);
+    if (at == failed_.end()) {
+        return false;
+    }
+    failed_.erase(at);
+    return true;
+}
+
+} // namespace cles::core

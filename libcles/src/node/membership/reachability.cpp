@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/reachability.hpp"
+
+#include "node/session/request_checks.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace cles::core {
+
+// -- for the rest of the node ----------------------------------------------------------------------------------------
+
+void reachability::allow_only(std::vector<std::string> nodes) { direct_.allow_only(std::move(nodes)); }
+
+std::string reachability::next_hop_to(std::string_view node, std::string_view via) const {
+    if (direct_.reaches(node, others_)) {
+        return std::string{node};
+    }
+    const auto hop = routes_.next_hop(node, usable(), [via](std::string_view by) { return is_in_via(via, by); });
+    if (!hop.empty()) {
+        return std::string{hop};
+    }
+    return !address_of(node).empty() && allows(node) ? std::string{node} : std::string{}; // a last attempt
+}
+
+bool reachability::is_beyond(std::string_view node) const {
+    return others_.address_of(node) && next_hop_to(node, {}) != node;
+}
+
+std::optional<unsigned> reachability::hops_to(std::string_view node) const {
+    return direct_.reaches(node, others_) ? std::optional{1U} : routes_.hops_to(node, usable());
+}
+
+void reachability::add_routes(std::vector<peer>& all) const {
+    for (auto& p : all) {
+        if (p.state != peer_state::clash && is_beyond(p.node)) {
+            p.via = next_hop_to(p.node, {});
+            p.hops = hops_to(p.node).value_or(0);
+        }
+    }
+}
+
+void reachability::on_unreachable(std::string_view url, time_point now) {
+    std::string node;
+    others_.for_each([&](const membership::member& k) {
+        if (k.where == url) {
+            node = k.node;
+        }
+    });
+    if (!node.empty()) {
+        lose(node, now);
+    }
+}
+
+void reachability::on_new_incarnation(std::string_view node) {
+    direct_.on_success(node);
+    routes_.forget(node);
+}
+
+// -- the need for routes ---------------------------------------------------------------------------------------------
+
+// A link that has just been lost may be repaired soon. Until then, the neighbours' own links are enough. Nodes that
+// announce no usable address are no reason: each host may have some, of its own.
+unsigned reachability::own_need(time_point now) const {
+    if (!direct_.allowed().empty()) {
+        return everywhere;
+    }
+    unsigned need = 0;
+    others_.for_each([&](const membership::member& k) {
+        if (need < everywhere && !k.suspect && !k.where.empty() && !direct_.reaches(k.node, others_)) {
+            const bool lasts =
+                !allows(k.node) || direct_.is_lost_since(k.node, others_, now - interval() * intervals_of_need);
+            need = lasts ? everywhere : 1;
+        }
+    });
+    return need;
+}
+
+unsigned reachability::need(time_point now) const noexcept {
+    return std::max(own_need_, now < others_need_until_ ? others_need_ : 0);
+}
+
+void reachability::review(time_point now) {
+    own_need_ = own_need(now);
+    report_lost_links();
+}
+
+void reachability::on_question(const protocol::routes_question& asked, time_point now) {
+    if (now >= others_need_until_ || asked.distance > others_need_) {
+        others_need_ = asked.distance - 1;
+        others_need_until_ = now + interval() * intervals_of_need;
+    }
+    if (now - interval_began_ >= interval()) {
+        interval_began_ = now;
+        ++number_;
+    }
+}
+
+// -- routes ----------------------------------------------------------------------------------------------------------
+
+std::optional<route_advert> reachability::advert_of(const delta_entry& item, std::string_view to) {
+    if (item.what == delta_entry::kind::leave || item.state == peer_state::clash) {
+        return {};
+    }
+    if (item.node == own_name_) {
+        return route_advert{number_, 0};
+    }
+    if (!out_.forwards() || item.node == to) {
+        return {};
+    }
+    return routes_.advertise(item.node, item.epoch, is_usable(item.node), usable(), to);
+}
+
+void reachability::on_reply(const peer_table& table, time_point asked) {
+    if (direct_.on_success(table.node)) {
+        reconsider(table.node);
+    }
+    apply(table);
+    find_lost_links(table.node, asked);
+}
+
+void reachability::apply(const peer_table& table) {
+    const auto works = usable();
+    for (const auto& [epoch, advert] : table.routes) {
+        const auto* const node = others_.owner_of(epoch);
+        if (node == nullptr) {
+            continue;
+        }
+        const std::string name{*node};
+        const auto before = routes_.in_use(name, works);
+        routes_.apply(name, epoch, table.node, advert);
+        const auto after = routes_.in_use(name, works);
+        if (before != after) {
+            others_.touch(name);
+        }
+        if (before.by != after.by) {
+            unsent_.insert(name);
+            out_.on_route_changed(name);
+        }
+        if (!advert.hops && name != table.node) {
+            out_.on_route_lost(name, address_of(table.node));
+        }
+    }
+}
+
+// A neighbour that still has a link to a node, after the time in which it would have noticed a crash, shows that the
+// node is alive.
+void reachability::find_lost_links(std::string_view neighbour, time_point asked) {
+    for (const auto& node : direct_.doubtful(asked - silence() - interval() / turns_per_interval)) {
+        if (node != neighbour && routes_.is_offered(node, neighbour)) {
+            direct_.on_alive(node);
+        }
+    }
+    report_lost_links();
+}
+
+void reachability::report_lost_links() {
+    for (const auto& node : direct_.take_lost(others_)) {
+        reconsider(node);
+        out_.on_route_lost(node, address_of(node));
+    }
+}
+
+void reachability::lose(std::string_view neighbour, time_point now) {
+    if (!direct_.on_failure(neighbour, now)) {
+        return;
+    }
+    reconsider(neighbour);
+    ++number_; // the routes to this node that lead over the lost link are out of date
+    others_.touch(own_name_);
+    for (auto& name : routes_.destinations_by(neighbour)) {
+        if (name != neighbour) {
+            out_.on_route_lost(name, address_of(neighbour));
+        }
+        unsent_.insert(std::move(name));
+    }
+}
+
+// Whether that neighbour can be used has changed.
+void reachability::reconsider(std::string_view neighbour) {
+    out_.on_route_changed(neighbour);
+    for (const auto& name : routes_.destinations_by(neighbour)) {
+        others_.touch(name);
+        out_.on_route_changed(name);
+    }
+}
+
+std::set<std::string> reachability::take_unsent(time_point now) {
+    if (unsent_.empty() || now < next_push_) {
+        return {};
+    }
+    next_push_ = now + interval() / turns_per_interval;
+    return std::exchange(unsent_, {});
+}
+
+} // namespace cles::core

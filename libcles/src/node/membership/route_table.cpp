@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/route_table.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+namespace cles::core {
+
+void route_table::destination::note_advertised(std::uint64_t s, unsigned h) noexcept {
+    if (s > seq) {
+        seq = s;
+        hops = h;
+    } else if (s == seq) {
+        hops = std::min(hops, h);
+    }
+}
+
+route_table::destination& route_table::entry_of(std::string_view name, std::uint32_t epoch) {
+    auto at = destinations_.find(name);
+    if (at == destinations_.end()) {
+        at = destinations_.emplace(name, destination{.epoch = epoch}).first;
+    } else if (at->second.epoch != epoch) {
+        at->second = {.epoch = epoch};
+    }
+    return at->second;
+}
+
+void route_table::apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered) {
+    if (destinations_.size() >= max_destinations_ && !destinations_.contains(name)) {
+        return;
+    }
+    auto& d = entry_of(name, epoch);
+    d.newest = std::max(d.newest, offered.seq);
+    const auto known = std::ranges::find(d.offers, neighbour, &offer::by);
+    if (!offered.hops || *offered.hops >= max_hops) {
+        if (known != d.offers.end()) {
+            d.offers.erase(known);
+        }
+        return;
+    }
+    if (known != d.offers.end()) {
+        known->seq = offered.seq;
+        known->hops = *offered.hops;
+    } else if (d.offers.size() < max_offers) {
+        d.offers.push_back({std::string{neighbour}, offered.seq, *offered.hops});
+    }
+}
+
+std::vector<std::string> route_table::destinations_by(std::string_view neighbour) const {
+    std::vector<std::string> found;
+    for (const auto& [name, d] : destinations_) {
+        if (std::ranges::find(d.offers, neighbour, &offer::by) != d.offers.end()) {
+            found.push_back(name);
+        }
+    }
+    return found;
+}
+
+bool route_table::is_offered(std::string_view name, std::string_view neighbour) const {
+    const auto at = destinations_.find(name);
+    return at != destinations_.end() &&
+           std::ranges::find(at->second.offers, neighbour, &offer::by) != at->second.offers.end();
+}
+
+route_table::route route_table::in_use(std::string_view name, const usable_function& usable) const {
+    const auto at = destinations_.find(name);
+    const auto* const found = at == destinations_.end() ? nullptr : best(at->second, usable, {});
+    return found == nullptr ? route{} : *found;
+}
+
+void route_table::forget(std::string_view name) {
+    if (const auto at = destinations_.find(name); at != destinations_.end()) {
+        destinations_.erase(at);
+    }
+}
+
+// Feasible ones first, then the shortest; among equals the newest, then by name, so that the choice is stable.
+const route_table::offer* route_table::best(const destination& d, const usable_function& usable,
+                                            const std::function<bool(std::string_view)>& avoid) const {
+    const auto rank = [&](const offer& o) {
+        return std::tuple{!d.is_feasible(o), o.hops, ~o.seq, std::string_view{o.by}};
+    };
+    const offer* found = nullptr;
+    for (const auto& o : d.offers) {
+        if (d.is_current(o) && (found == nullptr || rank(o) < rank(*found)) && !(avoid && avoid(o.by)) &&
+            usable(o.by)) {
+            found = &o;
+        }
+    }
+    return found;
+}
+
+std::string_view route_table::next_hop(std::string_view name, const usable_function& usable,
+                                       const std::function<bool(std::string_view)>& avoid) const {
+    const auto at = destinations_.find(name);
+    const auto* const found = at == destinations_.end() ? nullptr : best(at->second, usable, avoid);
+    return found == nullptr ? std::string_view{} : std::string_view{found->by};
+}
+
+std::optional<unsigned> route_table::hops_to(std::string_view name, const usable_function& usable) const {
+    const auto at = destinations_.find(name);
+    const auto* const found = at == destinations_.end() ? nullptr : best(at->second, usable, {});
+    return found == nullptr ? std::nullopt : std::optional{found->hops + 1};
+}
+
+route_advert route_table::advertise(std::string_view name, std::uint32_t epoch, bool direct,
+                                    const usable_function& usable, std::string_view to) {
+    const auto at = destinations_.find(name);
+    if (!direct && (at == destinations_.end() || at->second.epoch != epoch)) {
+        return {};
+    }
+    auto& d = direct ? entry_of(name, epoch) : at->second;
+    if (direct) { // no loop is possible, so the newest number counts, whoever told it
+        d.note_advertised(d.newest, 1);
+        return {d.newest, 1};
+    }
+    const auto* const chosen = best(d, usable, {});
+    if (chosen == nullptr || chosen->by == to || !d.is_feasible(*chosen)) { // it would or may come back
+        return {.seq = d.newest};
+    }
+    d.note_advertised(chosen->seq, chosen->hops + 1);
+    return {chosen->seq, chosen->hops + 1};
+}
+
+} // namespace cles::core

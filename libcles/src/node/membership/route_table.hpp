@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::core {
+
+/// How far a node is from the one that says so, by routes of which no two form a loop.
+struct route_advert {
+    std::uint64_t seq = 0;          ///< counts intervals of the destination: a greater one is newer
+    std::optional<unsigned> hops{}; ///< links to the destination, 0 from itself; nothing: it cannot be reached
+
+    bool operator==(const route_advert&) const = default;
+};
+
+/// The routes to nodes that this one has no link to, as its neighbours advertise them (docs/protocol.md, "Routes").
+///
+/// A distance-vector table without loops: each destination numbers its intervals, and a node uses a route only if it is
+/// newer than all that the node has advertised itself, or as new and shorter (Perkins and Bhagwat: DSDV, SIGCOMM 1994;
+/// the condition is that of Babel, RFC 8966, section 3.5.1). If no such route is left, requests take any other that a
+/// neighbour advertises, but none to a node that has forwarded them, until the destination's next number has arrived.
+class route_table {
+  public:
+    static constexpr unsigned max_hops = 16;      ///< as for the adverb `hops`
+    static constexpr std::size_t max_offers = 16; ///< neighbours that count for one destination
+    static constexpr std::uint64_t max_late = 4;  ///< intervals by which a route may be behind the newest
+
+    /// Whether requests can be sent to that neighbour.
+    using usable_function = std::function<bool(std::string_view neighbour)>;
+
+    explicit route_table(std::size_t max_destinations) noexcept : max_destinations_(max_destinations) {}
+
+    /// Applies what a neighbour advertises. Another epoch is another destination: what was known is forgotten.
+    void apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered);
+    /// The destinations that this neighbour advertises.
+    [[nodiscard]] std::vector<std::string> destinations_by(std::string_view neighbour) const;
+    void forget(std::string_view name);
+
+    /// The neighbour to which a request is sent, by the shortest route that does not lead through a node for which
+    /// `avoid` is true; empty: there is none.
+    [[nodiscard]] std::string_view next_hop(std::string_view name, const usable_function& usable,
+                                            const std::function<bool(std::string_view)>& avoid = {}) const;
+    /// What this node advertises to the neighbour `to`. `direct`: it has a link to the destination.
+    route_advert advertise(std::string_view name, std::uint32_t epoch, bool direct, const usable_function& usable,
+                           std::string_view to);
+    [[nodiscard]] bool is_offered(std::string_view name, std::string_view neighbour) const;
+    /// The route in use, as its neighbour advertises it.
+    struct route {
+        std::string by; ///< empty: there is none
+        std::uint64_t seq = 0;
+        unsigned hops = 0;
+
+        bool operator==(const route&) const = default;
+    };
+    [[nodiscard]] route in_use(std::string_view name, const usable_function& usable) const;
+    /// The length of the route in use, in links; nothing: there is none.
+    [[nodiscard]] std::optional<unsigned> hops_to(std::string_view name, const usable_function& usable) const;
+    [[nodiscard]] std::size_t size() const noexcept { return destinations_.size(); }
+
+  private:
+    using offer = route;
+    struct destination {
+        std::uint32_t epoch = 0;
+        std::uint64_t newest = 0; ///< number that is known
+        std::vector<offer> offers{};
+        // The newest and shortest that was advertised: the feasibility distance.
+        std::uint64_t seq = 0;
+        unsigned hops = max_hops + 1;
+
+        [[nodiscard]] bool is_feasible(const offer& o) const noexcept {
+            return o.seq > seq || (o.seq == seq && o.hops < hops);
+        }
+        [[nodiscard]] bool is_current(const offer& o) const noexcept { return o.seq + max_late > newest; }
+        void note_advertised(std::uint64_t s, unsigned h) noexcept;
+    };
+
+    [[nodiscard]] const offer* best(const destination& d, const usable_function& usable,
+                                    const std::function<bool(std::string_view)>& avoid) const;
+    destination& entry_of(std::string_view name, std::uint32_t epoch);
+
+    std::size_t max_destinations_;
+    std::map<std::string, destination, std::less<>> destinations_;
+};
+
+} // namespace cles::core

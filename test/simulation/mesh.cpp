@@ -1,0 +1,369 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "simulation/mesh.hpp"
+
+#include <cles/gossip.hpp>
+#include <cles/routing.hpp>
+
+#include "node/membership/announcement.hpp"
+#include "node/membership/gossip.hpp"
+#include "simulation/world/node_hosts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <deque>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace cles::simulation {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr milliseconds request_limit{2000};
+constexpr milliseconds until_answered{2500};
+
+std::string mesh_name(unsigned host) { return "n" + std::to_string(host); }
+
+/// Links between hosts.
+class graph {
+  public:
+    explicit graph(unsigned nodes) : neighbours_(nodes) {}
+
+    static graph of(const mesh_setup& setup, dice& chance);
+
+    [[nodiscard]] unsigned size() const noexcept { return static_cast<unsigned>(neighbours_.size()); }
+    [[nodiscard]] const std::set<unsigned>& of(unsigned host) const { return neighbours_.at(host); }
+    [[nodiscard]] bool has(unsigned a, unsigned b) const { return neighbours_.at(a).contains(b); }
+    void add(unsigned a, unsigned b) {
+        neighbours_.at(a).insert(b);
+        neighbours_.at(b).insert(a);
+    }
+    void remove(unsigned a, unsigned b) {
+        neighbours_.at(a).erase(b);
+        neighbours_.at(b).erase(a);
+    }
+    /// The number of links from one host to each other; nothing where no route leads.
+    [[nodiscard]] std::vector<std::optional<unsigned>> distances(unsigned from) const;
+    [[nodiscard]] bool is_connected() const {
+        const auto all = distances(0);
+        return std::ranges::all_of(all, [](const auto& each) { return each.has_value(); });
+    }
+
+  private:
+    std::vector<std::set<unsigned>> neighbours_;
+};
+
+graph graph::of(const mesh_setup& setup, dice& chance) {
+    graph g{setup.nodes};
+    const auto side = static_cast<unsigned>(std::lround(std::sqrt(setup.nodes)));
+    for (unsigned i = 1; i < setup.nodes; ++i) {
+        switch (setup.form) {
+        case mesh_form::line:
+        case mesh_form::ring: g.add(i - 1, i); break;
+        case mesh_form::star: g.add(0, i); break;
+        case mesh_form::grid:
+            if (i % side != 0) {
+                g.add(i - 1, i);
+            }
+            if (i >= side) {
+                g.add(i - side, i);
+            }
+            break;
+        case mesh_form::random: g.add(chance.below(i), i); break;
+        }
+    }
+    if (setup.form == mesh_form::ring) {
+        g.add(setup.nodes - 1, 0);
+    }
+    if (setup.form == mesh_form::random) {
+        for (unsigned links = setup.nodes - 1; links < setup.nodes * setup.mean_degree / 2;) {
+            const auto a = chance.below(setup.nodes);
+            const auto b = chance.below(setup.nodes);
+            if (a != b && !g.has(a, b) && g.of(a).size() < core::max_links && g.of(b).size() < core::max_links) {
+                g.add(a, b);
+                ++links;
+            }
+        }
+    }
+    return g;
+}
+
+std::vector<std::optional<unsigned>> graph::distances(unsigned from) const {
+    std::vector<std::optional<unsigned>> found(size());
+    found[from] = 0;
+    for (std::deque<unsigned> open{from}; !open.empty(); open.pop_front()) {
+        for (const auto next : neighbours_[open.front()]) {
+            if (!found[next]) {
+                found[next] = *found[open.front()] + 1;
+                open.push_back(next);
+            }
+        }
+    }
+    return found;
+}
+
+class mesh final : public node_hosts {
+  public:
+    mesh(std::uint64_t seed, const mesh_setup& setup, planted fault)
+        : node_hosts(seed, fault), setup_(setup), links_(graph::of(setup, chance_)), all_links_(links_) {
+        if (!setup.declared) {
+            net_.connect_only([this](unsigned a, unsigned b) { return all_links_.has(a, b); });
+        }
+        for (unsigned host = 0; host < links_.size(); ++host) {
+            start(host);
+        }
+    }
+    mesh(const mesh&) = delete;
+    mesh& operator=(const mesh&) = delete;
+    ~mesh() { end_all(); }
+
+    mesh_report live() {
+        report_.converged = pass_until_shortest();
+        for (unsigned i = 0; i < setup_.requests; ++i) {
+            ask_anyone(any_host());
+        }
+        pass(until_answered);
+        for (unsigned i = 0; i < setup_.cuts; ++i) {
+            lose_a_link();
+        }
+        for (unsigned i = 0; i < setup_.crashes; ++i) {
+            crash_a_node();
+        }
+        judge_links();
+        judge_requests();
+        report_.violations = watcher_.violations();
+        return report_;
+    }
+
+  private:
+    struct asked {
+        bool vital = false; ///< has to succeed
+        int ends = 0;
+        bool succeeded = false;
+        std::string why{};
+        int ran = 0;
+    };
+
+    void start(unsigned host) override {
+        std::vector<std::string> seeds;
+        std::vector<std::string> names;
+        for (const auto other : all_links_.of(host)) {
+            seeds.push_back(net_.url_of(other, carrier::stream));
+            names.push_back(mesh_name(other));
+        }
+        const auto n = std::make_shared<node_run>(
+            net_, host, ++runs_, mesh_name(host),
+            node_run::options{.seed = chance_.next(),
+                              .routing = fault() == planted::route_withheld && host == 1 ? nullptr : cles::routing(),
+                              .gossip = cles::gossip(seeds, states_links() ? names : std::vector<std::string>{})});
+        nodes_[host] = n;
+        const auto serve = [this](const request& r, const std::shared_ptr<core::call>& c) {
+            ++asked_.at(r.parameter<std::uint32_t>(0)).ran;
+            c->done("{}");
+        };
+        n->node()->tasks.add(verb::delegate, "work", {.start = serve});
+        n->start();
+    }
+
+    [[nodiscard]] bool states_links() const noexcept { return setup_.declared && fault() != planted::links_ignored; }
+
+    // -- routes ----------------------------------------------------------------------------------------------------
+
+    /// How many routes differ from the shortest.
+    std::size_t wrong_routes() {
+        std::size_t wrong = 0;
+        for (const auto& [host, n] : nodes_) {
+            if (!n) {
+                continue;
+            }
+            const auto far = links_.distances(host);
+            for (unsigned other = 0; other < links_.size(); ++other) {
+                if (other == host || node(other) == nullptr) {
+                    continue;
+                }
+                const auto hops = n->node()->gossip_responder->reach().hops_to(mesh_name(other));
+                wrong += hops != far[other] ? 1 : 0;
+                report_.longest = std::max(report_.longest, far[other].value_or(0));
+            }
+        }
+        return wrong;
+    }
+
+    milliseconds pass_until_shortest() {
+        const auto limit = seconds{60};
+        const auto begun = time_.now();
+        while (wrong_routes() != 0) {
+            if (time_.now() - begun > limit) {
+                watcher_.broken(rule::routes_found, std::to_string(wrong_routes()) + " routes are not the shortest");
+                break;
+            }
+            pass(milliseconds{250});
+        }
+        return std::chrono::duration_cast<milliseconds>(time_.now() - begun);
+    }
+
+    milliseconds interval() const { return core::interval_among(links_.size() - 1); }
+
+    // Silently: what is sent there is lost. Within one interval, its ends have to reach each other again, and within
+    // two all others: a longer way round waits for the destinations' next numbers.
+    void lose_a_link() {
+        const auto lost = any_link_to_spare();
+        if (!lost) {
+            return;
+        }
+        const auto [a, b] = *lost;
+        net_.part(a, b, time_point::max());
+        links_.remove(a, b);
+        const auto begun = time_.now();
+        const auto first = ask_until_answered(a, b, begun + interval() + seconds{1});
+        report_.rerouted = std::max(report_.rerouted, first);
+        if (first > interval()) {
+            watcher_.broken(rule::routes_found, "requests from " + mesh_name(a) + " to " + mesh_name(b) +
+                                                    " found no other way in " + std::to_string(first.count()) + " ms");
+        }
+        pass(std::max(milliseconds{0}, std::chrono::duration_cast<milliseconds>(begun + 2 * interval() - time_.now())));
+        for (unsigned i = 0; i < setup_.requests / 4; ++i) {
+            ask_anyone(any_host());
+        }
+        pass(until_answered);
+        pass_until_shortest();
+    }
+
+    // The ends of a link that is lost send each other requests until one is answered.
+    milliseconds ask_until_answered(unsigned a, unsigned b, time_point until) {
+        const auto begun = time_.now();
+        std::vector<std::uint32_t> sent;
+        while (time_.now() < until) {
+            sent.push_back(ask(a, b, false));
+            pass(milliseconds{20});
+            if (std::ranges::any_of(sent, [&](auto op) { return asked_.at(op).succeeded; })) {
+                break;
+            }
+        }
+        return std::chrono::duration_cast<milliseconds>(time_.now() - begun);
+    }
+
+    std::optional<std::pair<unsigned, unsigned>> any_link_to_spare() {
+        for (int tries = 0; tries < 100; ++tries) {
+            const auto a = any_host();
+            const auto& others = links_.of(a);
+            if (others.empty()) {
+                continue;
+            }
+            const auto b = *std::next(others.begin(), chance_.below(static_cast<unsigned>(others.size())));
+            auto without = links_;
+            without.remove(a, b);
+            if (without.is_connected()) {
+                return std::pair{a, b};
+            }
+        }
+        return {};
+    }
+
+    void crash_a_node() {
+        const auto host = any_host();
+        end_node(host, milliseconds{chance_.between(100, 3000)});
+        for (unsigned i = 0; i < setup_.requests / 4; ++i) {
+            const auto from = any_other_than(host);
+            ask(from, any_other_than(from), false);
+            pass(milliseconds{20});
+        }
+        pass(seconds{5});
+        pass_until_shortest();
+        for (unsigned i = 0; i < setup_.requests / 4; ++i) {
+            ask_anyone(any_host());
+        }
+        pass(until_answered);
+    }
+
+    // -- requests --------------------------------------------------------------------------------------------------
+
+    unsigned any_host() { return chance_.below(links_.size()); }
+    unsigned any_other_than(unsigned host) {
+        for (;;) {
+            if (const auto found = any_host(); found != host) {
+                return found;
+            }
+        }
+    }
+
+    // It has to succeed.
+    void ask_anyone(unsigned from) { ask(from, any_other_than(from), true); }
+
+    std::uint32_t ask(unsigned from, unsigned to, bool vital) {
+        const auto op = ++last_op_;
+        auto& a = asked_[op];
+        a.vital = vital;
+        auto& n = *node(from);
+        n.run([&] {
+            n.ask(to, carrier::name,
+                  {.verb = verb::delegate,
+                   .noun = mesh_name(to) + ":work/" + std::to_string(op),
+                   .deadline = request_limit},
+                  when_ended(
+                      [&a](std::string_view) {
+                          ++a.ends;
+                          a.succeeded = true;
+                      },
+                      [&a](errc, std::string_view why) {
+                          ++a.ends;
+                          a.why = why;
+                      }));
+        });
+        return op;
+    }
+
+    void judge_requests() {
+        for (const auto& [op, a] : asked_) {
+            const auto request = "request " + std::to_string(op);
+            if (a.ends != 1) {
+                watcher_.broken(rule::ends_in_time, request + " ended " + std::to_string(a.ends) + " times");
+            }
+            if (a.ran > 1) {
+                watcher_.broken(rule::effects_once, request + " ran " + std::to_string(a.ran) + " times");
+            }
+            if (a.vital && !a.succeeded) {
+                watcher_.broken(rule::asks_succeed, request + " failed: " + a.why);
+            }
+            ++report_.asked;
+            report_.answered += a.succeeded ? 1 : 0;
+        }
+    }
+
+    // The address of a link's other end shows its host.
+    void judge_links() {
+        for (const auto& [host, n] : nodes_) {
+            for (const auto& c : n->local().connections().all()) {
+                const auto where = c->peer().address;
+                for (unsigned other = 0; other < links_.size(); ++other) {
+                    if (other != host && !all_links_.has(host, other) && where == net_.url_of(other, carrier::stream)) {
+                        watcher_.broken(rule::links_kept, mesh_name(host) + " has a link to " + mesh_name(other));
+                    }
+                }
+            }
+        }
+    }
+
+    const mesh_setup setup_;
+    graph links_;
+    const graph all_links_;
+    std::map<std::uint32_t, asked> asked_;
+    std::uint32_t last_op_ = 0;
+    unsigned runs_ = 0;
+    mesh_report report_;
+};
+
+} // namespace
+
+mesh_report simulate_mesh(std::uint64_t seed, const mesh_setup& setup, planted fault) {
+    return mesh{seed, setup, fault}.live();
+}
+
+} // namespace cles::simulation

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include "simulation/network/planted.hpp"
+#include "simulation/world/witness.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace cles::simulation {
+
+/// Which nodes of a mesh have links to each other.
+enum class mesh_form : std::uint8_t { line, ring, star, grid, random };
+
+/// A mesh to simulate.
+struct mesh_setup {
+    mesh_form form = mesh_form::random;
+    unsigned nodes = 16;
+    unsigned mean_degree = 4; ///< of a random mesh
+    bool declared = true;     ///< by the `links` of each node; otherwise other links cannot be opened
+    unsigned cuts = 3;        ///< links that are lost, one after another, each of which leaves the mesh connected
+    unsigned crashes = 1;
+    unsigned requests = 200; ///< after each change
+};
+
+/// The result of a simulated mesh.
+struct mesh_report {
+    std::vector<violation> violations;
+    std::chrono::milliseconds converged{0}; ///< until all nodes had the shortest routes to all others
+    std::chrono::milliseconds rerouted{0};  ///< the longest time from the loss of a link to the first reply by another
+    std::size_t asked = 0;
+    std::size_t answered = 0;
+    unsigned longest = 0; ///< route, in links
+};
+
+/// Simulates nodes that route for each other in virtual time, where most have no link to each other. The routes have to
+/// become the shortest ones. Then links are lost silently and nodes crash; requests have to find another way
+/// within two intervals, between the ends of the lost link within one, and none may run twice.
+mesh_report simulate_mesh(std::uint64_t seed, const mesh_setup& setup, planted fault = planted::none);
+
+} // namespace cles::simulation

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: BSL-1.0
+// Nodes that reach each other through others, in virtual time: the routes, and what happens when links are lost.
+#include "simulation/mesh.hpp"
+#include "simulation/seeds.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+BOOST_AUTO_TEST_SUITE(mesh)
+
+using namespace std::chrono_literals;
+using namespace cles::simulation;
+
+namespace {
+
+void hold(std::uint64_t seed, const mesh_setup& setup) {
+    const auto r = simulate_mesh(seed, setup);
+    for (const auto& v : r.violations) {
+        BOOST_ERROR("seed " << seed << ": " << to_string(v.broken) << ": " << v.what);
+    }
+    BOOST_TEST(r.answered != 0U);
+    BOOST_TEST_MESSAGE("seed " << seed << ": converged in " << r.converged.count() << " ms, rerouted in "
+                               << r.rerouted.count() << " ms, longest route " << r.longest << ", " << r.answered
+                               << " of " << r.asked << " answered");
+}
+
+/// A line with this fault violates that rule, perhaps others too.
+void finds(planted fault, rule broken) {
+    const auto found =
+        simulate_mesh(1, {.form = mesh_form::line, .nodes = 4, .cuts = 0, .crashes = 0, .requests = 20}, fault)
+            .violations;
+    BOOST_TEST(std::ranges::any_of(found, [&](const violation& v) { return v.broken == broken; }),
+               std::string{to_string(fault)} + " was not found");
+}
+
+} // namespace
+
+BOOST_AUTO_TEST_CASE(a_line) { hold(1, {.form = mesh_form::line, .nodes = 6, .cuts = 0}); }
+BOOST_AUTO_TEST_CASE(a_ring) { hold(2, {.form = mesh_form::ring, .nodes = 8, .cuts = 1}); }
+BOOST_AUTO_TEST_CASE(a_star) { hold(3, {.form = mesh_form::star, .nodes = 8, .cuts = 0}); }
+BOOST_AUTO_TEST_CASE(a_grid) { hold(4, {.form = mesh_form::grid, .nodes = 16}); }
+BOOST_AUTO_TEST_CASE(random_meshes) {
+    for (std::uint64_t seed = 1; seed <= (is_slow ? 2 : 10); ++seed) {
+        hold(seed, {.nodes = 20});
+    }
+}
+BOOST_AUTO_TEST_CASE(meshes_that_lose_many_links) {
+    for (std::uint64_t seed = 1; seed <= (is_slow ? 1 : 3); ++seed) {
+        hold(seed, {.nodes = 40, .cuts = 8, .crashes = 1});
+    }
+}
+BOOST_AUTO_TEST_CASE(links_that_cannot_be_opened_need_not_be_declared) {
+    for (std::uint64_t seed = 1; seed <= (is_slow ? 1 : 5); ++seed) {
+        hold(seed, {.nodes = 12, .declared = false});
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_link_that_must_not_be_is_found) { finds(planted::links_ignored, rule::links_kept); }
+BOOST_AUTO_TEST_CASE(a_node_that_forwards_nothing_is_found) { finds(planted::route_withheld, rule::routes_found); }
+BOOST_AUTO_TEST_CASE(two_hundred_nodes) { hold(1, {.nodes = is_slow ? 60U : 200U, .cuts = 1, .requests = 1000}); }
+
+BOOST_AUTO_TEST_SUITE_END()

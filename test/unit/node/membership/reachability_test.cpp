@@ -1,0 +1,208 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "node/membership/reachability.hpp"
+
+#include <boost/test/unit_test.hpp>
+
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace reachability {
+namespace {
+
+using namespace std::chrono_literals;
+using cles::time_point;
+using cles::core::route_advert;
+
+struct fixture : cles::core::reachability::listener {
+    fixture() {
+        hear("car1", 0xB);
+        hear("car2", 0xC);
+        hear("far", 0xF, {"car1", "car2"});
+    }
+
+    [[nodiscard]] bool forwards() const override { return routes; }
+    void on_route_lost(std::string_view node, std::string_view address) override {
+        lost.emplace_back(std::string{node} + " by " + std::string{address});
+    }
+    void on_route_changed(std::string_view node) override { changed.insert(std::string{node}); }
+
+    void hear(const std::string& node, std::uint32_t epoch, std::vector<std::string> links = {},
+              std::uint64_t seq = 1) {
+        cles::core::announcement said{.node = node, .endpoints = {"tcp://10.0.0.7:" + std::to_string(epoch)}};
+        said.tasks = "1";
+        said.links = std::move(links);
+        others.apply_gossip({said, epoch, seq, 0ms}, {"10.0.0.7", false}, now, now);
+    }
+    /// The neighbour replies, and advertises a route to `far`.
+    void reply(const std::string& by, route_advert advert) {
+        cles::core::peer_table table;
+        table.node = by;
+        table.routes = {{.epoch = 0xF, .advert = advert}};
+        reach.on_reply(table, now);
+    }
+    [[nodiscard]] auto advert(std::string_view of, std::string_view to) {
+        const auto item = others.entry_of(of);
+        return item ? reach.advert_of(*item, to) : std::nullopt;
+    }
+
+    bool routes = true;
+    std::vector<std::string> lost;
+    std::set<std::string> changed;
+    time_point now = time_point{} + 1h;
+    cles::core::deadline_queue deadlines;
+    cles::core::membership others{"me", 0xA, deadlines, 10};
+    cles::core::reachability reach{"me", *this, others, 10};
+};
+
+BOOST_FIXTURE_TEST_SUITE(reachability, fixture)
+
+BOOST_AUTO_TEST_CASE(a_node_whose_links_exclude_this_one_is_reached_through_a_neighbour) {
+    BOOST_TEST(reach.next_hop_to("far", {}).empty());
+    BOOST_TEST(!reach.hops_to("far"));
+    reply("car2", {5, 1});
+    reply("car1", {5, 2});
+    BOOST_TEST(reach.next_hop_to("far", {}) == "car2");
+    BOOST_TEST(reach.next_hop_to("far", "car9,car2") == "car1");
+    BOOST_TEST(reach.next_hop_to("far", "car1,car2").empty());
+    BOOST_TEST(reach.hops_to("far").value() == 2U);
+    BOOST_TEST(reach.is_beyond("far"));
+    BOOST_TEST(!reach.is_beyond("car1"));
+    BOOST_TEST(!reach.is_beyond("nobody"));
+}
+
+BOOST_AUTO_TEST_CASE(the_list_of_nodes_shows_the_routes) {
+    reply("car2", {5, 1});
+    auto all = others.list(now);
+    reach.add_routes(all);
+    for (const auto& each : all) {
+        BOOST_TEST(each.hops == (each.node == "far" ? 2U : 1U));
+        BOOST_TEST(each.via == (each.node == "far" ? "car2" : ""));
+    }
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_does_not_forward_advertises_only_itself) {
+    cles::core::announcement said{.node = "me"};
+    others.announce_self(said, 1, now);
+    reply("car2", {5, 1});
+    BOOST_TEST(advert("far", "car1").value().hops.value() == 2U);
+    BOOST_TEST(advert("car2", "car1").value().hops.value() == 1U);
+    BOOST_TEST(!advert("car1", "car1")); // it knows itself
+    routes = false;
+    BOOST_TEST(!advert("far", "car1"));
+}
+
+BOOST_AUTO_TEST_CASE(a_neighbour_that_does_not_reply_is_not_used_and_its_routes_are_reported) {
+    reply("car2", {5, 1});
+    reply("car1", {5, 2});
+    reach.lose("car2", now);
+    BOOST_TEST(reach.next_hop_to("far", {}) == "car1");
+    BOOST_TEST(lost == (std::vector<std::string>{"far by tcp://10.0.0.7:12"}), boost::test_tools::per_element());
+    BOOST_TEST(changed.contains("far"));
+    BOOST_TEST(reach.take_unsent(now).contains("far"));
+    BOOST_TEST(reach.take_unsent(now).empty());
+    reply("car2", {6, 1});
+    BOOST_TEST(reach.next_hop_to("far", {}) == "car2");
+}
+
+BOOST_AUTO_TEST_CASE(changes_are_pushed_once_a_turn) {
+    reply("car2", {5, 1});
+    BOOST_TEST(reach.take_unsent(now).size() == 1U);
+    reply("car2", {5, std::nullopt});
+    BOOST_TEST(reach.has_unsent());
+    BOOST_TEST(reach.take_unsent(now).empty());
+    now = reach.next_push();
+    BOOST_TEST(reach.take_unsent(now).size() == 1U);
+}
+
+// It would have noticed a crash by then.
+BOOST_AUTO_TEST_CASE(a_node_that_others_still_reach_has_not_crashed) {
+    reply("car1", {5, 1});
+    cles::core::peer_table table;
+    table.node = "car1";
+    table.routes = {{.epoch = 0xC, .advert = {3, 1}}};
+    reach.on_reply(table, now);
+    reach.lose("car2", now);
+    BOOST_TEST(reach.next_hop_to("car2", {}) == "car2"); // it may have crashed
+    reach.on_reply(table, now + reach.silence());
+    BOOST_TEST(reach.next_hop_to("car2", {}) == "car2");
+    reach.on_reply(table, now + reach.silence() + 125ms);
+    BOOST_TEST(reach.next_hop_to("car2", {}) == "car1");
+    BOOST_TEST(reach.hops_to("car2").value() == 2U);
+}
+
+BOOST_AUTO_TEST_CASE(feeds_leave_a_link_that_is_lost) {
+    hear("car2", 0xC, {}, 2);
+    reach.lose("car2", now);
+    BOOST_TEST(lost.empty()); // it may have crashed: its link ends by itself
+    now += 1s;
+    hear("car2", 0xC, {}, 3);
+    reach.review(now);
+    reach.review(now);
+    BOOST_TEST(lost == (std::vector<std::string>{"car2 by tcp://10.0.0.7:12"}), boost::test_tools::per_element());
+}
+
+BOOST_AUTO_TEST_CASE(the_address_at_which_a_node_replied_is_preferred_to_one_that_others_report) {
+    others.prefer_address("car1", "tcp://10.0.1.7:11");
+    BOOST_TEST(others.address_of("car1").value() == "tcp://10.0.1.7:11");
+    others.prefer_address("car1", "udp://10.0.1.7:11");
+    BOOST_TEST(others.address_of("car1").value() == "tcp://10.0.1.7:11");
+    others.prefer_address("nobody", "tcp://10.0.1.7:11");
+}
+
+BOOST_AUTO_TEST_CASE(a_list_of_links_is_a_need_everywhere) {
+    BOOST_TEST(reach.need(now) == 0U);
+    reach.allow_only({"car1"});
+    reach.review(now);
+    BOOST_TEST(reach.need(now) == 16U);
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_excludes_this_one_is_a_need_everywhere) {
+    reach.review(now);
+    BOOST_TEST(reach.need(now) == 16U);
+}
+
+BOOST_AUTO_TEST_CASE(a_link_that_has_just_been_lost_is_a_need_of_this_node_alone) {
+    hear("far", 0xF, {}, 2);
+    reach.review(now);
+    BOOST_TEST(reach.need(now) == 0U);
+    reach.lose("far", now);
+    now += 1s;
+    hear("far", 0xF, {}, 3);
+    reach.review(now);
+    BOOST_TEST(reach.need(now) == 1U);
+    now += 3s;
+    hear("far", 0xF, {}, 4);
+    reach.review(now);
+    BOOST_TEST(reach.need(now) == 16U);
+}
+
+BOOST_AUTO_TEST_CASE(the_need_of_others_spreads_one_link_less_far_and_is_forgotten) {
+    hear("far", 0xF, {}, 2);
+    reach.on_question({.distance = 5, .by = "car1"}, now);
+    BOOST_TEST(reach.need(now) == 4U);
+    reach.on_question({.distance = 2, .by = "car2"}, now);
+    BOOST_TEST(reach.need(now) == 4U);
+    BOOST_TEST(reach.need(now + 3999ms) == 4U);
+    BOOST_TEST(reach.need(now + 4s) == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(another_incarnation_has_no_routes_yet) {
+    reply("car2", {5, 1});
+    reach.on_new_incarnation("far");
+    BOOST_TEST(reach.next_hop_to("far", {}).empty());
+}
+
+BOOST_AUTO_TEST_CASE(an_address_that_cannot_be_reached_is_that_of_a_node) {
+    reply("car2", {5, 1});
+    reach.on_unreachable("tcp://10.0.0.7:12", now);
+    BOOST_TEST(reach.next_hop_to("far", {}).empty());
+    reach.on_unreachable("tcp://10.0.0.9:1", now);
+}
+
+BOOST_AUTO_TEST_SUITE_END()
+
+} // namespace
+} // namespace reachability
