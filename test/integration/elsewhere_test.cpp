@@ -181,8 +181,8 @@ BOOST_AUTO_TEST_CASE(of_a_pool_operations_are_begun_on_any_thread) {
     cles::service tower{pool, knowing("tower", car)};
     tower.set_peer("car2", car.endpoints().front());
     std::vector<std::future<int>> all;
-#ifdef __SANITIZE_THREAD__
-    constexpr int times = 30; // some hundred times slower, with the publisher on a separate core
+#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+    constexpr int times = 30; // up to some hundred times slower, with the publisher on a separate core
 #else
     constexpr int times = 200;
 #endif
