@@ -19,8 +19,10 @@
 #include <CLI/App.hpp>
 #include <CLI/Option.hpp>
 
+#include <algorithm>
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -91,6 +93,8 @@ std::string tasks_text(const std::string& tasks) {
 
 std::string ls_table(const std::vector<listed_node>& nodes, bool tasks) {
     table out{"NODE", "STATE", "LOAD", "LAST SEEN", "ENDPOINTS"};
+    const bool has_routes = std::ranges::any_of(nodes, [](const listed_node& node) { return node.hops != 1; });
+    const std::size_t route_column = has_routes ? out.column("ROUTE") : 0;
     const std::size_t tasks_column = tasks ? out.column("TASKS") : 0;
     for (const auto& node : nodes) {
         out.row();
@@ -99,6 +103,9 @@ std::string ls_table(const std::vector<listed_node>& nodes, bool tasks) {
         out.set(2, load_text(node.load), true);
         out.set(3, node.last_seen());
         out.set(4, node.endpoints.empty() ? "-" : printable(joined(node.endpoints, " ")));
+        if (has_routes) {
+            out.set(route_column, printable(node.route()));
+        }
         if (tasks) {
             out.set(tasks_column, node.tasks.empty() ? "(" + printable(node.error) + ")" : tasks_text(node.tasks));
         }
@@ -125,6 +132,12 @@ void write_node(cles::json_writer& w, const listed_node& node, bool tasks) {
     if (node.load) {
         w.key("load");
         write_load(w, *node.load);
+    }
+    if (node.hops != 1) {
+        w.key("hops");
+        w.value(std::uint64_t{node.hops});
+        w.key("via");
+        w.value(std::string_view{node.via});
     }
     if (tasks && node.tasks.empty()) {
         w.key("failure");
@@ -194,7 +207,8 @@ void add_ls(CLI::App& app, context& shared) {
     add_timeout(*command, args->timeout, "2s");
     add_output_option(*command, args->format);
     command->footer("LOAD is RUNNING/WORKERS, and +N if N jobs are queued.\n"
-                    "With --at, only that node and the nodes that it knows are listed.\n\n"
+                    "With --at, only that node and the nodes that it knows are listed. ROUTE is how\n"
+                    "it reaches those that it has no link to.\n\n"
                     "Examples:\n"
                     "  cles ls\n"
                     "  cles ls -l -m eth0\n"

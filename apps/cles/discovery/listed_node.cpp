@@ -34,8 +34,10 @@ struct peer_document {
     std::int64_t age_ms = 0;
     std::string state;
     load_document load;
+    std::optional<std::uint32_t> hops;
+    std::optional<std::string> via;
 };
-BOOST_DESCRIBE_STRUCT(peer_document, (), (node, endpoints, epoch, age_ms, state, load))
+BOOST_DESCRIBE_STRUCT(peer_document, (), (node, endpoints, epoch, age_ms, state, load, hops, via))
 
 struct peers_document {
     std::vector<peer_document> peers;
@@ -51,6 +53,10 @@ struct self_document {
 BOOST_DESCRIBE_STRUCT(self_document, (), (node, epoch, endpoints, load))
 
 } // namespace
+
+std::string listed_node::route() const {
+    return hops == 1 ? "-" : hops == 0 ? "none" : std::to_string(hops) + " links via " + via;
+}
 
 std::string listed_node::last_seen() const {
     return age_ms ? to_text(std::chrono::milliseconds{*age_ms}) + " ago" : "now";
@@ -98,7 +104,9 @@ std::vector<listed_node> nodes_of(const std::vector<cles::peer>& peers) {
                          .age_ms = p.age.count(),
                          .endpoints = p.endpoints,
                          .epoch = p.epoch,
-                         .load = p.load});
+                         .load = p.load,
+                         .hops = p.hops,
+                         .via = p.via});
     }
     return nodes;
 }
@@ -126,7 +134,9 @@ std::vector<listed_node> peers_in(std::string_view peers) {
                          .age_ms = p.age_ms,
                          .endpoints = p.endpoints,
                          .epoch = p.epoch,
-                         .load = p.load.value()});
+                         .load = p.load.value(),
+                         .hops = p.hops.value_or(1),
+                         .via = p.via.value_or("")});
     }
     return nodes;
 }

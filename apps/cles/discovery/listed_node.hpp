@@ -22,9 +22,13 @@ struct listed_node {
     std::optional<cles::node_load> load{}; ///< nothing: it has not reported any
     std::string tasks{};                   ///< what it offers, as JSON; empty if that is not known
     std::string error{};                   ///< why it is not known
+    unsigned hops = 1;                     ///< links to it from the node that lists it; 0: there is no route
+    std::string via{};                     ///< the neighbour that the route leads through
 
     /// The address at which to ask it, or empty.
     [[nodiscard]] std::string url() const { return endpoints.empty() ? std::string{} : endpoints.front(); }
+    /// "3 links via car2", "none", or "-" for a link.
+    [[nodiscard]] std::string route() const;
     /// "350 ms ago" or "now"
     [[nodiscard]] std::string last_seen() const;
     /// Sets its tasks from its answer to PULL self:cles.

@@ -98,6 +98,16 @@ void check(const config& setup) {
                                "'" + setup.seeds[i] + "' names no node, as 'udp' requires with 'security': use 'tls'");
         }
     }
+    constexpr std::size_t max_links = 16;
+    if (setup.links.size() > max_links) {
+        throw config_error(setup.location_of("links"), std::to_string(setup.links.size()) + " names; at most 16 fit");
+    }
+    for (std::size_t i = 0; i < setup.links.size(); ++i) {
+        if (setup.links[i] == setup.node) {
+            throw config_error(setup.location_of("links[" + std::to_string(i) + "]"),
+                               "'" + setup.node + "' is this node itself");
+        }
+    }
     for (const auto& [name, url] : setup.peers) {
         check_url(setup, "peers." + name, url);
     }

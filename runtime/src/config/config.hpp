@@ -56,6 +56,7 @@ struct config {
     std::vector<std::string> networks;
     multicast_options multicast;
     std::vector<std::string> seeds;
+    std::vector<std::string> links; ///< the only nodes that this one may have links to; empty: all
     std::map<std::string, std::string> peers;
 
     std::uint32_t workers = 1;

@@ -293,6 +293,7 @@ const std::vector<setting>& settings() {
                                           value("networks", &config::networks, list(to_network)),
                                           value("multicast", &config::multicast, multicast_of),
                                           value("seeds", &config::seeds, list(to_url)),
+                                          value("links", &config::links, list(to_node_name)),
                                           value("peers", &config::peers, peers_of),
                                           value("workers", &config::workers, count(1, max_workers)),
                                           value("queue", &config::queue, count(1, max_queue)),

@@ -38,7 +38,7 @@ service_options options_of(const config& setup, const daemon_log& log) {
     options.limits = setup.limits;
     options.log = log.sink();
     options.routing = cles::routing();
-    options.gossip = cles::gossip(setup.seeds); // without any, this node may be the seed of others
+    options.gossip = cles::gossip(setup.seeds, setup.links); // without any, this node may be the seed of others
     return options;
 }
 
@@ -249,7 +249,7 @@ void daemon::reload() {
         if (fixed_part(fresh) != fixed_part(setup_)) {
             log_.warning("other changes of the configuration take effect at the next start");
         }
-        service_.set_gossip(cles::gossip(fresh.seeds));
+        service_.set_gossip(cles::gossip(fresh.seeds, setup_.links));
         setup_.seeds = fresh.seeds;
         setup_.log = fresh.log;
     } catch (const config_error& e) {

@@ -71,6 +71,7 @@ const mistake mistakes[] = {
     {"multicast: {interface: off}\n", "clesd.yaml:1: multicast.interface: ", "is not an interface"},
     {"multicast: {required: 1}\n", "clesd.yaml:1: multicast.required: ", "neither true nor false"},
     {"seeds:\n- tcp://a\n- mqtt://b\n", "clesd.yaml:3: seeds[1]: ", ""},
+    {"links:\n- recon\n- not a name\n", "clesd.yaml:3: links[1]: ", ""},
     {"peers:\n  recon: there\n", "clesd.yaml:2: peers.recon: ", ""},
     {"peers: {any: tcp://127.0.0.1}\n", "clesd.yaml:1: peers.any: ", "is not a valid node name"},
     {"peers: []\n", "clesd.yaml:1: peers: ", "has to be a map"},

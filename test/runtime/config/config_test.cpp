@@ -65,6 +65,16 @@ BOOST_AUTO_TEST_CASE(with_security_it_listens_for_other_hosts) {
     BOOST_TEST(refusal(c).find("use 'tls'") != std::string::npos);
 }
 
+BOOST_AUTO_TEST_CASE(links_are_to_other_nodes_and_at_most_sixteen) {
+    auto c = default_config("sat1", 1);
+    c.links = {"recon", "car1"};
+    BOOST_TEST(refusal(c) == "accepted");
+    c.links.emplace_back("sat1");
+    BOOST_TEST(refusal(c).find("'sat1' is this node itself") != std::string::npos);
+    c.links.assign(17, "recon");
+    BOOST_TEST(refusal(c).find("17 names; at most 16 fit") != std::string::npos);
+}
+
 BOOST_AUTO_TEST_CASE(multicast_to_other_hosts_requires_insecure) {
     auto c = default_config("host", 1);
     c.multicast.interface = "eth0";
