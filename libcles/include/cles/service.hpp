@@ -264,7 +264,7 @@ class service : public registrar {
     std::string listen(std::string_view url);
     /// Sets the URL of a node. An empty URL removes it.
     void set_peer(std::string_view name, std::string_view url);
-    /// Starts gossip with these seeds, or replaces the seeds.
+    /// Starts gossip with these seeds and links, or replaces both.
     /// \throws cles::error: `invalid_url`, `unknown_scheme`, `invalid_option`
     void set_gossip(const gossip_options& how);
     /// The other nodes known from multicast or gossip, by name. Requests to them need no URL; those in

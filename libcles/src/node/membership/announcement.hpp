@@ -31,6 +31,7 @@ inline constexpr std::size_t max_endpoints = 16;
 inline constexpr std::size_t max_endpoint = 128;
 inline constexpr std::size_t max_digest = 64;
 inline constexpr std::size_t max_links = 16;
+inline constexpr std::size_t max_links_bytes = 400;
 inline constexpr std::size_t max_sources = multicast_options::most_interfaces;
 
 /// The maximum time between two announcements of a node that knows this many others.

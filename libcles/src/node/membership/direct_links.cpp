@@ -46,6 +46,9 @@ bool direct_links::may_try(std::string_view node, const membership& others, time
 
 bool direct_links::on_failure(std::string_view node, time_point now) {
     const auto [at, is_new] = failed_.try_emplace(std::string{node});
+    if (const auto known = confirmed_.find(node); known != confirmed_.end()) {
+        confirmed_.erase(known);
+    }
     if (is_new) {
         at->second.first = now;
     }
@@ -83,12 +86,20 @@ std::vector<std::string> direct_links::take_lost(const membership& others) {
 }
 
 bool direct_links::on_success(std::string_view node) {
+    if (!confirmed_.contains(node)) {
+        confirmed_.emplace(node);
+    }
     const auto at = failed_.find(node);
     if (at == failed_.end()) {
         return false;
     }
     failed_.erase(at);
     return true;
+}
+
+void direct_links::forget(std::string_view node) {
+    on_success(node);
+    confirmed_.erase(confirmed_.find(node));
 }
 
 } // namespace cles::core

@@ -8,7 +8,7 @@
 
 #include <chrono>
 #include <map>
-#include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,8 +52,12 @@ class direct_links {
     void on_alive(std::string_view node);
     /// Nodes to which a link is lost, each once.
     [[nodiscard]] std::vector<std::string> take_lost(const membership& others);
-    /// The node has replied on a link. Returns whether it had not been reached before.
+    /// The node has replied on a link. Returns whether the last attempt had failed.
     bool on_success(std::string_view node);
+    /// Whether it has replied since the last failure.
+    [[nodiscard]] bool is_confirmed(std::string_view node) const noexcept { return confirmed_.contains(node); }
+    [[nodiscard]] bool has_failures() const noexcept { return !failed_.empty(); }
+    void forget(std::string_view node);
 
   private:
     struct failure {
@@ -68,6 +72,7 @@ class direct_links {
     const std::string own_name_;
     std::vector<std::string> allowed_;
     std::map<std::string, failure, std::less<>> failed_;
+    std::set<std::string, std::less<>> confirmed_;
 };
 
 } // namespace cles::core

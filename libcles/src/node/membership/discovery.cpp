@@ -95,7 +95,12 @@ void discovery::check_links(const std::vector<std::string>& nodes) const {
     if (nodes.size() > max_links) {
         throw error(errc::invalid_option, "'links' has " + std::to_string(nodes.size()) + " names; at most 16 fit");
     }
+    std::size_t bytes = 0;
     for (const auto& name : nodes) {
+        bytes += name.size();
+        if (bytes > max_links_bytes) { // announcements are datagrams
+            throw error(errc::invalid_option, "the names in 'links' are too long together: more than 400 bytes");
+        }
         if (!protocol::is_name(name) || protocol::is_reserved_target(name)) {
             throw error(errc::invalid_name, "in 'links', " + protocol::quoted(name) + " is not a node's name");
         }
@@ -123,6 +128,8 @@ void discovery::gossip(const gossip_options& how) {
     if (gossip_) {
         gossip_->set_seeds(how.seeds, host_.now());
         gossip_->reach().allow_only(how.links);
+        announcer_.expedite(host_.now()); // the others respect the links
+        host_.peer_channels().on_address_changed({});
         return;
     }
     gossip_ = how.part->make(host_, seed_);

@@ -80,6 +80,7 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
     peer_table table;
     const bool good = read(json, others_.max_peers() * 2 + 2, table);
     const bool allowed = table.node.empty() || reach_.allows(table.node);
+    c->reply_time = now - c->sent;
     auto found = allowed ? apply(table, observed_source::at(c->url), c->sent, now) : learned{};
     if (!good) {
         on_failure(ticket, now);
@@ -87,9 +88,11 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
     }
     c->failures = 0;
     c->ticket = 0;
-    if (allowed && !table.node.empty()) {
-        if (security_ == nullptr) { // otherwise the name is only claimed
-            others_.prefer_address(table.node, c->url);
+    if (table.node.empty()) {
+        reach_.on_reached(c->node);
+    } else if (allowed && is_of_owner(table) && (c->node.empty() || c->node == table.node)) {
+        if (security_ == nullptr) { // otherwise the announcement states its addresses
+            others_.prefer_address(table.node, table.epoch, c->url);
         }
         reach_.on_reply(table, c->sent);
         push_routes(now);
@@ -153,14 +156,14 @@ void gossip::on_description(std::uint64_t ticket, std::string_view json, time_po
     follow(now);
 }
 
-void gossip::on_failure(std::uint64_t ticket, time_point now) {
+void gossip::on_failure(std::uint64_t ticket, time_point now, bool silent) {
     auto* c = contacts_.find_ticket(ticket);
     if (c == nullptr) {
         return;
     }
     ++counts_.tables_failed;
     c->ticket = 0;
-    if (!c->node.empty()) {
+    if (!c->node.empty() && silent) {
         reach_.lose(std::string{c->node}, now);
         push_routes(now);
     }
@@ -190,7 +193,7 @@ bool gossip::on_pushed_table(std::string_view json, const observed_source& by, t
     peer_table table;
     const bool good = read(json, max_pushed_entries, table);
     auto found = apply(table, by, now, now);
-    if (contacts_.find_node(table.node) != nullptr) {
+    if (security_ == nullptr && contacts_.find_node(table.node) != nullptr && is_of_owner(table)) {
         reach_.on_pushed(table);
         push_routes(now);
     }
@@ -219,6 +222,12 @@ gossip::learned gossip::apply(const peer_table& table, const observed_source& by
         }
     }
     return found;
+}
+
+// Whether it is from the node that has the name here, and of this pool.
+bool gossip::is_of_owner(const peer_table& table) const {
+    const auto known = others_.find_member(table.node);
+    return known && protocol::epoch_text(known->epoch) == table.epoch && table.pool == others_.pool();
 }
 
 bool gossip::read(std::string_view json, std::size_t max_entries, peer_table& table) const {
@@ -291,10 +300,20 @@ void gossip::push_routes(time_point now) {
 // A neighbour that does not reply for that long is not used for now: there may be another way.
 void gossip::notice_silence(time_point now) {
     for (const auto& c : contacts_) {
-        if (c.ticket != 0 && !c.node.empty() && reach_.need(now) != 0 && now - c.sent >= reach_.silence()) {
+        if (c.ticket != 0 && !c.node.empty() && reach_.need(now) != 0 && now - c.sent >= silence_of(c)) {
             reach_.lose(std::string{c.node}, now);
         }
     }
+}
+
+// Longer than it usually takes: until it has replied once, a link may have to be opened. By datagrams, the request may
+// have to be repeated.
+std::chrono::nanoseconds gossip::silence_of(const contact& c) const {
+    if (!c.reply_time) {
+        return limit;
+    }
+    const auto usual = c.url.starts_with("udp:") ? 2 * reach_.silence() : reach_.silence();
+    return std::max<std::chrono::nanoseconds>(usual, 3 * *c.reply_time);
 }
 
 bool gossip::can_be_asked(const membership::member& k, time_point now) const {
@@ -338,7 +357,8 @@ void gossip::drop_unresponsive(time_point now) {
         const auto known = others_.find_member(c.node);
         // Nodes chosen while few were known would be the same for all, and changes would come only from them.
         const bool had_its_time = c.until <= now || (c.as == part::chosen && others_.size() >= 2 * c.among);
-        if (!known || !can_be_asked(*known, now) || c.failures >= max_failures || (had_its_time && c.ticket == 0)) {
+        if (!known || (!can_be_asked(*known, now) && c.ticket == 0) || c.failures >= max_failures ||
+            (had_its_time && c.ticket == 0)) {
             end(c, c.failures != 0, now);
         } else {
             c.url = known->where;
@@ -402,19 +422,26 @@ void gossip::choose_at_random(time_point now) {
 
 // All that can be asked, because the shortest route may lead through any of them.
 void gossip::choose_neighbours(time_point now) {
+    const auto stay = interval() * intervals_of_stay;
     const auto add = [&](const membership::member& k) {
-        if (contacts_.count(part::chosen) < max_neighbours && can_be_asked(k, now) &&
-            contacts_.find_node(k.node) == nullptr && !announce_only_.contain(k, now)) {
-            contacts_.add(part::chosen, k.node, k.where, now).among = others_.size();
+        if (can_be_asked(k, now) && contacts_.find_node(k.node) == nullptr && !contacts_.rests(k.node, now) &&
+            !announce_only_.contain(k, now)) {
+            auto& c = contacts_.add(part::chosen, k.node, k.where, now);
+            c.until = now + stay - jitter_.quarter_of(stay);
+            c.among = others_.size();
         }
     };
-    if (reach_.allowed().empty()) {
-        others_.for_each(add);
-        return;
-    }
-    for (const auto& name : reach_.allowed()) {
-        if (const auto known = others_.find_member(name)) {
-            add(*known);
+    if (!reach_.allowed().empty()) {
+        for (const auto& name : reach_.allowed()) {
+            if (const auto known = others_.find_member(name)) {
+                add(*known);
+            }
+        }
+    } else if (others_.size() != 0) {
+        auto next = others_.at(jitter_.below(others_.size())); // others in turn, where there are more
+        for (std::size_t i = 0; i < others_.size() && contacts_.count(part::chosen) < max_neighbours; ++i) {
+            add(next);
+            next = *others_.next_member(next.node);
         }
     }
 }
@@ -510,9 +537,10 @@ void gossip::follow(time_point now) {
         due = std::min(due, *seed);
     }
     for (const auto& c : contacts_) {
-        due = std::min(due, c.ticket == 0                                       ? c.next
-                            : reach_.need(now) != 0 && reach_.is_usable(c.node) ? c.sent + reach_.silence()
-                                                                                : c.sent + limit * 2);
+        due = std::min(due, c.ticket == 0 ? c.next
+                            : reach_.need(now) != 0 && reach_.is_usable(c.node)
+                                ? c.sent + std::chrono::ceil<milliseconds>(silence_of(c))
+                                : c.sent + limit * 2);
     }
     const bool wanting = contacts_.count(part::chosen) + contacts_.count(part::successor) <
                          std::min<std::size_t>(random_contacts + 1, announce_only_.count_gossiping(others_, now));

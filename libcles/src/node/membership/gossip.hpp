@@ -88,7 +88,8 @@ class gossip : private deadline {
 
     void on_answer(std::uint64_t ticket, std::string_view json, time_point now);
     void on_description(std::uint64_t ticket, std::string_view json, time_point now);
-    void on_failure(std::uint64_t ticket, time_point now);
+    /// `silent`: the node has not replied at all.
+    void on_failure(std::uint64_t ticket, time_point now, bool silent = true);
 
     /// Answers the gossip request of another node: writes what has changed, in at most `longest` bytes including the
     /// head of the reply.
@@ -117,6 +118,8 @@ class gossip : private deadline {
     void push_routes(time_point now);
     [[nodiscard]] bool can_be_asked(const membership::member& k, time_point now) const;
     void notice_silence(time_point now);
+    [[nodiscard]] std::chrono::nanoseconds silence_of(const contact& c) const;
+    [[nodiscard]] bool is_of_owner(const peer_table& table) const;
     bool read(std::string_view json, std::size_t max_entries, peer_table& table) const;
 
     void on_deadline(time_point now) override;

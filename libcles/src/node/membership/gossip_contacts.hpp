@@ -35,10 +35,11 @@ struct gossip_contact {
     std::uint64_t ticket = 0; ///< 0: no request is in progress
     time_point sent{};
     time_point until = time_point::max();
-    std::string describe{};      ///< epochs to describe, separated by commas
-    std::size_t table_bytes = 0; ///< size of a table that is always sent whole
-    std::size_t among = 0;       ///< number of known nodes when it was chosen
-    unsigned failures = 0;       ///< in a row
+    std::optional<std::chrono::nanoseconds> reply_time{}; ///< of the last reply
+    std::string describe{};                               ///< epochs to describe, separated by commas
+    std::size_t table_bytes = 0;                          ///< size of a table that is always sent whole
+    std::size_t among = 0;                                ///< number of known nodes when it was chosen
+    unsigned failures = 0;                                ///< in a row
     bool own_entry_sent = false;
     bool ended = false;
 };

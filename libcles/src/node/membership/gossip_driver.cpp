@@ -68,14 +68,17 @@ class gossip_driver final : private gossip::client, public gossip {
     /// The operation of a request, whose reply is passed to `taken`. This lives as long as the node.
     detail::pending_ptr reply_to(std::uint64_t ticket,
                                  void (gossip::*taken)(std::uint64_t, std::string_view, time_point)) {
-        return detail::pending_ptr{
-            new peer_reply{host_.weak_from_this(), [this, ticket, taken](local_node& host, const peer_answer& answer) {
-                               if (answer.code) {
-                                   on_failure(ticket, host.now());
-                               } else {
-                                   (this->*taken)(ticket, answer.json, host.now());
-                               }
-                           }}};
+        return detail::pending_ptr{new peer_reply{
+            host_.weak_from_this(), [this, ticket, taken](local_node& host, const peer_answer& answer) {
+                if (answer.code) {
+                    // A refusal is a reply, and what failed here says nothing about the link.
+                    const bool silent =
+                        !answer.refused && (answer.code == errc::unavailable || answer.code == errc::deadline);
+                    on_failure(ticket, host.now(), silent);
+                } else {
+                    (this->*taken)(ticket, answer.json, host.now());
+                }
+            }}};
     }
     void send(std::string_view url, const protocol::outgoing_request& request, detail::pending_ptr operation) {
         host_.peer_channels().send("self", url, request, host_.now() + limit, std::move(operation), {});

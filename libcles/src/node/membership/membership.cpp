@@ -577,9 +577,9 @@ const std::string* membership::owner_of(std::uint32_t epoch) const noexcept {
     return found != nullptr && found->second.owner.epoch == epoch ? &found->first : nullptr;
 }
 
-void membership::prefer_address(std::string_view node, std::string_view url) {
+void membership::prefer_address(std::string_view node, std::string_view epoch, std::string_view url) {
     const auto at = peers_.find(node);
-    if (at == peers_.end()) {
+    if (at == peers_.end() || protocol::epoch_text(at->second.owner.epoch) != epoch) {
         return;
     }
     auto& all = at->second.owner.endpoints;

@@ -131,8 +131,9 @@ class membership final : private deadline {
     [[nodiscard]] time_point last_seen(std::string_view node) const noexcept;
     /// The node of that incarnation; null if it is unknown, or not the owner of its name.
     [[nodiscard]] const std::string* owner_of(std::uint32_t epoch) const noexcept;
-    /// The node has replied at that URL: it is used instead of an address of the same kind that others have reported.
-    void prefer_address(std::string_view node, std::string_view url);
+    /// That incarnation of the node has replied at the URL: it is used instead of an address of the same kind that
+    /// others have reported.
+    void prefer_address(std::string_view node, std::string_view epoch, std::string_view url);
     /// Reports the node again to those that ask for changes.
     void touch(std::string_view node);
     /// All such URLs, the preferred one first; null if it is unknown.

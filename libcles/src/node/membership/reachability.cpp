@@ -7,6 +7,11 @@
 #include <utility>
 
 namespace cles::core {
+namespace {
+
+constexpr std::uint64_t max_number = std::uint64_t{1} << 62U; // leaves room to count
+
+} // namespace
 
 // -- for the rest of the node ----------------------------------------------------------------------------------------
 
@@ -40,20 +45,36 @@ void reachability::add_routes(std::vector<peer>& all) const {
     }
 }
 
-void reachability::on_unreachable(std::string_view url, time_point now) {
+std::string reachability::node_at(std::string_view url) const {
     std::string node;
     others_.for_each([&](const membership::member& k) {
-        if (k.where == url) {
+        if (k.where == url && !k.suspect) {
             node = k.node;
         }
     });
-    if (!node.empty()) {
+    return node;
+}
+
+void reachability::on_unreachable(std::string_view url, time_point now) {
+    if (const auto node = node_at(url); !node.empty()) {
         lose(node, now);
     }
 }
 
+void reachability::on_opened(std::string_view url) {
+    if (direct_.has_failures()) {
+        on_reached(node_at(url));
+    }
+}
+
+void reachability::on_reached(std::string_view node) {
+    if (direct_.on_success(node)) {
+        reconsider(node);
+    }
+}
+
 void reachability::on_new_incarnation(std::string_view node) {
-    direct_.on_success(node);
+    direct_.forget(node);
     routes_.forget(node);
 }
 
@@ -108,13 +129,12 @@ std::optional<route_advert> reachability::advert_of(const delta_entry& item, std
     if (!out_.forwards() || item.node == to) {
         return {};
     }
-    return routes_.advertise(item.node, item.epoch, is_usable(item.node), usable(), to);
+    const bool direct = is_usable(item.node) && direct_.is_confirmed(item.node);
+    return routes_.advertise(item.node, item.epoch, direct, usable(), to);
 }
 
 void reachability::on_reply(const peer_table& table, time_point asked) {
-    if (direct_.on_success(table.node)) {
-        reconsider(table.node);
-    }
+    on_reached(table.node);
     apply(table);
     find_lost_links(table.node, asked);
 }
@@ -122,11 +142,19 @@ void reachability::on_reply(const peer_table& table, time_point asked) {
 void reachability::apply(const peer_table& table) {
     const auto works = usable();
     for (const auto& [epoch, advert] : table.routes) {
+        if (advert.seq > max_number) {
+            continue;
+        }
+        if (others_.own() != nullptr && others_.own()->epoch == epoch) { // nobody may be ahead of this node
+            number_ = std::max(number_, advert.seq);
+            continue;
+        }
         const auto* const node = others_.owner_of(epoch);
         if (node == nullptr) {
             continue;
         }
         const std::string name{*node};
+        const bool was_offered = routes_.is_offered(name, table.node);
         const auto before = routes_.in_use(name, works);
         routes_.apply(name, epoch, table.node, advert);
         const auto after = routes_.in_use(name, works);
@@ -137,7 +165,7 @@ void reachability::apply(const peer_table& table) {
             unsent_.insert(name);
             out_.on_route_changed(name);
         }
-        if (!advert.hops && name != table.node) {
+        if (was_offered && !advert.hops && name != table.node) {
             out_.on_route_lost(name, address_of(table.node));
         }
     }
@@ -162,7 +190,7 @@ void reachability::report_lost_links() {
 }
 
 void reachability::lose(std::string_view neighbour, time_point now) {
-    if (!direct_.on_failure(neighbour, now)) {
+    if (!others_.address_of(neighbour) || !direct_.on_failure(neighbour, now)) {
         return;
     }
     reconsider(neighbour);

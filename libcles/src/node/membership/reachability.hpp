@@ -66,6 +66,8 @@ class reachability {
     virtual void add_routes(std::vector<peer>& all) const;
     /// No link could be opened to that address.
     virtual void on_unreachable(std::string_view url, time_point now);
+    /// A link has been opened to that address.
+    virtual void on_opened(std::string_view url);
     /// The name has another incarnation, or none.
     virtual void on_new_incarnation(std::string_view node);
 
@@ -89,6 +91,8 @@ class reachability {
     void on_question(const protocol::routes_question& asked, time_point now);
     /// What is advertised to the neighbour `to`, if anything.
     [[nodiscard]] std::optional<route_advert> advert_of(const delta_entry& item, std::string_view to);
+    /// The node has replied.
+    void on_reached(std::string_view node);
     /// The neighbour has replied to what it was asked at that time.
     void on_reply(const peer_table& table, time_point asked);
     /// It has sent routes without being asked.
@@ -108,6 +112,7 @@ class reachability {
     [[nodiscard]] unsigned own_need(time_point now) const;
     void apply(const peer_table& table);
     void find_lost_links(std::string_view neighbour, time_point asked);
+    [[nodiscard]] std::string node_at(std::string_view url) const;
     void report_lost_links();
     void reconsider(std::string_view neighbour);
     [[nodiscard]] std::string_view address_of(std::string_view node) const {

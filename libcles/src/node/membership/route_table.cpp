@@ -43,6 +43,8 @@ void route_table::apply(std::string_view name, std::uint32_t epoch, std::string_
         known->hops = *offered.hops;
     } else if (d.offers.size() < max_offers) {
         d.offers.push_back({std::string{neighbour}, offered.seq, *offered.hops});
+    } else if (auto& oldest = *std::ranges::min_element(d.offers, {}, &offer::seq); oldest.seq < offered.seq) {
+        oldest = {std::string{neighbour}, offered.seq, *offered.hops};
     }
 }
 

@@ -77,7 +77,7 @@ class route_table {
         [[nodiscard]] bool is_feasible(const offer& o) const noexcept {
             return o.seq > seq || (o.seq == seq && o.hops < hops);
         }
-        [[nodiscard]] bool is_current(const offer& o) const noexcept { return o.seq + max_late > newest; }
+        [[nodiscard]] bool is_current(const offer& o) const noexcept { return newest - o.seq < max_late; }
         void note_advertised(std::uint64_t s, unsigned h) noexcept;
     };
 

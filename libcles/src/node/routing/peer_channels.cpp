@@ -6,6 +6,8 @@
 #include "node/publish/feed_machine.hpp"
 #include "protocol/grammar.hpp"
 
+#include <boost/system/errc.hpp>
+
 #include <algorithm>
 #include <optional>
 #include <utility>
@@ -129,10 +131,16 @@ void peer_channel::dial() {
 void peer_channel::on_dialled(boost::system::error_code code, link_ptr made) {
     const auto keep = shared_from_this();
     give_up_ = nullptr;
+    auto* const routes = host_->node().gossip_responder;
     if (code) {
-        host_->peer_channels().on_unreachable(*this);
+        if (routes != nullptr && code != errc::denied && code != boost::system::errc::too_many_files_open) {
+            host_->peer_channels().on_unreachable(*this);
+        }
         fail(code, "cannot connect to " + address_ + ": " + code.message());
     } else {
+        if (routes != nullptr) {
+            routes->reach().on_opened(address_);
+        }
         const auto c = host_->connections().adopt(std::move(made), connection::origin::dialled);
         links_.push_back(c);
         serve_waiting(c);
@@ -308,7 +316,8 @@ std::uint64_t peer_channels::send(std::string_view target, std::string_view at, 
         return 0;
     }
     r.id = host_.draw_id();
-    channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress), at.empty());
+    channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress),
+                  at.empty() && via.empty() && !r.carried.urgent);
     return r.id;
 }
 
@@ -382,11 +391,7 @@ std::optional<peer_channels::place> peer_channels::discovered_place_of(std::stri
 }
 
 void peer_channels::on_unreachable(peer_channel& channel) {
-    auto* const routes = host_.node().gossip_responder;
-    if (routes == nullptr) {
-        return;
-    }
-    routes->reach().on_unreachable(channel.address(), host_.now());
+    host_.node().gossip_responder->reach().on_unreachable(channel.address(), host_.now());
     reroute(channel);
 }
 

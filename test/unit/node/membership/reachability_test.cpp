@@ -44,8 +44,11 @@ struct fixture : cles::core::reachability::listener {
         reach.on_reply(table, now);
     }
     [[nodiscard]] auto advert(std::string_view of, std::string_view to) {
-        const auto item = others.entry_of(of);
-        return item ? reach.advert_of(*item, to) : std::nullopt;
+        using cles::core::delta_entry;
+        const auto item = of == "me"
+                              ? delta_entry::of(delta_entry::kind::heartbeat, of, *others.own(), cles::peer_state::live)
+                              : others.entry_of(of).value();
+        return reach.advert_of(item, to);
     }
 
     bool routes = true;
@@ -92,6 +95,41 @@ BOOST_AUTO_TEST_CASE(a_node_that_does_not_forward_advertises_only_itself) {
     BOOST_TEST(!advert("car1", "car1")); // it knows itself
     routes = false;
     BOOST_TEST(!advert("far", "car1"));
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_has_never_replied_is_not_advertised_as_a_neighbour) {
+    BOOST_TEST(!advert("car2", "car1").value().hops);
+    reach.on_opened("tcp://10.0.0.7:12"); // nothing has failed
+    BOOST_TEST(!advert("car2", "car1").value().hops);
+    reach.on_reached("car2");
+    BOOST_TEST(advert("car2", "car1").value().hops.value() == 1U);
+    reach.lose("car2", now);
+    BOOST_TEST(!advert("car2", "car1").value().hops);
+    reach.on_opened("tcp://10.0.0.7:12");
+    BOOST_TEST(advert("car2", "car1").value().hops.value() == 1U);
+}
+
+BOOST_AUTO_TEST_CASE(a_number_that_others_state_for_this_node_is_not_ahead_of_its_own) {
+    cles::core::announcement said{.node = "me"};
+    others.announce_self(said, 1, now);
+    cles::core::peer_table table;
+    table.node = "car1";
+    table.routes = {{.epoch = 0xA, .advert = {900, 1}}};
+    reach.on_reply(table, now);
+    BOOST_TEST(advert("me", "car1").value().seq == 900U);
+    table.routes = {{.epoch = 0xA, .advert = {~std::uint64_t{0}, 1}}};
+    reach.on_reply(table, now);
+    BOOST_TEST(advert("me", "car1").value().seq == 900U);
+    reply("car1", {~std::uint64_t{0}, std::nullopt});
+    reply("car2", {5, 1});
+    BOOST_TEST(reach.next_hop_to("far", {}) == "car2");
+}
+
+BOOST_AUTO_TEST_CASE(a_route_that_is_withdrawn_twice_is_lost_once) {
+    reply("car2", {5, 1});
+    reply("car2", {6, std::nullopt});
+    reply("car2", {7, std::nullopt});
+    BOOST_TEST(lost.size() == 1U);
 }
 
 BOOST_AUTO_TEST_CASE(a_neighbour_that_does_not_reply_is_not_used_and_its_routes_are_reported) {
@@ -145,11 +183,12 @@ BOOST_AUTO_TEST_CASE(feeds_leave_a_link_that_is_lost) {
 }
 
 BOOST_AUTO_TEST_CASE(the_address_at_which_a_node_replied_is_preferred_to_one_that_others_report) {
-    others.prefer_address("car1", "tcp://10.0.1.7:11");
+    others.prefer_address("car1", "0000000b", "tcp://10.0.1.7:11");
     BOOST_TEST(others.address_of("car1").value() == "tcp://10.0.1.7:11");
-    others.prefer_address("car1", "udp://10.0.1.7:11");
+    others.prefer_address("car1", "0000000b", "udp://10.0.1.7:11");
+    others.prefer_address("car1", "0000000c", "tcp://10.0.2.7:11");
     BOOST_TEST(others.address_of("car1").value() == "tcp://10.0.1.7:11");
-    others.prefer_address("nobody", "tcp://10.0.1.7:11");
+    others.prefer_address("nobody", "0000000b", "tcp://10.0.1.7:11");
 }
 
 BOOST_AUTO_TEST_CASE(a_list_of_links_is_a_need_everywhere) {
@@ -187,6 +226,11 @@ BOOST_AUTO_TEST_CASE(the_need_of_others_spreads_one_link_less_far_and_is_forgott
     BOOST_TEST(reach.need(now) == 4U);
     BOOST_TEST(reach.need(now + 3999ms) == 4U);
     BOOST_TEST(reach.need(now + 4s) == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(nothing_is_remembered_of_a_node_that_is_not_known) {
+    reach.lose("nobody", now);
+    BOOST_TEST(changed.empty());
 }
 
 BOOST_AUTO_TEST_CASE(another_incarnation_has_no_routes_yet) {

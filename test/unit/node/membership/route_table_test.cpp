@@ -152,6 +152,16 @@ BOOST_AUTO_TEST_CASE(the_table_is_bounded) {
     BOOST_TEST(small.is_offered("x", "n14"));
 }
 
+BOOST_AUTO_TEST_CASE(a_newer_offer_replaces_the_oldest_where_there_are_sixteen) {
+    for (unsigned i = 0; i < 16; ++i) {
+        offer("n" + std::to_string(i), 5 + i % 2, 1);
+    }
+    offer("late", 5, 1);
+    BOOST_TEST(!table.is_offered("far", "late"));
+    offer("late", 6, 0);
+    BOOST_TEST(hop() == "late");
+}
+
 BOOST_AUTO_TEST_CASE(the_destinations_of_a_neighbour_are_known) {
     offer("a", 7, 1);
     table.apply("near", 1, "a", {1, 0});
