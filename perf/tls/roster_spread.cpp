@@ -7,9 +7,9 @@
 //
 // Fails if it takes longer than 5 seconds, or than MOST_SECONDS.
 #include "perf/support/descriptor.hpp"
-#include "perf/support/temporary_folder.hpp"
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
+#include "support/temporary_folder.hpp"
 
 #include <algorithm>
 #include <array>
@@ -47,7 +47,7 @@ double seconds(steady::duration span) { return std::chrono::duration<double>(spa
 /// `clesd` with the keys of a member, in a directory of that name.
 class daemon_process {
   public:
-    daemon_process(const std::string& program, const temporary_folder& in, std::string name)
+    daemon_process(const std::string& program, const test::temporary_folder& in, std::string name)
         : name_(std::move(name)), keys_((in / name_).string()), socket_((in / (name_ + ".sock")).string()) {
         const std::vector<std::string> words{program,
                                              "--config",
@@ -216,7 +216,7 @@ class spreading_fleet {
     [[nodiscard]] std::size_t roster_bytes() const { return authority_.newest().line().size(); }
 
   private:
-    temporary_folder folder_{"cles-spread"};
+    test::temporary_folder folder_{"cles-spread"};
     security::fleet_authority authority_ = security::fleet_authority::found(security::signing_key::generate());
     std::vector<std::unique_ptr<daemon_process>> daemons_;
 };

@@ -13,10 +13,10 @@
 #include "perf/support/child_process.hpp"
 #include "perf/support/descriptor.hpp"
 #include "perf/support/pinning.hpp"
-#include "perf/support/temporary_folder.hpp"
 #include "security/fleet/fleet.hpp"
 #include "security/fleet/fleet_authority.hpp"
 #include "security/fleet/key_directory.hpp"
+#include "support/temporary_folder.hpp"
 #include "tls/tls_transport.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -102,7 +102,7 @@ class fleet_folder {
     }
 
   private:
-    temporary_folder folder_{"cles-tls-links"};
+    test::temporary_folder folder_{"cles-tls-links"};
     security::fleet_authority authority_ = security::fleet_authority::found(security::signing_key::generate());
     std::vector<security::signing_key> keys_;
 };

@@ -72,9 +72,9 @@ EXCEPTIONS: dict[str, set[str]] = {
     "test/plugins/three_homes_test.cpp": {"apps"},  # the tasks of an example, in service, test and plugin
     "test/effort/impaired_line_test.cpp": {"perf"},  # the decisions of the measurements' impaired link
     "perf/routing/choice_cost.cpp": {"node", "protocol"},  # measures a choice without a link
-    "perf/tls/roster_spread.cpp": {"security"},  # makes a fleet of its own
+    "perf/tls/roster_spread.cpp": {"security", "test"},  # makes a fleet of its own, in a folder as tests have
     "perf/tls/tls_cost.cpp": {"security", "tls"},  # the same
-    "perf/tls/tls_links.cpp": {"security", "tls"},  # the same
+    "perf/tls/tls_links.cpp": {"security", "test", "tls"},  # the same
     "perf/jobs/job_cost.cpp": {"runtime"},  # measures a daemon in a process of its own
 }
 
