@@ -52,6 +52,12 @@ std::optional<std::uint64_t> lease_from(std::string_view value) noexcept {
     return is_number(value) ? std::optional<std::uint64_t>{max_lease_ms} : std::nullopt; // too long for 64 bits
 }
 
+bool take_routes(routes_question& target, std::string_view text) {
+    const auto dot = text.find('.');
+    target.by = text.substr(dot == std::string_view::npos ? text.size() : dot + 1);
+    return dot < 3 && take(target.distance, number_between(text.substr(0, dot), 1, max_hops)) && is_name(target.by);
+}
+
 template <class... Verbs>
 constexpr unsigned on(Verbs... verbs) {
     return ((1U << static_cast<unsigned>(verbs)) | ...);
@@ -98,7 +104,7 @@ constexpr std::array known_adverbs{
     known_adverb{"describe", on(verb::pull),
                  [](std::string_view v, request_line& r) { return is_epoch_list(r.describe = v); }},
     known_adverb{"routes", on(verb::pull),
-                 [](std::string_view v, request_line& r) { return parse_routes_question(r.routes = v).has_value(); }},
+                 [](std::string_view v, request_line& r) { return take_routes(r.routes, v); }},
     known_adverb{"mark", on(verb::bind),
                  [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }}};
 
@@ -185,15 +191,6 @@ void append_adverb(std::string& out, std::string_view key, std::uint64_t value) 
 }
 
 } // namespace
-
-std::optional<routes_question> parse_routes_question(std::string_view text) noexcept {
-    const auto dot = text.find('.');
-    const auto distance = dot < 3 ? parse_number(text.substr(0, dot)) : std::nullopt;
-    if (!distance || *distance == 0 || *distance > max_hops || !is_name(text.substr(dot + 1))) {
-        return {};
-    }
-    return routes_question{static_cast<unsigned>(*distance), text.substr(dot + 1)};
-}
 
 bool parse_request(std::string_view line, request_line& out, malformed_request& error) {
     if (parse_parts(line, out, error.why)) {

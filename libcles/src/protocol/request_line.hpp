@@ -31,10 +31,9 @@ inline constexpr std::size_t max_sig = 128; // a signature has 86 characters
 
 /// The value of `routes=8.car1` on `PULL self:cles/peers`.
 struct routes_question {
-    unsigned distance = 0; ///< of the nodes that are to ask for routes too, in links
+    unsigned distance = 0; ///< of the nodes that are to ask for routes too, in links; 0: no routes are asked for
     std::string_view by{}; ///< the node that asks
 };
-std::optional<routes_question> parse_routes_question(std::string_view text) noexcept;
 
 constexpr std::uint32_t default_deadline(verb v) noexcept {
     return v == verb::delegate ? default_delegate_deadline_ms : default_deadline_ms;
@@ -65,10 +64,10 @@ struct request_line : carried_adverbs {
     std::optional<std::uint64_t> seq;
     std::optional<std::uint32_t> epoch;
     std::string_view via;
-    std::string_view from;                     ///< the requester, if the peer forwards
-    std::string_view sig;                      ///< the signature of the requester, or of an update's publisher
-    std::string_view since;                    ///< what the requester knows already
-    std::string_view routes;                   ///< how far the need for routes spreads, and who asks
+    std::string_view from;  ///< the requester, if the peer forwards
+    std::string_view sig;   ///< the signature of the requester, or of an update's publisher
+    std::string_view since; ///< what the requester knows already
+    routes_question routes{};
     std::string_view describe;                 ///< epochs of the incarnations to describe in full, separated by commas
     std::string_view body;                     ///< empty: none
     std::string_view text;                     ///< the whole line

@@ -10,6 +10,16 @@ bool contains(const std::vector<std::string>& names, std::string_view name) {
     return names.empty() || std::ranges::find(names, name) != names.end();
 }
 
+template <class Container>
+bool erase_key(Container& from, std::string_view key) {
+    const auto at = from.find(key);
+    if (at == from.end()) {
+        return false;
+    }
+    from.erase(at);
+    return true;
+}
+
 } // namespace
 
 bool direct_links::allows(std::string_view node, const membership& others) const {
@@ -21,9 +31,13 @@ bool direct_links::is_lost(const failure& f, std::string_view node, const member
     return f.alive || others.last_seen(node) > f.first;
 }
 
-bool direct_links::reaches(std::string_view node, const membership& others) const {
+bool direct_links::may_have(std::string_view node, const membership& others) const {
     const auto where = others.address_of(node);
-    if (!where || where->empty() || !allows(node, others)) {
+    return where && !where->empty() && allows(node, others);
+}
+
+bool direct_links::reaches(std::string_view node, const membership& others) const {
+    if (!may_have(node, others)) {
         return false;
     }
     const auto failed = failed_.find(node);
@@ -36,8 +50,7 @@ bool direct_links::is_lost_since(std::string_view node, const membership& others
 }
 
 bool direct_links::may_try(std::string_view node, const membership& others, time_point now) const {
-    const auto where = others.address_of(node);
-    if (!where || where->empty() || !allows(node, others)) {
+    if (!may_have(node, others)) {
         return false;
     }
     const auto failed = failed_.find(node);
@@ -46,9 +59,7 @@ bool direct_links::may_try(std::string_view node, const membership& others, time
 
 bool direct_links::on_failure(std::string_view node, time_point now) {
     const auto [at, is_new] = failed_.try_emplace(std::string{node});
-    if (const auto known = confirmed_.find(node); known != confirmed_.end()) {
-        confirmed_.erase(known);
-    }
+    erase_key(confirmed_, node);
     if (is_new) {
         at->second.first = now;
     }
@@ -89,17 +100,12 @@ bool direct_links::on_success(std::string_view node) {
     if (!confirmed_.contains(node)) {
         confirmed_.emplace(node);
     }
-    const auto at = failed_.find(node);
-    if (at == failed_.end()) {
-        return false;
-    }
-    failed_.erase(at);
-    return true;
+    return erase_key(failed_, node);
 }
 
 void direct_links::forget(std::string_view node) {
-    on_success(node);
-    confirmed_.erase(confirmed_.find(node));
+    erase_key(failed_, node);
+    erase_key(confirmed_, node);
 }
 
 } // namespace cles::core

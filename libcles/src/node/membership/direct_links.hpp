@@ -67,6 +67,8 @@ class direct_links {
         bool alive = false;
         bool is_reported = false;
     };
+    /// Whether the node has an address, and both nodes' `links` allow it.
+    [[nodiscard]] bool may_have(std::string_view node, const membership& others) const;
     [[nodiscard]] bool is_lost(const failure& f, std::string_view node, const membership& others) const;
 
     const std::string own_name_;

@@ -129,7 +129,7 @@ void discovery::gossip(const gossip_options& how) {
         gossip_->set_seeds(how.seeds, host_.now());
         gossip_->reach().allow_only(how.links);
         announcer_.expedite(host_.now()); // the others respect the links
-        host_.peer_channels().on_address_changed({});
+        host_.peer_channels().on_links_changed();
         return;
     }
     gossip_ = how.part->make(host_, seed_);
@@ -380,17 +380,11 @@ void discovery::on_peer(std::string_view node, membership::change what, std::str
     case membership::change::moved: host_.post_log(log_level::info, name + " is now" + place); break;
     case membership::change::silent: host_.post_log(log_level::debug, name + " is no longer received"); break;
     case membership::change::returned: host_.post_log(log_level::debug, name + " is received again"); break;
-    case membership::change::left:
-        host_.post_log(log_level::info, name + " has left");
-        if (gossip_) {
-            gossip_->reach().on_new_incarnation(name);
-        }
-        break;
+    case membership::change::left: host_.post_log(log_level::info, name + " has left"); break;
     case membership::change::gone:
         host_.post_log(log_level::info, name + " is gone");
         if (gossip_) {
             gossip_->on_gone(node, where, host_.now());
-            gossip_->reach().on_new_incarnation(name);
         }
         break;
     case membership::change::clash:
@@ -416,8 +410,11 @@ void discovery::on_peer(std::string_view node, membership::change what, std::str
 // When a name has a new incarnation, its feeds bind to that one at once.
 void discovery::follow_incarnation(const std::string& name) {
     const auto known = host_.node().peers.find_member(name);
-    if (!known) {
-        return; // the next incarnation may still follow
+    if (!known) { // the next incarnation may still follow
+        if (gossip_) {
+            gossip_->reach().on_new_incarnation(name);
+        }
+        return;
     }
     const auto [at, is_new] = incarnations_.try_emplace(name, known->epoch);
     const bool another = std::exchange(at->second, known->epoch) != known->epoch;

@@ -179,14 +179,13 @@ void gossip::on_failure(std::uint64_t ticket, time_point now, bool silent) {
 void gossip::write_delta(json_writer& w, const table_question& asked, std::size_t longest, time_point now) {
     last_asked_ = now;
     ++counts_.tables_told;
-    const auto question = protocol::parse_routes_question(asked.routes);
-    if (!question) {
+    if (asked.routes.distance == 0) {
         core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now);
         return;
     }
-    reach_.on_question(*question, now);
+    reach_.on_question(asked.routes, now);
     core::write_delta(w, {self_.name, self_.epoch}, others_, asked, longest, now,
-                      [&](const delta_entry& item) { return reach_.advert_of(item, question->by); });
+                      [&](const delta_entry& item) { return reach_.advert_of(item, asked.routes.by); });
 }
 
 bool gossip::on_pushed_table(std::string_view json, const observed_source& by, time_point now) {
@@ -291,16 +290,19 @@ void gossip::push_routes(time_point now) {
         if (!routes.empty()) {
             std::string table;
             json_writer w{table};
-            write_routes(w, self_.name, routes);
+            write_routes(w, {self_.name, self_.epoch}, others_.pool(), routes);
             out_.push(c.url, table);
         }
     }
 }
 
-// A neighbour that does not reply for that long is not used for now: there may be another way.
+// A neighbour that does not reply for that long is not used until it does: another may have a route.
 void gossip::notice_silence(time_point now) {
+    if (reach_.need(now) == 0) {
+        return;
+    }
     for (const auto& c : contacts_) {
-        if (c.ticket != 0 && !c.node.empty() && reach_.need(now) != 0 && now - c.sent >= silence_of(c)) {
+        if (c.ticket != 0 && !c.node.empty() && now - c.sent >= silence_of(c)) {
             reach_.lose(std::string{c.node}, now);
         }
     }
@@ -401,6 +403,13 @@ void gossip::choose_successor(time_point now) {
     }
 }
 
+void gossip::choose(const membership::member& k, time_point now) {
+    const auto stay = interval() * intervals_of_stay;
+    auto& c = contacts_.add(part::chosen, k.node, k.where, now);
+    c.until = now + stay - jitter_.quarter_of(stay);
+    c.among = others_.size();
+}
+
 void gossip::choose_at_random(time_point now) {
     constexpr int tries = 8; // the next turn comes soon
     const auto size = others_.size();
@@ -412,23 +421,17 @@ void gossip::choose_at_random(time_point now) {
         const auto k = others_.at(jitter_.below(size));
         if (can_be_asked(k, now) && contacts_.find_node(k.node) == nullptr && !announce_only_.contain(k, now) &&
             (size <= random_contacts + 1 || !contacts_.rests(k.node, now))) {
-            const auto stay = interval() * intervals_of_stay;
-            auto& c = contacts_.add(part::chosen, k.node, k.where, now);
-            c.until = now + stay - jitter_.quarter_of(stay);
-            c.among = size;
+            choose(k, now);
         }
     }
 }
 
 // All that can be asked, because the shortest route may lead through any of them.
 void gossip::choose_neighbours(time_point now) {
-    const auto stay = interval() * intervals_of_stay;
     const auto add = [&](const membership::member& k) {
         if (can_be_asked(k, now) && contacts_.find_node(k.node) == nullptr && !contacts_.rests(k.node, now) &&
             !announce_only_.contain(k, now)) {
-            auto& c = contacts_.add(part::chosen, k.node, k.where, now);
-            c.until = now + stay - jitter_.quarter_of(stay);
-            c.among = others_.size();
+            choose(k, now);
         }
     };
     if (!reach_.allowed().empty()) {
@@ -479,9 +482,8 @@ void gossip::call(contact& c, time_point now) {
     ++counts_.tables_asked;
     c.sent = now;
     c.ticket = ++last_ticket_;
-    const auto need = reach_.need(now);
-    const auto routes = need == 0 ? std::string{} : std::to_string(need) + "." + self_.name;
-    out_.ask(c.ticket, c.url, {.since = c.since, .describe = c.describe, .routes = routes});
+    out_.ask(c.ticket, c.url,
+             {.since = c.since, .describe = c.describe, .routes = {.distance = reach_.need(now), .by = self_.name}});
 }
 
 void gossip::send_own_entry(contact& c, time_point now) {
@@ -537,10 +539,7 @@ void gossip::follow(time_point now) {
         due = std::min(due, *seed);
     }
     for (const auto& c : contacts_) {
-        due = std::min(due, c.ticket == 0 ? c.next
-                            : reach_.need(now) != 0 && reach_.is_usable(c.node)
-                                ? c.sent + std::chrono::ceil<milliseconds>(silence_of(c))
-                                : c.sent + limit * 2);
+        due = std::min(due, due_of(c, now));
     }
     const bool wanting = contacts_.count(part::chosen) + contacts_.count(part::successor) <
                          std::min<std::size_t>(random_contacts + 1, announce_only_.count_gossiping(others_, now));
@@ -551,6 +550,16 @@ void gossip::follow(time_point now) {
         due = std::min(due, now + interval() / turns_per_interval);
     }
     deadlines_.arm(*this, std::max(due, now + milliseconds{1}));
+}
+
+time_point gossip::due_of(const contact& c, time_point now) const {
+    if (c.ticket == 0) {
+        return c.next;
+    }
+    if (reach_.need(now) != 0 && reach_.is_usable(c.node)) {
+        return c.sent + std::chrono::ceil<milliseconds>(silence_of(c));
+    }
+    return c.sent + limit * 2;
 }
 
 milliseconds gossip::interval() const noexcept { return interval_among(others_.size()); }

@@ -58,7 +58,7 @@ class gossip : private deadline {
     static constexpr std::size_t random_contacts = 2;        ///< number of random nodes to ask
     static constexpr std::chrono::milliseconds limit{2'000}; ///< for a reply
     static constexpr unsigned max_failures = 2;              ///< in a row, before the node is replaced
-    static constexpr int turns_per_interval = 8;
+    static constexpr int turns_per_interval = reachability::turns_per_interval;
     static constexpr int turns_among_few = 4;            ///< if all others are asked
     static constexpr int intervals_of_rest = 2;          ///< after a failure
     static constexpr int intervals_of_stay = 30;         ///< of a random node
@@ -128,6 +128,7 @@ class gossip : private deadline {
     void choose_successor(time_point now);
     void choose_at_random(time_point now);
     void choose_neighbours(time_point now);
+    void choose(const membership::member& k, time_point now);
     void contact_bootstraps(time_point now);
     void call(contact& c, time_point now);
     void send_own_entry(contact& c, time_point now);
@@ -136,6 +137,7 @@ class gossip : private deadline {
     void end(contact& c, bool rests, time_point now);
     void sweep();
     void follow(time_point now);
+    [[nodiscard]] time_point due_of(const contact& c, time_point now) const;
 
     [[nodiscard]] std::chrono::milliseconds interval() const noexcept;
     [[nodiscard]] std::chrono::milliseconds search_pause() const noexcept;

@@ -29,8 +29,8 @@ class gossip_driver final : private gossip::client, public gossip {
         if (!what.describe.empty()) {
             adverbs.append(" describe=").append(what.describe);
         }
-        if (!what.routes.empty()) {
-            adverbs.append(" routes=").append(what.routes);
+        if (what.routes.distance != 0) {
+            adverbs.append(" routes=").append(std::to_string(what.routes.distance)).append(".").append(what.routes.by);
         }
         send(url, {.verb = verb::pull, .noun = "self:cles/peers", .adverbs = adverbs},
              reply_to(ticket, &gossip::on_answer));

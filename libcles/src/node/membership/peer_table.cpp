@@ -281,6 +281,14 @@ bool read_heartbeats(json_reader& r, std::size_t most, peer_table& out) {
     });
 }
 
+void write_owner(json_writer& w, const table_owner& who, std::string_view pool) {
+    write_member(w, "node", who.node);
+    write_member(w, "epoch", who.epoch);
+    if (!pool.empty()) {
+        write_member(w, "pool", pool);
+    }
+}
+
 bool read_route(json_reader& r, route_advert& out) {
     if (!r.begin_array() || !r.next_element() || !r.read(out.seq)) {
         return false;
@@ -331,11 +339,7 @@ void write_delta(json_writer& w, const table_owner& who, const membership& other
     const auto for_items = available > bytes_for_head ? available - bytes_for_head : 0;
     const auto p = page_of(items, others.latest_revision(), for_items, route_of, now);
     w.begin_object();
-    write_member(w, "node", who.node);
-    write_member(w, "epoch", who.epoch);
-    if (!others.pool().empty()) {
-        write_member(w, "pool", others.pool());
-    }
+    write_owner(w, who, others.pool());
     w.plain_key("peers");
     w.raw(p.peers);
     w.plain_key("beats");
@@ -361,9 +365,10 @@ void write_own_entry(json_writer& w, const incarnation& own, time_point now) {
     w.end_object();
 }
 
-void write_routes(json_writer& w, std::string_view node, const std::vector<peer_table::route>& routes) {
+void write_routes(json_writer& w, const table_owner& who, std::string_view pool,
+                  const std::vector<peer_table::route>& routes) {
     w.begin_object();
-    write_member(w, "node", node);
+    write_owner(w, who, pool);
     w.plain_key("peers");
     w.raw("[]");
     w.plain_key("routes");

@@ -7,6 +7,7 @@
 #include "node/membership/announcement.hpp"
 #include "node/membership/membership.hpp"
 #include "node/membership/route_table.hpp"
+#include "protocol/request_line.hpp"
 
 #include <chrono>
 #include <cstddef>
@@ -33,7 +34,7 @@ inline constexpr std::size_t max_pushed_entries = 64;
 struct table_question {
     std::string_view since;
     std::string_view describe{}; ///< epochs, separated by commas
-    std::string_view routes{};   ///< how far the need for routes spreads, and who asks: "8.car1"
+    protocol::routes_question routes{};
 };
 
 /// The node that replies.
@@ -70,7 +71,8 @@ struct peer_table {
 };
 
 /// Writes the body of `PUSH self:cles/peers` with routes that have changed.
-void write_routes(json_writer& w, std::string_view node, const std::vector<peer_table::route>& routes);
+void write_routes(json_writer& w, const table_owner& who, std::string_view pool,
+                  const std::vector<peer_table::route>& routes);
 
 /// How the entries of tables are written.
 enum class entry_form : std::uint8_t {

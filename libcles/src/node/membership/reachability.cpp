@@ -38,8 +38,8 @@ std::optional<unsigned> reachability::hops_to(std::string_view node) const {
 
 void reachability::add_routes(std::vector<peer>& all) const {
     for (auto& p : all) {
-        if (p.state != peer_state::clash && is_beyond(p.node)) {
-            p.via = next_hop_to(p.node, {});
+        if (auto hop = p.state == peer_state::clash ? p.node : next_hop_to(p.node, {}); hop != p.node) {
+            p.via = std::move(hop);
             p.hops = hops_to(p.node).value_or(0);
         }
     }

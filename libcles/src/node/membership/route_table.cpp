@@ -65,8 +65,7 @@ bool route_table::is_offered(std::string_view name, std::string_view neighbour) 
 }
 
 route_table::route route_table::in_use(std::string_view name, const usable_function& usable) const {
-    const auto at = destinations_.find(name);
-    const auto* const found = at == destinations_.end() ? nullptr : best(at->second, usable, {});
+    const auto* const found = find(name, usable);
     return found == nullptr ? route{} : *found;
 }
 
@@ -92,16 +91,20 @@ const route_table::offer* route_table::best(const destination& d, const usable_f
     return found;
 }
 
+const route_table::offer* route_table::find(std::string_view name, const usable_function& usable,
+                                            const std::function<bool(std::string_view)>& avoid) const {
+    const auto at = destinations_.find(name);
+    return at == destinations_.end() ? nullptr : best(at->second, usable, avoid);
+}
+
 std::string_view route_table::next_hop(std::string_view name, const usable_function& usable,
                                        const std::function<bool(std::string_view)>& avoid) const {
-    const auto at = destinations_.find(name);
-    const auto* const found = at == destinations_.end() ? nullptr : best(at->second, usable, avoid);
+    const auto* const found = find(name, usable, avoid);
     return found == nullptr ? std::string_view{} : std::string_view{found->by};
 }
 
 std::optional<unsigned> route_table::hops_to(std::string_view name, const usable_function& usable) const {
-    const auto at = destinations_.find(name);
-    const auto* const found = at == destinations_.end() ? nullptr : best(at->second, usable, {});
+    const auto* const found = find(name, usable);
     return found == nullptr ? std::nullopt : std::optional{found->hops + 1};
 }
 
@@ -112,7 +115,7 @@ route_advert route_table::advertise(std::string_view name, std::uint32_t epoch, 
         return {};
     }
     auto& d = direct ? entry_of(name, epoch) : at->second;
-    if (direct) { // no loop is possible, so the newest number counts, whoever told it
+    if (direct) { // no loop is possible, so the newest number counts, no matter which node stated it
         d.note_advertised(d.newest, 1);
         return {d.newest, 1};
     }

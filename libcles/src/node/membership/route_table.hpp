@@ -81,8 +81,12 @@ class route_table {
         void note_advertised(std::uint64_t s, unsigned h) noexcept;
     };
 
+    /// The route in use; null if there is none.
     [[nodiscard]] const offer* best(const destination& d, const usable_function& usable,
                                     const std::function<bool(std::string_view)>& avoid) const;
+    /// The same by name; null too if the destination is unknown.
+    [[nodiscard]] const offer* find(std::string_view name, const usable_function& usable,
+                                    const std::function<bool(std::string_view)>& avoid = {}) const;
     destination& entry_of(std::string_view name, std::uint32_t epoch);
 
     std::size_t max_destinations_;

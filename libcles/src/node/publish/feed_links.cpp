@@ -324,38 +324,38 @@ void feed_links::on_new_incarnation(std::string_view node, bool replaced) {
     }
 }
 
-void feed_links::on_route_lost(std::string_view node, std::string_view address) {
-    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> moved; // a completion may close others
+void feed_links::unbind_where(const std::function<bool(core::feed_machine&)>& concerns, const std::string& why,
+                              bool bind_at_once) {
+    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> found; // a completion may close others
     for (auto& feed : feeds_) {
-        const auto& e = feed.entry();
-        if (feed.is_bound() && feed.target() == node && e.terms.at.empty() && e.at == address) {
-            moved.emplace_back(&feed, e.handle);
+        if (feed.is_bound() && concerns(feed)) {
+            found.emplace_back(&feed, feed.entry().handle);
         }
     }
-    for (const auto& [feed, handle] : moved) {
+    for (const auto& [feed, handle] : found) {
         const auto alive = handle.lock();
-        if (alive && feed->is_bound()) {
-            unbind(*feed);
-            feed->on_lost("the route to " + std::string{node} + " has changed", host_.now());
+        if (!alive || !feed->is_bound()) {
+            continue;
+        }
+        unbind(*feed);
+        feed->on_lost(why, host_.now());
+        if (bind_at_once) {
             feed->expedite(host_.now());
         }
     }
 }
 
+void feed_links::on_route_lost(std::string_view node, std::string_view address) {
+    const auto concerns = [&](core::feed_machine& feed) {
+        const auto& e = feed.entry();
+        return feed.target() == node && e.terms.at.empty() && e.at == address;
+    };
+    unbind_where(concerns, "the route to " + std::string{node} + " has changed", true);
+}
+
 void feed_links::on_security_changed() {
-    std::vector<std::pair<core::feed_machine*, std::weak_ptr<void>>> refused; // a completion may close others
-    for (auto& feed : feeds_) {
-        if (feed.is_bound() && !is_permitted(feed)) {
-            refused.emplace_back(&feed, feed.entry().handle);
-        }
-    }
-    for (const auto& [feed, handle] : refused) {
-        const auto alive = handle.lock();
-        if (alive && feed->is_bound()) {
-            unbind(*feed);
-            feed->on_lost(host_.node().name + " may no longer bind it", host_.now());
-        }
-    }
+    unbind_where([this](core::feed_machine& feed) { return !is_permitted(feed); },
+                 host_.node().name + " may no longer bind it", false);
 }
 
 void feed_links::stop() {

@@ -48,6 +48,10 @@ class feed_links final : public core::feed_host {
         std::string_view text;            ///< the body, or the message of the failure
         std::optional<update_mark> mark{};
     };
+    /// Unbinds the bound feeds that it concerns, and reports why; they bind again after a pause, or at once.
+    void unbind_where(const std::function<bool(core::feed_machine&)>& concerns, const std::string& why,
+                      bool bind_at_once);
+
     /// Null: the feed or its service has been destroyed.
     using reply_function = std::function<void(local_node* host, const reply&)>;
     class feed_reply;

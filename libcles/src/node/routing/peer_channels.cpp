@@ -131,16 +131,10 @@ void peer_channel::dial() {
 void peer_channel::on_dialled(boost::system::error_code code, link_ptr made) {
     const auto keep = shared_from_this();
     give_up_ = nullptr;
-    auto* const routes = host_->node().gossip_responder;
+    host_->peer_channels().on_dialled(*this, code);
     if (code) {
-        if (routes != nullptr && code != errc::denied && code != boost::system::errc::too_many_files_open) {
-            host_->peer_channels().on_unreachable(*this);
-        }
         fail(code, "cannot connect to " + address_ + ": " + code.message());
     } else {
-        if (routes != nullptr) {
-            routes->reach().on_opened(address_);
-        }
         const auto c = host_->connections().adopt(std::move(made), connection::origin::dialled);
         links_.push_back(c);
         serve_waiting(c);
@@ -390,9 +384,17 @@ std::optional<peer_channels::place> peer_channels::discovered_place_of(std::stri
     return place{std::string{*where}, std::move(hop)};
 }
 
-void peer_channels::on_unreachable(peer_channel& channel) {
-    host_.node().gossip_responder->reach().on_unreachable(channel.address(), host_.now());
-    reroute(channel);
+void peer_channels::on_dialled(peer_channel& channel, boost::system::error_code code) {
+    auto* const routes = host_.node().gossip_responder;
+    if (routes == nullptr) {
+        return;
+    }
+    if (!code) {
+        routes->reach().on_opened(channel.address());
+    } else if (code != errc::denied && code != boost::system::errc::too_many_files_open) { // the link is not to blame
+        routes->reach().on_unreachable(channel.address(), host_.now());
+        reroute(channel);
+    }
 }
 
 void peer_channels::on_route_changed(std::string_view node) {

@@ -131,8 +131,10 @@ class peer_channels {
     void on_address_changed(std::string_view node);
     /// Requests for the node are sent elsewhere: moves those that wait for a link.
     void on_route_changed(std::string_view node);
-    /// No link could be opened to the channel's address: moves what can be sent by another route.
-    void on_unreachable(peer_channel& channel);
+    /// The nodes to which this one may have links have changed.
+    void on_links_changed() noexcept { recent_ = nullptr; }
+    /// A link has been opened to the channel's address, or could not be: then moves what can be sent by another route.
+    void on_dialled(peer_channel& channel, boost::system::error_code code);
     /// Resolves or fails the names that wait for discovery.
     void on_discovery_grace_over();
 

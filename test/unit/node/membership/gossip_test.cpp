@@ -26,6 +26,7 @@ struct fixture : cles::core::gossip::client, cles::core::membership::watcher {
         whos.push_back({ticket, std::string{url}, {}, {}});
     }
     void push(std::string_view url, std::string_view table) override { pushed[std::string{url}] = table; }
+    [[nodiscard]] bool forwards() const override { return true; }
     void release(std::string_view url) override { released.insert(std::string{url}); }
     void on_peer(std::string_view node, cles::core::membership::change what, std::string_view where) override {
         if (what == cles::core::membership::change::gone) {
@@ -443,6 +444,24 @@ BOOST_AUTO_TEST_CASE(seeds_may_be_changed_while_it_runs) {
     const auto all = take_asks_within(5ms);
     BOOST_REQUIRE(all.size() == 1U);
     BOOST_TEST(all[0].url == url_of(2));
+}
+
+BOOST_AUTO_TEST_CASE(a_route_that_a_neighbour_pushes_is_used_and_pushed_to_the_others) {
+    gossip.reach().allow_only({"car1", "car2"});
+    begin({url_of(1), url_of(2)});
+    live_among(3, 1s);
+    pushed.clear();
+    const auto push = [&](const std::string& epoch) {
+        return gossip.on_pushed_table(R"({"node":"car1","epoch":")" + epoch +
+                                          R"(","peers":[],"routes":{"00000003":[5,1]}})",
+                                      {"10.0.0.1", false}, clock.now());
+    };
+    BOOST_TEST(push("00000009")); // another incarnation
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}).empty());
+    BOOST_TEST(push("00000001"));
+    BOOST_TEST(gossip.reach().next_hop_to("car3", {}) == "car1");
+    BOOST_TEST(pushed[url_of(2)] == R"({"node":"car5","epoch":"00000005","peers":[],"routes":{"00000003":[5,2]}})");
+    BOOST_TEST(pushed[url_of(1)] == R"({"node":"car5","epoch":"00000005","peers":[],"routes":{"00000003":[5]}})");
 }
 
 BOOST_AUTO_TEST_SUITE_END()

@@ -92,7 +92,7 @@ BOOST_AUTO_TEST_CASE(a_route_is_not_advertised_to_the_neighbour_that_it_leads_th
     BOOST_TEST((advert("b") == route_advert{7, 2}));
 }
 
-BOOST_AUTO_TEST_CASE(of_a_node_with_a_link_the_newest_number_is_advertised_whoever_stated_it) {
+BOOST_AUTO_TEST_CASE(of_a_node_with_a_link_the_newest_known_number_is_advertised) {
     BOOST_TEST((advert("a", true) == route_advert{0, 1}));
     offer("a", 9, 4);
     BOOST_TEST((advert("a", true) == route_advert{9, 1}));
