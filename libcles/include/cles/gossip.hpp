@@ -16,7 +16,7 @@ struct gossip_options {
     /// reach. Addresses are better than host names, which have to be resolved. A node that is a seed of others needs
     /// none.
     std::vector<std::string> seeds{};
-    /// The names of the only nodes that this one may have links to, at most 16; empty: all. Others that gossip respect
+    /// The names of the only nodes that this one may have links to, 16 at most; empty: all. Others that gossip respect
     /// it: they learn it from this node's announcements. A URL that is configured for a node is used all the same.
     /// Requests for nodes further away, and from them, pass through nodes that route (docs/protocol.md, "Routes").
     std::vector<std::string> links{};
