@@ -11,6 +11,7 @@
 #include "daemon/daemon_log.hpp"
 #include "daemon/daemon_security.hpp"
 #include "daemon/service_manager.hpp"
+#include "isolation/plugin_process_main.hpp"
 #include "plugins/plugin_trial.hpp"
 
 #include <boost/asio/io_context.hpp>
@@ -162,6 +163,9 @@ int start(int argc, const char* const* argv) {
 int main(int argc, char** argv) {
     using namespace cles::runtime;
     set_up_signals();
+    if (is_plugin_process(argc, argv)) {
+        return run_plugin_process(argc, argv);
+    }
     try {
         return start(argc, argv);
     } catch (const usage_error& e) {

@@ -8,8 +8,8 @@
 #include <cles/run.hpp>
 #include <cles/service.hpp>
 
-#include "daemon/daemon.hpp"
 #include "delegate_load.hpp"
+#include "job_daemon.hpp"
 #include "perf/baseline/exchange.hpp"
 #include "perf/support/child_process.hpp"
 #include "perf/support/latency_recorder.hpp"
@@ -29,12 +29,9 @@
 #include <string_view>
 #include <vector>
 
-#include <sched.h>
-
 namespace {
 
 namespace perf = cles::perf;
-namespace runtime = cles::runtime;
 
 constexpr std::size_t singles = 5'000;
 constexpr std::size_t many = 200'000;
@@ -78,28 +75,6 @@ options read(std::span<char*> arguments) {
 
 cles::run_options polling(const options& o) { return {.busy_poll = std::chrono::microseconds{o.busy_poll_us}}; }
 
-/// \param cores where its threads may run
-void run_daemon(const options& o, const std::vector<int>& cores, const perf::child_process::announce& announce) {
-    cpu_set_t allowed;
-    CPU_ZERO(&allowed);
-    for (const auto core : cores) {
-        CPU_SET(static_cast<unsigned>(core), &allowed);
-    }
-    ::sched_setaffinity(0, sizeof allowed, &allowed);
-    auto setup = runtime::default_config("car1", 1);
-    setup.listen = {"tcp://127.0.0.1:0"};
-    setup.multicast = {};
-    setup.workers = o.workers;
-    setup.plugins = {{.path = o.plugin}};
-    setup.log.level = cles::log_level::warning;
-    runtime::daemon_log log{setup.node, setup.log};
-    const runtime::service_manager nobody{""};
-    boost::asio::io_context io{1};
-    runtime::daemon car{io, setup, {}, log, nobody};
-    announce(car.endpoints().front());
-    cles::run(io, polling(o));
-}
-
 double median(std::vector<double> of) {
     const auto middle = of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2);
     std::nth_element(of.begin(), middle, of.end());
@@ -114,8 +89,9 @@ int measure(const options& o) {
                                  packets.run();
                              }};
     const auto cores = o.spread ? perf::usable_cores() : std::vector{ends.server};
-    perf::child_process node{ends.server,
-                             [&](const perf::child_process::announce& announce) { run_daemon(o, cores, announce); }};
+    perf::child_process node{ends.server, [&](const perf::child_process::announce& announce) {
+                                 perf::run_daemon({.path = o.plugin}, o.workers, cores, polling(o), announce);
+                             }};
     perf::icd::client by_hand{cles::parse_url(hand.announced())};
     perf::pin_to(ends.client);
     boost::asio::io_context io{1};

@@ -76,10 +76,10 @@ class Top(unittest.TestCase):
         code, out, err = cles("top", "-n", "2", "-i", "200ms", "-o", "table", env=ENVIRONMENT)
         self.assertEqual((code, err), (0, ""))
         first, second = out.split("\n\n")
-        self.assertEqual(first.splitlines()[0].split(), ["NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S",
-                                                         "ERR/S", "P50", "P99", "LAST", "SEEN"])
-        self.assertRegex(first.splitlines()[1], r"^car1 +live +- +0 +0 +- +- ")
-        self.assertRegex(second.splitlines()[1], r"^car1 +live +- +0 +0 +0 +0 ")
+        self.assertEqual(first.splitlines()[0].split(), ["NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "OUT",
+                                                         "IN", "REQ/S", "ERR/S", "P50", "P99", "LAST", "SEEN"])
+        self.assertRegex(first.splitlines()[1], r"^car1 +live +- +0 +0 +0 +0 +- +- ")
+        self.assertRegex(second.splitlines()[1], r"^car1 +live +- +0 +0 +0 +0 +0 +0 ")
 
     def test_a_node_and_those_that_it_knows(self):
         nodes = self.watch("-n", "1", "--at", self.nodes[0].url, "--sort", "name")[0]

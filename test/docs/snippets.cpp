@@ -52,6 +52,7 @@ void the_links_of_a_node(cles::service_options& options) {
 
 void a_load(cles::service_options& options, const own_pool& pool);
 std::string plan_a_way(position there);
+void record_camera(const cles::request& asked);
 void a_task_to_repeat(cles::registrar& tasks);
 void handlers(cles::service& car, position& target, std::array<double, 4>& tyres);
 asio::awaitable<void> asking(cles::service& car);
@@ -171,6 +172,10 @@ void a_load(cles::service_options& options, const own_pool& pool) {
 
 void a_task_to_repeat(cles::registrar& tasks) {
     tasks.on_delegate("plan", plan_a_way, {.description = "A way there", .idempotent = true});
+}
+
+void a_task_that_stays(cles::registrar& tasks) {
+    tasks.on_delegate("record", record_camera, {.description = "Records the camera", .local = true});
 }
 
 void blocking(cles::service& me) {

@@ -311,4 +311,22 @@ BOOST_DATA_TEST_CASE(a_completion_may_destroy_the_service_that_calls_it, carrier
     }
 }
 
+BOOST_AUTO_TEST_CASE(a_handler_may_remove_its_own_task) {
+    nodes n;
+    const auto shared = std::make_shared<std::string>("not destroyed");
+    n.car->on_pull("speed", [&car = *n.car, shared] {
+        const bool first = car.remove(cles::verb::pull, "speed");
+        const bool second = car.remove(cles::verb::pull, "speed");
+        return std::to_string(int{first}) + std::to_string(int{second}) + *shared;
+    });
+    n.car->on_push("speed", [] {});
+    auto peer = n.peer();
+    BOOST_TEST(peer.ask("PULL self:speed") == R"({"value":"10not destroyed"})");
+    BOOST_TEST(peer.ask("PULL self:speed").starts_with(R"({"error":"no_task")"));
+    BOOST_TEST(peer.ask("PUSH self:speed") == "{}");
+    BOOST_TEST(shared.use_count() == 1);
+    n.car->on_pull("speed", [] { return 7; });
+    BOOST_TEST(peer.ask("PULL self:speed") == R"({"value":7})");
+}
+
 BOOST_AUTO_TEST_SUITE_END()

@@ -75,7 +75,9 @@ EXCEPTIONS: dict[str, set[str]] = {
     "perf/tls/roster_spread.cpp": {"security", "test"},  # makes a fleet of its own, in a folder as tests have
     "perf/tls/tls_cost.cpp": {"security", "tls"},  # the same
     "perf/tls/tls_links.cpp": {"security", "test", "tls"},  # the same
-    "perf/jobs/job_cost.cpp": {"runtime"},  # measures a daemon in a process of its own
+    "perf/jobs/isolation_cost.cpp": {"runtime"},  # its daemon runs it as the process of a plugin
+    "perf/jobs/job_daemon.cpp": {"runtime"},  # a daemon that is measured, in a process of its own
+    "perf/jobs/job_daemon.hpp": {"runtime"},  # the same
 }
 
 # Headers for I/O, waiting or threads: forbidden in sans-I/O layers, where time is a parameter.

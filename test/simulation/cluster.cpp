@@ -29,7 +29,7 @@ std::string name_of(unsigned host) { return "car" + std::to_string(host); }
 
 class cluster final : public node_hosts {
   public:
-    cluster(std::uint64_t seed, planted fault) : node_hosts(seed, fault) {
+    cluster(std::uint64_t seed, planted fault, bool sharing) : node_hosts(seed, fault), sharing_(sharing) {
         start(hub_host);
         start(client_host);
         for (const auto host : workers) {
@@ -89,10 +89,13 @@ class cluster final : public node_hosts {
                               .multicast = host != client_host,
                               .load = is_worker ? [this, host] { return pools_[host]->load(); }
                                                 : std::function<node_load()>{},
-                              .routing = host == hub_host ? cles::routing() : nullptr});
+                              .routing = host == hub_host || (is_worker && sharing_) ? cles::routing() : nullptr});
         nodes_[host] = n;
         if (is_worker) {
             pools_[host] = std::make_shared<work_pool>(*n);
+            if (sharing_) {
+                pools_[host]->share();
+            }
             offer(*n, pools_[host]);
         }
         n->start();
@@ -121,6 +124,7 @@ class cluster final : public node_hosts {
 
     void end_run(node_run& n) override {
         if (const auto pool = pools_.find(n.host()); pool != pools_.end()) {
+            report_.moved += pool->second->sent() - pool->second->returned();
             pool->second->crash();
         }
         n.crash();
@@ -252,9 +256,11 @@ class cluster final : public node_hosts {
         }
         for (const auto& [host, pool] : pools_) {
             pool->check_rest();
+            report_.moved += pool->sent() - pool->returned();
         }
     }
 
+    const bool sharing_;
     std::map<unsigned, std::shared_ptr<work_pool>> pools_;
     std::map<std::uint32_t, asked> asked_;
     std::shared_ptr<core::call> kept_; // by a planted fault
@@ -265,8 +271,8 @@ class cluster final : public node_hosts {
 
 } // namespace
 
-cluster_report simulate_cluster(std::uint64_t seed, seconds trouble, planted fault) {
-    return cluster{seed, fault}.live(trouble);
+cluster_report simulate_cluster(std::uint64_t seed, seconds trouble, planted fault, bool sharing) {
+    return cluster{seed, fault, sharing}.live(trouble);
 }
 
 } // namespace cles::simulation

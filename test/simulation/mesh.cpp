@@ -4,19 +4,15 @@
 #include <cles/gossip.hpp>
 #include <cles/routing.hpp>
 
-#include "node/membership/announcement.hpp"
 #include "node/membership/gossip.hpp"
 #include "simulation/world/node_hosts.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -29,90 +25,13 @@ using std::chrono::seconds;
 constexpr milliseconds request_limit{2000};
 constexpr milliseconds until_answered{2500};
 
-std::string mesh_name(unsigned host) { return "n" + std::to_string(host); }
-
-/// Links between hosts.
-class graph {
-  public:
-    explicit graph(unsigned nodes) : neighbours_(nodes) {}
-
-    static graph of(const mesh_setup& setup, dice& chance);
-
-    [[nodiscard]] unsigned size() const noexcept { return static_cast<unsigned>(neighbours_.size()); }
-    [[nodiscard]] const std::set<unsigned>& of(unsigned host) const { return neighbours_.at(host); }
-    [[nodiscard]] bool has(unsigned a, unsigned b) const { return neighbours_.at(a).contains(b); }
-    void add(unsigned a, unsigned b) {
-        neighbours_.at(a).insert(b);
-        neighbours_.at(b).insert(a);
-    }
-    void remove(unsigned a, unsigned b) {
-        neighbours_.at(a).erase(b);
-        neighbours_.at(b).erase(a);
-    }
-    /// The number of links from one host to each other; nothing where no route leads.
-    [[nodiscard]] std::vector<std::optional<unsigned>> distances(unsigned from) const;
-    [[nodiscard]] bool is_connected() const {
-        const auto all = distances(0);
-        return std::ranges::all_of(all, [](const auto& each) { return each.has_value(); });
-    }
-
-  private:
-    std::vector<std::set<unsigned>> neighbours_;
-};
-
-graph graph::of(const mesh_setup& setup, dice& chance) {
-    graph g{setup.nodes};
-    const auto side = static_cast<unsigned>(std::lround(std::sqrt(setup.nodes)));
-    for (unsigned i = 1; i < setup.nodes; ++i) {
-        switch (setup.form) {
-        case mesh_form::line:
-        case mesh_form::ring: g.add(i - 1, i); break;
-        case mesh_form::star: g.add(0, i); break;
-        case mesh_form::grid:
-            if (i % side != 0) {
-                g.add(i - 1, i);
-            }
-            if (i >= side) {
-                g.add(i - side, i);
-            }
-            break;
-        case mesh_form::random: g.add(chance.below(i), i); break;
-        }
-    }
-    if (setup.form == mesh_form::ring) {
-        g.add(setup.nodes - 1, 0);
-    }
-    if (setup.form == mesh_form::random) {
-        for (unsigned links = setup.nodes - 1; links < setup.nodes * setup.mean_degree / 2;) {
-            const auto a = chance.below(setup.nodes);
-            const auto b = chance.below(setup.nodes);
-            if (a != b && !g.has(a, b) && g.of(a).size() < core::max_links && g.of(b).size() < core::max_links) {
-                g.add(a, b);
-                ++links;
-            }
-        }
-    }
-    return g;
-}
-
-std::vector<std::optional<unsigned>> graph::distances(unsigned from) const {
-    std::vector<std::optional<unsigned>> found(size());
-    found[from] = 0;
-    for (std::deque<unsigned> open{from}; !open.empty(); open.pop_front()) {
-        for (const auto next : neighbours_[open.front()]) {
-            if (!found[next]) {
-                found[next] = *found[open.front()] + 1;
-                open.push_back(next);
-            }
-        }
-    }
-    return found;
-}
+unsigned host_of(std::string_view name) { return static_cast<unsigned>(std::stoul(std::string{name.substr(1)})); }
 
 class mesh final : public node_hosts {
   public:
     mesh(std::uint64_t seed, const mesh_setup& setup, planted fault)
-        : node_hosts(seed, fault), setup_(setup), links_(graph::of(setup, chance_)), all_links_(links_) {
+        : node_hosts(seed, fault), setup_(setup),
+          links_(graph::of(setup.form, setup.nodes, setup.mean_degree, chance_)), all_links_(links_) {
         if (!setup.declared) {
             net_.connect_only([this](unsigned a, unsigned b) { return all_links_.has(a, b); });
         }
@@ -126,6 +45,7 @@ class mesh final : public node_hosts {
 
     mesh_report live() {
         report_.converged = pass_until_shortest();
+        measure_traffic();
         for (unsigned i = 0; i < setup_.requests; ++i) {
             ask_anyone(any_host());
         }
@@ -209,16 +129,26 @@ class mesh final : public node_hosts {
         return std::chrono::duration_cast<milliseconds>(time_.now() - begun);
     }
 
+    // Of an interval without changes.
+    void measure_traffic() {
+        pass(interval());
+        const auto before = net_.arrived();
+        pass(interval());
+        report_.bytes = (net_.arrived().all - before.all) / setup_.nodes;
+        report_.bytes_of_routes = (net_.arrived().routes - before.routes) / setup_.nodes;
+    }
+
     milliseconds interval() const { return core::interval_among(links_.size() - 1); }
 
-    // Silently: what is sent there is lost. Within one interval, its ends have to reach each other again, and within
-    // two all others: a longer way round waits for the destinations' next numbers.
+    // Silently: what is sent there is lost. Within one interval, requests between any two nodes have to find another
+    // way, those between its ends by being sent.
     void lose_a_link() {
         const auto lost = any_link_to_spare();
         if (!lost) {
             return;
         }
         const auto [a, b] = *lost;
+        const auto cut = pairs_over(a, b);
         net_.part(a, b, time_point::max());
         links_.remove(a, b);
         const auto begun = time_.now();
@@ -228,12 +158,67 @@ class mesh final : public node_hosts {
             watcher_.broken(rule::routes_found, "requests from " + mesh_name(a) + " to " + mesh_name(b) +
                                                     " found no other way in " + std::to_string(first.count()) + " ms");
         }
-        pass(std::max(milliseconds{0}, std::chrono::duration_cast<milliseconds>(begun + 2 * interval() - time_.now())));
+        pass_until_rerouted(cut, begun);
         for (unsigned i = 0; i < setup_.requests / 4; ++i) {
             ask_anyone(any_host());
         }
         pass(until_answered);
         pass_until_shortest();
+    }
+
+    using pair_of_hosts = std::pair<unsigned, unsigned>;
+
+    /// The hosts on the way of a request now, as far as it gets.
+    std::vector<unsigned> way(pair_of_hosts ends) {
+        std::vector<unsigned> on_it{ends.first};
+        for (std::string via; on_it.back() != ends.second && on_it.size() < core::route_table::max_hops;) {
+            const auto at = on_it.back();
+            const auto hop = node(at)->node()->gossip_responder->reach().next_hop_to(mesh_name(ends.second), via);
+            if (hop.empty() || !links_.has(at, host_of(hop))) {
+                break;
+            }
+            on_it.push_back(host_of(hop));
+            via.append(via.empty() ? "" : ",").append(mesh_name(at));
+        }
+        return on_it;
+    }
+
+    std::vector<pair_of_hosts> pairs_over(unsigned a, unsigned b) {
+        std::vector<pair_of_hosts> found;
+        for (unsigned from = 0; from < links_.size(); ++from) {
+            for (unsigned to = 0; to < links_.size(); ++to) {
+                const auto on_it = from == to ? std::vector<unsigned>{} : way({from, to});
+                for (std::size_t i = 1; i < on_it.size(); ++i) {
+                    if (std::minmax(on_it[i - 1], on_it[i]) == std::minmax(a, b)) {
+                        found.emplace_back(from, to);
+                    }
+                }
+            }
+        }
+        return found;
+    }
+
+    // Until a request between any of them would have got there for the rest of the second interval.
+    void pass_until_rerouted(std::vector<pair_of_hosts> cut, time_point begun) {
+        auto last = milliseconds{0};
+        std::size_t late = 0;
+        while (time_.now() < begun + 2 * interval()) {
+            pass(milliseconds{20});
+            const auto took = std::chrono::duration_cast<milliseconds>(time_.now() - begun);
+            const auto lost =
+                std::ranges::count_if(cut, [this](const auto& ends) { return way(ends).back() != ends.second; });
+            if (lost != 0) {
+                last = took;
+                late = took > interval() ? std::max(late, static_cast<std::size_t>(lost)) : late;
+            }
+        }
+        report_.cut += cut.size();
+        report_.all_rerouted = std::max(report_.all_rerouted, last);
+        if (late != 0) {
+            watcher_.broken(rule::routes_found, std::to_string(late) + " of " + std::to_string(cut.size()) +
+                                                    " pairs without their link found no other way in " +
+                                                    std::to_string(last.count()) + " ms");
+        }
     }
 
     // The ends of a link that is lost send each other requests until one is answered.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: BSL-1.0
 #pragma once
 
+#include "simulation/network/graph.hpp"
 #include "simulation/network/planted.hpp"
 #include "simulation/world/witness.hpp"
 
@@ -10,9 +11,6 @@
 #include <vector>
 
 namespace cles::simulation {
-
-/// Which nodes of a mesh have links to each other.
-enum class mesh_form : std::uint8_t { line, ring, star, grid, random };
 
 /// A mesh to simulate.
 struct mesh_setup {
@@ -30,6 +28,10 @@ struct mesh_report {
     std::vector<violation> violations;
     std::chrono::milliseconds converged{0}; ///< until all nodes had the shortest routes to all others
     std::chrono::milliseconds rerouted{0};  ///< the longest time from the loss of a link to the first reply by another
+    std::chrono::milliseconds all_rerouted{0}; ///< the longest time from there until all pairs over it had another way
+    std::size_t cut = 0;                       ///< how many these were
+    std::uint64_t bytes = 0;                   ///< received by a node in an interval without changes, on average
+    std::uint64_t bytes_of_routes = 0;         ///< among them
     std::size_t asked = 0;
     std::size_t answered = 0;
     unsigned longest = 0; ///< route, in links
@@ -37,7 +39,7 @@ struct mesh_report {
 
 /// Simulates nodes that route for each other in virtual time, where most have no link to each other. The routes have to
 /// become the shortest ones. Then links are lost silently and nodes crash; requests have to find another way
-/// within two intervals, between the ends of the lost link within one, and none may run twice.
+/// within one interval, and none may run twice.
 mesh_report simulate_mesh(std::uint64_t seed, const mesh_setup& setup, planted fault = planted::none);
 
 } // namespace cles::simulation

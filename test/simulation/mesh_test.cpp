@@ -24,8 +24,9 @@ void hold(std::uint64_t seed, const mesh_setup& setup) {
     }
     BOOST_TEST(r.answered != 0U);
     BOOST_TEST_MESSAGE("seed " << seed << ": converged in " << r.converged.count() << " ms, rerouted in "
-                               << r.rerouted.count() << " ms, longest route " << r.longest << ", " << r.answered
-                               << " of " << r.asked << " answered");
+                               << r.rerouted.count() << " ms, all " << r.cut << " pairs in " << r.all_rerouted.count()
+                               << " ms, longest route " << r.longest << ", " << r.answered << " of " << r.asked
+                               << " answered");
 }
 
 /// A line with this fault violates that rule, perhaps others too.

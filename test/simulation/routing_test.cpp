@@ -50,6 +50,25 @@ BOOST_AUTO_TEST_CASE(whatever_happens_each_request_ends_once_in_its_time_and_non
     BOOST_TEST(refused > 0U); // queues were full
 }
 
+BOOST_AUTO_TEST_CASE(the_same_holds_for_workers_that_share_their_jobs) {
+    std::size_t succeeded = 0;
+    std::size_t failed = 0;
+    std::size_t moved = 0;
+    for (std::uint64_t seed = 1; seed <= lives; ++seed) {
+        const auto r = simulate_cluster(seed, trouble, planted::none, true);
+        for (const auto& v : r.violations) {
+            BOOST_ERROR("seed " << seed << ": " << to_string(v.broken) << ": " << v.what);
+        }
+        succeeded += r.succeeded;
+        failed += r.failed;
+        moved += r.moved;
+    }
+    BOOST_TEST_MESSAGE(std::to_string(succeeded) + " succeeded, " + std::to_string(failed) + " failed, " +
+                       std::to_string(moved) + " jobs moved");
+    BOOST_TEST(succeeded > failed);
+    BOOST_TEST(moved > 10 * lives);
+}
+
 BOOST_AUTO_TEST_CASE(a_way_that_repeats_requests_is_found) { finds(planted::way_repeats, rule::effects_once); }
 BOOST_AUTO_TEST_CASE(a_timer_that_is_late_is_found) { finds(planted::timer_late, rule::ends_in_time); }
 BOOST_AUTO_TEST_CASE(a_queue_without_bounds_is_found) { finds(planted::queue_boundless, rule::bounded); }

@@ -55,6 +55,13 @@ std::string time_text(const std::optional<double>& us) {
     return *us < 999'995 ? fixed(*us / 1e3, 2) + " ms" : fixed(*us / 1e6, 2) + " s";
 }
 
+void write_count(cles::json_writer& w, std::string_view name, const std::optional<std::uint64_t>& value) {
+    if (value) {
+        w.key(name);
+        w.value(*value);
+    }
+}
+
 void write_rate(cles::json_writer& w, std::string_view name, const std::optional<double>& value) {
     if (value) {
         w.key(name);
@@ -74,7 +81,8 @@ node_rate node_rates::update(const std::string& run, std::string_view metrics, t
     }
     current.errors = number_in<std::uint64_t>(document.find("errors")).value_or(0);
 
-    node_rate out;
+    node_rate out{.moved_out = number_in<std::uint64_t>(document.find("jobs_moved_out")),
+                  .moved_in = number_in<std::uint64_t>(document.find("jobs_moved_in"))};
     if (const auto* times = document.find("handler_us");
         times != nullptr && number_in<std::uint64_t>(times->find("samples")).value_or(0) > 0) {
         out.p50_us = number_in<double>(times->find("p50"));
@@ -120,7 +128,8 @@ std::string summary_of(const std::vector<top_row>& rows) {
 }
 
 std::string to_table(const std::vector<top_row>& rows) {
-    table out{"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "REQ/S", "ERR/S", "P50", "P99", "LAST SEEN"};
+    table out{"NODE", "STATE", "WORKERS", "RUNNING", "QUEUED", "OUT",
+              "IN",   "REQ/S", "ERR/S",   "P50",     "P99",    "LAST SEEN"};
     const auto number = [&](std::size_t column, std::string text) { out.set(column, std::move(text), true); };
     for (const auto& row : rows) {
         const auto& node = row.node;
@@ -130,11 +139,13 @@ std::string to_table(const std::vector<top_row>& rows) {
         number(2, node.load && node.load->workers != 0 ? std::to_string(node.load->workers) : "-");
         number(3, node.load ? std::to_string(node.load->running) : "-");
         number(4, node.load ? std::to_string(node.load->queued) : "-");
-        number(5, number_text(row.rate.requests, 0));
-        number(6, number_text(row.rate.errors, 0));
-        number(7, time_text(row.rate.p50_us));
-        number(8, time_text(row.rate.p99_us));
-        out.set(9, node.last_seen() + (node.error.empty() ? "" : " (" + printable(node.error) + ")"));
+        number(5, row.rate.moved_out ? std::to_string(*row.rate.moved_out) : "-");
+        number(6, row.rate.moved_in ? std::to_string(*row.rate.moved_in) : "-");
+        number(7, number_text(row.rate.requests, 0));
+        number(8, number_text(row.rate.errors, 0));
+        number(9, time_text(row.rate.p50_us));
+        number(10, time_text(row.rate.p99_us));
+        out.set(11, node.last_seen() + (node.error.empty() ? "" : " (" + printable(node.error) + ")"));
     }
     return out.text();
 }
@@ -155,6 +166,8 @@ std::string to_json(const std::vector<top_row>& rows) {
             w.key("load");
             write_load(w, *row.node.load);
         }
+        write_count(w, "jobs_moved_out", row.rate.moved_out);
+        write_count(w, "jobs_moved_in", row.rate.moved_in);
         write_rate(w, "requests_per_s", row.rate.requests);
         write_rate(w, "errors_per_s", row.rate.errors);
         write_rate(w, "handler_p50_us", row.rate.p50_us);

@@ -13,12 +13,14 @@
 
 namespace tool {
 
-/// The rates of a node, from two of its answers to PULL self:cles/metrics.
+/// What a node has counted, from its last two answers to PULL self:cles/metrics.
 struct node_rate {
     std::optional<double> requests{}; ///< per second, without those of this command; nothing after one answer
     std::optional<double> errors{};   ///< per second
     std::optional<double> p50_us{};   ///< run time of handlers, since the start of the node
     std::optional<double> p99_us{};
+    std::optional<std::uint64_t> moved_out{}; ///< jobs that other nodes ran, since the start of the node
+    std::optional<std::uint64_t> moved_in{};  ///< jobs of other nodes that it ran
 };
 
 /// Keeps the last answer of each node.

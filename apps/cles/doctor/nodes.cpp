@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <set>
 #include <string>
 #include <utility>
@@ -100,6 +101,37 @@ void check_rosters(const std::vector<listed_node>& nodes, const std::vector<node
     }
 }
 
+struct isolated_plugin {
+    std::string name;
+    std::string state;
+};
+BOOST_DESCRIBE_STRUCT(isolated_plugin, (), (name, state))
+
+struct stated_plugins {
+    std::optional<std::vector<isolated_plugin>> isolated; // only of daemons that have some
+};
+BOOST_DESCRIBE_STRUCT(stated_plugins, (), (isolated))
+
+// Plugins whose processes have ended so often that the daemon does not start them again.
+asio::awaitable<void> check_plugins(client& requester, const std::vector<listed_node>& nodes, findings& found) {
+    auto urls = urls_of(nodes);
+    const auto answers = co_await ask_all(requester, "self:cles/metrics", std::move(urls), query_timeout);
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+        stated_plugins stated;
+        if (!answers[i].error.empty() || !cles::from_json(answers[i].json, stated)) {
+            continue; // it may not be allowed
+        }
+        for (const auto& plugin : stated.isolated.value_or(std::vector<isolated_plugin>{})) {
+            if (plugin.state == "withdrawn") {
+                found.warning("nodes",
+                              "the tasks of the plugin " + plugin.name + " of " + nodes[i].node +
+                                  " are withdrawn, because its process ended too often",
+                              "the log of " + nodes[i].node + " says why; SIGHUP starts it again");
+            }
+        }
+    }
+}
+
 // The nodes know of a name conflict sooner than this command, which has just started.
 asio::awaitable<void> check_names(client& requester, const std::vector<listed_node>& nodes, findings& found) {
     auto urls = urls_of(nodes);
@@ -183,6 +215,7 @@ asio::awaitable<void> check_nodes(client& requester, const address_book& address
         check_rosters(nodes, answers, found);
     }
     co_await check_names(requester, nodes, found);
+    co_await check_plugins(requester, nodes, found);
     co_await compare_clocks(requester, nodes, found);
 }
 

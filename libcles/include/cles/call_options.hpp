@@ -23,10 +23,7 @@ class call_options {
         return *this;
     }
     /// The URL to send it to, instead of looking up the target's name.
-    call_options& at(std::string_view url) {
-        at_ = url;
-        return *this;
-    }
+    call_options& at(std::string_view url);
     /// Marks a small request that must not wait behind large ones: it uses a separate link, and its reply is sent
     /// before others that wait at the peer. A peer that does not know the adverb `urgent` sends the reply in the normal
     /// order.
@@ -76,18 +73,9 @@ class bind_options : public call_options {
         multicast_ = wanted;
         return *this;
     }
-    bind_options& deadline(std::chrono::milliseconds limit) {
-        call_options::deadline(limit);
-        return *this;
-    }
-    bind_options& at(std::string_view url) {
-        call_options::at(url);
-        return *this;
-    }
-    bind_options& diagnostics(std::string& text) {
-        call_options::diagnostics(text);
-        return *this;
-    }
+    bind_options& deadline(std::chrono::milliseconds limit);
+    bind_options& at(std::string_view url);
+    bind_options& diagnostics(std::string& text);
 
     std::chrono::milliseconds every_{0};
     std::uint32_t keep_ = 0;

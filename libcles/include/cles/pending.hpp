@@ -34,6 +34,8 @@ class pending {
         static_cast<void>(mark);
         return offer(json);
     }
+    /// As `offer`, for a reply with which the peer grants a slot (<cles/sharing.hpp>).
+    virtual verdict offer_granted(std::string_view json, std::uint64_t /*grant*/) { return offer(json); }
     virtual void fail(boost::system::error_code code, std::string_view message) = 0;
     /// As `fail`, for a failure reported by the peer; `answer` is its whole reply.
     virtual void refuse(boost::system::error_code code, std::string_view message, std::string_view answer) {

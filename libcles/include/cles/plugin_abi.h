@@ -34,7 +34,7 @@ extern "C" {
 #endif
 
 #define CLES_PLUGIN_ABI_MAJOR 1u
-#define CLES_PLUGIN_ABI_MINOR 2u
+#define CLES_PLUGIN_ABI_MINOR 3u
 /* The name of the entry point, as text. */
 #define CLES_PLUGIN_ENTRY "cles_plugin_v1"
 
@@ -89,6 +89,9 @@ typedef struct cles_request {
 /* Since 1.2: requests of the task, except CLES_BIND, run only with the signature of a member of the fleet, and updates
  * of its nouns are signed. An older host ignores this: a plugin that adds such a task checks the host's `abi_minor`. */
 #define CLES_TASK_SIGNED 4u
+
+/* Since 1.3: the task's jobs are not moved to other nodes. An older host ignores this, and moves none. */
+#define CLES_TASK_LOCAL 8u
 
 /* A task that the plugin adds. The host copies it. */
 typedef struct cles_task {

@@ -134,18 +134,18 @@ class plugin_registrar final : public registrar {
         const auto name = task.task;
         const auto verb = task.verb;
         tasks_.push_back(std::make_unique<plugin_task>(host_, std::move(task)));
-        const cles_task crossing{.size = sizeof(cles_task),
-                                 .verb = static_cast<std::uint32_t>(verb),
-                                 .name = abi_text(name),
-                                 .description = abi_text(info.description),
-                                 .parameters = parameters.data(),
-                                 .parameter_count = parameters.size(),
-                                 .flags = (info.idempotent ? CLES_TASK_IDEMPOTENT : 0U) |
-                                          (info.inline_ok ? CLES_TASK_INLINE_OK : 0U) |
-                                          (info.must_be_signed ? CLES_TASK_SIGNED : 0U),
-                                 .reserved = 0,
-                                 .start = handled ? &plugin_task::start : nullptr,
-                                 .user = tasks_.back().get()};
+        const cles_task crossing{
+            .size = sizeof(cles_task),
+            .verb = static_cast<std::uint32_t>(verb),
+            .name = abi_text(name),
+            .description = abi_text(info.description),
+            .parameters = parameters.data(),
+            .parameter_count = parameters.size(),
+            .flags = (info.idempotent ? CLES_TASK_IDEMPOTENT : 0U) | (info.inline_ok ? CLES_TASK_INLINE_OK : 0U) |
+                     (info.must_be_signed ? CLES_TASK_SIGNED : 0U) | (info.local ? CLES_TASK_LOCAL : 0U),
+            .reserved = 0,
+            .start = handled ? &plugin_task::start : nullptr,
+            .user = tasks_.back().get()};
         switch (host_.add_task(&host_, &crossing)) {
         case CLES_ADDED: return;
         case CLES_TASK_EXISTS: throw error(errc::already_registered, what);

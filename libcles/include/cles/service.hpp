@@ -100,6 +100,7 @@ class service;
 namespace detail {
 
 class engine; // the implementation of the service
+struct sharing_access;
 
 /// A completion token, as opposed to the options that may precede it.
 template <class T>
@@ -292,6 +293,9 @@ class service : public registrar {
     void stop();
 
     void add(registration task) override;
+    /// Stops offering a task: from now on its requests fail with `no_task`, and other nodes are told. Requests that
+    /// have started are still answered. What it has published stays (`retire`). False if there is no such task.
+    bool remove(cles::verb verb, std::string_view task);
     [[nodiscard]] publisher make_publisher() override;
 
     /// Publishes a value to all subscribers of the task (or of "task/parameter/..."), and keeps it as the last value.
@@ -511,6 +515,7 @@ class service : public registrar {
     [[nodiscard]] bool on_strand() const noexcept;
 
     friend detail::awaited_request;
+    friend detail::sharing_access;
     template <class T>
     friend struct detail::bind_coroutine;
 

@@ -12,4 +12,24 @@ call_options& call_options::on_progress(std::function<void(double, std::string_v
     return *this;
 }
 
+call_options& call_options::at(std::string_view url) {
+    at_ = url;
+    return *this;
+}
+
+bind_options& bind_options::deadline(std::chrono::milliseconds limit) {
+    call_options::deadline(limit);
+    return *this;
+}
+
+bind_options& bind_options::at(std::string_view url) {
+    call_options::at(url);
+    return *this;
+}
+
+bind_options& bind_options::diagnostics(std::string& text) {
+    call_options::diagnostics(text);
+    return *this;
+}
+
 } // namespace cles

@@ -104,6 +104,7 @@ class service_call final : public call_control, public std::enable_shared_from_t
         }
     }
     [[nodiscard]] boost::asio::any_io_executor executor() const override { return executor_; }
+    [[nodiscard]] std::shared_ptr<core::call> node_call() const noexcept override { return call_; }
 
   private:
     /// Its own requests that are in flight.
@@ -322,6 +323,17 @@ void engine::add(registration offered) {
     if (is_announced) { // subscribers that do not know of it accept unsigned updates
         discovery().expedite_announcement();
     }
+}
+
+bool engine::remove(cles::verb verb, std::string_view offered) {
+    std::shared_ptr<core::handler> removed = node().tasks.remove(verb, offered);
+    if (!removed) {
+        return false;
+    }
+    boost::asio::post(executor(),
+                      [removed = std::move(removed)] {}); // destroyed later, because this may be called inside it
+    discovery().expedite_announcement();
+    return true;
 }
 
 std::shared_ptr<update_sink> engine::cross_thread_updates() {

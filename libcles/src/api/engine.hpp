@@ -23,6 +23,7 @@ class engine final : public core::local_node {
 
     [[nodiscard]] const boost::asio::any_io_executor& executor() const noexcept { return asio_.executor(); }
     void add(registration offered);
+    bool remove(cles::verb verb, std::string_view offered);
     /// Receives updates from other threads.
     std::shared_ptr<update_sink> cross_thread_updates();
     void stop() override;

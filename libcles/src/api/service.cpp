@@ -177,6 +177,10 @@ void service::add(registration task) {
     run_on(strand_of(pooled_, get_executor()), [this, &task] { engine_->add(std::move(task)); });
 }
 
+bool service::remove(cles::verb verb, std::string_view task) {
+    return run_on(strand_of(pooled_, get_executor()), [this, verb, task] { return engine_->remove(verb, task); });
+}
+
 publisher service::make_publisher() {
     return run_on(strand_of(pooled_, get_executor()), [this] { return publisher{engine_->cross_thread_updates()}; });
 }

@@ -27,6 +27,7 @@ namespace cles::core {
 
 class gossip;
 class node_security;
+class request_sharing;
 class security_protocol;
 
 struct node_state;
@@ -79,6 +80,7 @@ struct node_state {
     deadline_queue deadlines;
     membership peers;
     gossip* gossip_responder = nullptr; ///< answers gossip requests; null if this node does not gossip
+    request_sharing* sharing = nullptr; ///< moves jobs between nodes; null if this node does not share its work
     counters counts;
     latency_histogram handler_time; ///< of all handlers that reply later, and of a sample of the others
     std::uint64_t plain_runs = 0;   ///< of those others, for sampling

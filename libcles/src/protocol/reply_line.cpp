@@ -43,6 +43,8 @@ bool parse_reply(std::string_view line, reply_line& out) noexcept {
             seq = number_between(a.value, 1, max_id);
         } else if (a.key == "epoch") {
             epoch = parse_epoch(a.value);
+        } else if (a.key == "grant") {
+            out.grant = parse_grant(a.value).value_or(0);
         } else if (a.key == "progress") {
             double fraction = -1;
             const auto end = a.value.data() + a.value.size();

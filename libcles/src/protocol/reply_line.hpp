@@ -22,6 +22,7 @@ struct reply_line {
     std::uint64_t id = 0; ///< 0: none
     std::optional<double> progress;
     std::optional<update_mark> mark; ///< of a value in reply to BIND
+    std::uint64_t grant = 0;         ///< of a slot, in reply to a job that was forwarded on a grant; 0: none
     std::string_view body;
 };
 

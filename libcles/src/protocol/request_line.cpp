@@ -105,6 +105,8 @@ constexpr std::array known_adverbs{
                  [](std::string_view v, request_line& r) { return is_epoch_list(r.describe = v); }},
     known_adverb{"routes", on(verb::pull),
                  [](std::string_view v, request_line& r) { return take_routes(r.routes, v); }},
+    known_adverb{"grant", on(verb::push, verb::delegate),
+                 [](std::string_view v, request_line& r) { return take(r.grant, parse_grant(v)); }},
     known_adverb{"mark", on(verb::bind),
                  [](std::string_view v, request_line& r) { return take_flag(r.wants_mark, true, v == "yes"); }}};
 
@@ -308,9 +310,13 @@ void append_update_head(std::string& out, std::string_view publisher, std::strin
     out.append(" epoch=").append(epoch).push_back(' ');
 }
 
-std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept {
-    std::uint32_t value = 0;
-    if (text.size() != 8) {
+namespace {
+
+/// Lower-case hex digits, all that `Number` has.
+template <class Number>
+std::optional<Number> parse_hex(std::string_view text) noexcept {
+    Number value = 0;
+    if (text.size() != 2 * sizeof(Number)) {
         return std::nullopt;
     }
     for (const auto c : text) {
@@ -318,19 +324,33 @@ std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept {
         if (!digit && (c < 'a' || c > 'f')) {
             return std::nullopt;
         }
-        value = value << 4U | static_cast<std::uint32_t>(digit ? c - '0' : c - 'a' + 10);
+        value = value << 4U | static_cast<Number>(digit ? c - '0' : c - 'a' + 10);
     }
     return value;
 }
 
-std::string epoch_text(std::uint32_t epoch) {
+template <class Number>
+std::string hex_text(Number value) {
     constexpr std::string_view digits = "0123456789abcdef";
-    std::string text(8, '0');
-    for (std::size_t i = 8; i-- > 0; epoch >>= 4U) {
-        text[i] = digits[epoch & 0xFU];
+    std::string text(2 * sizeof(Number), '0');
+    for (std::size_t i = text.size(); i-- > 0; value >>= 4U) {
+        text[i] = digits[value & 0xFU];
     }
     return text;
 }
+
+} // namespace
+
+std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept { return parse_hex<std::uint32_t>(text); }
+
+std::optional<std::uint64_t> parse_grant(std::string_view text) noexcept {
+    const auto number = parse_hex<std::uint64_t>(text);
+    return number != 0U ? number : std::nullopt;
+}
+
+std::string epoch_text(std::uint32_t epoch) { return hex_text(epoch); }
+
+std::string grant_text(std::uint64_t grant) { return hex_text(grant); }
 
 // --- The heads of updates ---
 

@@ -68,6 +68,7 @@ struct request_line : carried_adverbs {
     std::string_view sig;   ///< the signature of the requester, or of an update's publisher
     std::string_view since; ///< what the requester knows already
     routes_question routes{};
+    std::uint64_t grant = 0;                   ///< of slots, or on which a job is forwarded; 0: none
     std::string_view describe;                 ///< epochs of the incarnations to describe in full, separated by commas
     std::string_view body;                     ///< empty: none
     std::string_view text;                     ///< the whole line
@@ -138,9 +139,18 @@ void append_request(std::string& out, const outgoing_request& request);
 void append_update_head(std::string& out, std::string_view publisher, std::string_view path, std::uint64_t seq,
                         std::string_view epoch);
 
+/// The last of the nodes that have forwarded a request.
+constexpr std::string_view last_in_via(std::string_view via) noexcept {
+    const auto comma = via.rfind(',');
+    return comma == std::string_view::npos ? via : via.substr(comma + 1);
+}
+
 /// Eight lower-case hex digits: parsing and formatting.
 std::optional<std::uint32_t> parse_epoch(std::string_view text) noexcept;
 std::string epoch_text(std::uint32_t epoch);
+/// Sixteen such digits; not 0.
+std::optional<std::uint64_t> parse_grant(std::string_view text) noexcept;
+std::string grant_text(std::uint64_t grant);
 
 /// A request that outlives the line from which it was parsed.
 class owned_request {

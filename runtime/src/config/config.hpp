@@ -25,11 +25,23 @@ struct log_config {
     bool operator==(const log_config&) const = default;
 };
 
+/// What a plugin may use that runs in a process of its own.
+struct isolation_limits {
+    std::uint64_t memory = std::uint64_t{1} << 30U;
+    std::uint32_t open_files = 256;
+    std::vector<std::string> read{};  ///< paths that it may read, besides those of the system
+    std::vector<std::string> write{}; ///< paths that it may read and write
+
+    bool operator==(const isolation_limits&) const = default;
+};
+
 struct plugin_config {
     std::string path;          ///< as written in the configuration
     std::string config = "{}"; ///< JSON, passed to the plugin unchanged
     bool required = true;      ///< the daemon does not start without it
     std::string sha256{};      ///< of its file, in small hexadecimal digits; empty: any
+    bool isolated = false;     ///< it runs in a process of its own
+    isolation_limits limits{}; ///< of that process
     std::string
         trial_error{}; ///< why the plugin cannot be used (`try_plugins`); empty if it can, or has not been tried
 
@@ -63,6 +75,7 @@ struct config {
     std::uint32_t queue = 1024;
     std::chrono::microseconds stuck_after{2'000'000}; ///< after its deadline, before a job's worker is replaced
     std::uint32_t replacements = 4;                   ///< at most so many stuck workers are replaced
+    bool sharing = true;                              ///< of jobs with other nodes (docs/sharing.md)
     std::chrono::microseconds drain{5'000'000};       ///< how long running jobs may take to end at a stop
 
     std::vector<plugin_config> plugins;

@@ -122,6 +122,18 @@ security_config security_of(const yaml_value& from) {
     return read;
 }
 
+isolation_limits isolation_limits_of(const yaml_value& from) {
+    constexpr std::uint64_t least = std::uint64_t{64} << 20U;
+    constexpr std::uint64_t most = std::uint64_t{1} << 40U;
+    const auto to_memory = [](const std::string& text) { return to_size(text, least, most); };
+    isolation_limits read;
+    from.read_map({{"memory", part(read.memory, scalar(to_memory))},
+                   {"open_files", part(read.open_files, count(16, 100'000))},
+                   {"read", part(read.read, list(to_absolute_path))},
+                   {"write", part(read.write, list(to_absolute_path))}});
+    return read;
+}
+
 std::vector<plugin_config> plugins_of(const yaml_value& from) {
     const auto to_path = [](const std::string& path) {
         if (path.empty()) {
@@ -136,10 +148,20 @@ std::vector<plugin_config> plugins_of(const yaml_value& from) {
             read.path = item.as(to_path);
             return;
         }
+        bool limited = false;
+        const auto read_limits = [&](const yaml_value& v) {
+            limited = true;
+            return isolation_limits_of(v);
+        };
         item.read_map({{"path", part(read.path, scalar(to_path))},
                        {"config", part(read.config, [](const yaml_value& v) { return v.json(); })},
                        {"required", part(read.required, scalar(to_bool))},
-                       {"sha256", part(read.sha256, scalar(to_sha256))}});
+                       {"sha256", part(read.sha256, scalar(to_sha256))},
+                       {"isolation", part(read.isolated, scalar(to_isolated))},
+                       {"limits", part(read.limits, read_limits)}});
+        if (limited && !read.isolated) {
+            item.fail("has 'limits', which require 'isolation: process'");
+        }
         if (read.path.empty()) {
             item.fail("has no 'path'");
         }
@@ -238,6 +260,11 @@ std::string text_of(const std::vector<plugin_config>& plugins) {
         all +=
             "\n  - path: " + text_of(p.path) + "\n    config: " + p.config + "\n    required: " + text_of(p.required);
         all += p.sha256.empty() ? "" : "\n    sha256: " + text_of(p.sha256);
+        if (p.isolated) {
+            all += "\n    isolation: process\n    limits: {memory: " + std::to_string(p.limits.memory) +
+                   ", open_files: " + std::to_string(p.limits.open_files) + ", read: " + text_of(p.limits.read) +
+                   ", write: " + text_of(p.limits.write) + "}";
+        }
     }
     return (all.empty() ? " []" : all) + "\n";
 }
@@ -299,6 +326,7 @@ const std::vector<setting>& settings() {
                                           value("queue", &config::queue, count(1, max_queue)),
                                           value("stuck_after", &config::stuck_after, scalar(to_duration)),
                                           value("replacements", &config::replacements, count(0, max_workers)),
+                                          value("sharing", &config::sharing, scalar(to_bool)),
                                           value("drain", &config::drain, scalar(to_duration)),
                                           value("plugin_path", &config::plugin_path, list(unchanged)),
                                           value("plugins", &config::plugins, plugins_of),

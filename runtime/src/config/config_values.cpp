@@ -192,6 +192,20 @@ std::string to_interfaces(std::string_view text) {
     return std::move(where.interface);
 }
 
+bool to_isolated(std::string_view text) {
+    if (text != "process" && text != "none") {
+        refuse(text, "is neither process nor none");
+    }
+    return text == "process";
+}
+
+std::string to_absolute_path(std::string_view text) {
+    if (!text.starts_with('/')) {
+        refuse(text, "is not an absolute path, which begins with '/'");
+    }
+    return std::string{text};
+}
+
 std::string to_sha256(std::string_view text) {
     constexpr std::size_t digits = 64;
     constexpr std::string_view small = "0123456789abcdef";

@@ -45,6 +45,10 @@ multicast_options to_multicast(std::string_view text);
 /// The names of network interfaces, separated by commas, or `auto`.
 std::string to_interfaces(std::string_view text);
 
+/// "process": true, "none": false
+bool to_isolated(std::string_view text);
+std::string to_absolute_path(std::string_view text);
+
 /// The SHA-256 of a file, as `sha256sum` prints it: 64 hexadecimal digits, returned in small letters.
 std::string to_sha256(std::string_view text);
 

@@ -18,7 +18,7 @@ constexpr auto footer =
     "/etc/cles/clesd.yaml; without any, defaults are used. Flags override the environment (CLES_NODE,\n"
     "CLES_POOL, CLES_LISTEN, CLES_SEEDS, CLES_MULTICAST, CLES_KEYS, CLES_LOG), which overrides the file.\n\n"
     "SIGTERM and Ctrl-C stop it after its jobs have ended, within the limit 'drain'; a second one stops it at once.\n"
-    "SIGHUP reloads 'seeds' and 'log'.\n\n"
+    "SIGHUP reloads 'seeds' and 'log', and starts isolated plugins again that were withdrawn.\n\n"
     "Exit codes: 0 ok, 1 could not run, 2 usage or configuration error, 3 another node has the name.\n\n"
     "Examples:\n"
     "  clesd                           # with the defaults: a node on loopback, without tasks\n"

@@ -95,18 +95,24 @@ daemon::daemon(boost::asio::io_context& io, config setup, config_sources sources
       signals_(io, SIGTERM, SIGINT, SIGHUP) {
     wait_for_signal();
     has_pool_ = true;
+    if (setup_.sharing) {
+        pool_.share(service_);
+    }
     try {
         load_plugins();
     } catch (...) {
+        end_isolated(0ms);
         service_.stop(); // while everything that it uses exists
         throw;
     }
 }
 
-daemon::~daemon() { service_.stop(); }
+daemon::~daemon() {
+    end_isolated(0ms);
+    service_.stop();
+}
 
 void daemon::load_plugins() {
-    pooled_registrar tasks{service_, pool_};
     for (std::size_t i = 0; i < setup_.plugins.size(); ++i) {
         const auto& wanted = setup_.plugins[i];
         if (!wanted.trial_error.empty()) {
@@ -114,23 +120,69 @@ void daemon::load_plugins() {
             continue;
         }
         try {
-            const auto path = resolve_plugin_path(setup_, wanted);
-            const plugin_start_guard guard{"clesd: " + setup_.location_of("plugins[" + std::to_string(i) + "].path") +
-                                               ": " + path,
-                                           exit_configuration_error, start_limit};
-            plugins_.load(path, wanted.config, tasks, wanted.sha256);
+            load_plugin(i);
         } catch (const plugin_error& e) {
             const auto message = plugin_error_message(setup_, i, e);
             if (wanted.required) {
                 throw config_error(message);
             }
             log_.warning(message + " (continuing without it)");
-            continue;
         }
-        const auto& loaded = plugins_.plugins().back();
-        log_.info("plugin " + loaded.name + " " + loaded.version + " with " + counted(loaded.tasks.size(), "task") +
-                  " from " + loaded.path);
     }
+}
+
+void daemon::load_plugin(std::size_t index) {
+    const auto& wanted = setup_.plugins[index];
+    const auto path = resolve_plugin_path(setup_, wanted);
+    if (wanted.isolated) {
+        load_isolated(wanted, path);
+        return;
+    }
+    {
+        const plugin_start_guard guard{"clesd: " + setup_.location_of("plugins[" + std::to_string(index) + "].path") +
+                                           ": " + path,
+                                       exit_configuration_error, start_limit};
+        pooled_registrar tasks{service_, pool_};
+        plugins_.load(path, wanted.config, tasks, wanted.sha256);
+    }
+    const auto& loaded = plugins_.plugins().back();
+    log_.info("plugin " + loaded.name + " " + loaded.version + " with " + counted(loaded.tasks.size(), "task") +
+              " from " + loaded.path);
+}
+
+void daemon::load_isolated(const plugin_config& wanted, const std::string& path) {
+    const isolated_plugin_node node{
+        .executor = io_.get_executor(),
+        .add =
+            [this](registration task) {
+                pooled_registrar{service_, pool_}.add(std::move(task));
+            },
+        .remove = [this](cles::verb verb, std::string_view task) { service_.remove(verb, task); },
+        .publish = [this](std::string_view noun, const json_text& value) { service_.update(noun, value); },
+        .retire = [this](std::string_view noun) { service_.retire(noun); },
+        .log = host_options_of(setup_, log_).log};
+    const auto rules = plugin_rules_of(setup_);
+    load_message loading{.node = setup_.node,
+                         .path = path,
+                         .config = wanted.config,
+                         .sha256 = wanted.sha256,
+                         .folders = {},
+                         .secured = rules.secured,
+                         .memory = wanted.limits.memory,
+                         .open_files = wanted.limits.open_files,
+                         .readable = wanted.limits.read,
+                         .writable = wanted.limits.write};
+    for (const auto& folder : rules.folders) {
+        loading.folders.push_back(folder.string());
+    }
+    const auto isolated =
+        std::make_shared<isolated_plugin>(node, std::move(loading),
+                                          session_options{.program = "/proc/self/exe",
+                                                          .lanes = std::size_t{setup_.workers} + setup_.replacements,
+                                                          .grace = setup_.stuck_after,
+                                                          .max_line = 2 * setup_.limits.line + 65536});
+    isolated->start();
+    isolated_.push_back(isolated);
 }
 
 void daemon::write_metrics(json_writer& w) const {
@@ -138,6 +190,14 @@ void daemon::write_metrics(json_writer& w) const {
     write_json(w, pool_.figures());
     w.key("plugins");
     write_json(w, plugins_.figures());
+    if (!isolated_.empty()) {
+        w.key("isolated");
+        w.begin_array();
+        for (const auto& each : isolated_) {
+            write_json(w, each->figures());
+        }
+        w.end_array();
+    }
 }
 
 // -- the end -------------------------------------------------------------------------------------------------------
@@ -212,8 +272,14 @@ void daemon::finish() {
     }
     // Plugins may use the remaining time to stop, and at least `min_stop_time`: only a plugin that blocks takes so
     // long.
-    const auto stopped = plugins_.stop(
-        stopped_at_once_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::min_stop_time, 2000ms));
+    const auto limit =
+        stopped_at_once_ ? 100ms : std::clamp<milliseconds>(time_left(), plugin_host::min_stop_time, 2000ms);
+    for (const auto& each : isolated_) {
+        each->begin_stop(); // they stop at the same time as the others
+    }
+    const auto until = steady_clock::now() + limit;
+    const auto stopped = plugins_.stop(limit);
+    end_isolated(std::chrono::ceil<milliseconds>(until - steady_clock::now()));
     for (const auto& name : stopped.late) {
         log_.warning("plugin " + name + " did not stop in time");
     }
@@ -227,6 +293,19 @@ void daemon::finish() {
     log_.info("stopped");
     // A job that does not end is still watched, and keeps the context running.
     boost::asio::post(io_, [this] { io_.stop(); });
+}
+
+void daemon::end_isolated(milliseconds limit) {
+    for (const auto& each : isolated_) {
+        each->begin_stop();
+    }
+    const auto until = steady_clock::now() + limit;
+    for (const auto& each : isolated_) {
+        if (each->finish_stop(until)) {
+            log_.warning("plugin " + each->figures().name + " did not stop in time, and its process was ended");
+        }
+    }
+    isolated_.clear();
 }
 
 // Closed here, and not in the destructor, to find out whether work is unfinished. Jobs that were told to stop at the
@@ -250,6 +329,9 @@ void daemon::reload() {
             log_.warning("other changes of the configuration take effect at the next start");
         }
         service_.set_gossip(cles::gossip(fresh.seeds, setup_.links));
+        for (const auto& each : isolated_) {
+            each->retry();
+        }
         setup_.seeds = fresh.seeds;
         setup_.log = fresh.log;
     } catch (const config_error& e) {

@@ -7,6 +7,7 @@
 #include "config/config_sources.hpp"
 #include "daemon/daemon_log.hpp"
 #include "daemon/service_manager.hpp"
+#include "isolation/isolated_plugin.hpp"
 #include "jobs/job_pool.hpp"
 #include "plugins/plugin_host.hpp"
 
@@ -14,6 +15,8 @@
 #include <boost/asio/signal_set.hpp>
 
 #include <chrono>
+#include <cstddef>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,6 +47,8 @@ class daemon {
 
   private:
     void load_plugins();
+    void load_plugin(std::size_t index);
+    void load_isolated(const plugin_config& wanted, const std::string& path);
     void write_metrics(json_writer& w) const;
     void wait_for_signal();
     void stop(int signal);
@@ -51,6 +56,7 @@ class daemon {
     void drain();
     void close(const drain_report& report);
     void finish();
+    void end_isolated(std::chrono::milliseconds limit);
     void close_pool();
     [[nodiscard]] std::chrono::milliseconds time_left() const;
     void reload();
@@ -64,6 +70,7 @@ class daemon {
     service service_;
     job_pool pool_;
     plugin_host plugins_;
+    std::vector<std::shared_ptr<isolated_plugin>> isolated_;
     boost::asio::signal_set signals_;
     std::chrono::steady_clock::time_point stop_begun_;
     bool stopping_ = false;

@@ -21,12 +21,23 @@ using namespace std::chrono_literals;
 
 namespace {
 
+// How many waiting jobs are looked at for one that another node wants, so that the queue is not locked for long.
+constexpr std::size_t most_offered = 256;
+
 // After so many jobs of one burst further workers are woken at once, and not when the burst has been read.
 constexpr std::size_t max_unwoken_jobs = 32;
 
 std::string seconds(std::chrono::nanoseconds span) {
     const auto tenths = std::chrono::duration_cast<std::chrono::milliseconds>(span).count() / 100;
     return std::to_string(tenths / 10) + "." + std::to_string(tenths % 10) + " s";
+}
+
+// While no worker becomes free, the next job waits at least as long as this has lasted. Rounded up, because zero means
+// that nothing is known.
+std::chrono::microseconds expected_service_time(const worker_pool::figures& workers) noexcept {
+    constexpr std::chrono::microseconds most = 1'000s;
+    const auto known = std::max(workers.service_time, workers.saturated_for);
+    return std::min(std::chrono::ceil<std::chrono::microseconds>(known), most);
 }
 
 // A function for the executor that does nothing once the dispatcher has been destroyed.
@@ -63,10 +74,13 @@ asio::any_io_executor job_dispatcher::executor() const {
 }
 
 void job_dispatcher::start() {
-    workers_.start(std::shared_ptr<worker_pool>{shared_from_this(), &workers_}, [this] {
-        // If this fails, the next timer does it.
-        static_cast<void>(completions_.post([this] { pauses_.check(); }));
-    });
+    workers_.start(
+        std::shared_ptr<worker_pool>{shared_from_this(), &workers_},
+        [this] {
+            // If this fails, the next timer does it.
+            static_cast<void>(completions_.post([this] { pauses_.check(); }));
+        },
+        [this] { static_cast<void>(completions_.post([] {})); }); // `process_completions` reports the change
     pauses_.start(std::shared_ptr<pause_detector>{shared_from_this(), &pauses_});
     if (options_.check_interval.count() > 0) {
         // Once the executor runs, which may be later.
@@ -133,9 +147,17 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
     r.requester_.emplace(std::move(answer));
     ++open_;
     ++awaited_;
-    r.requester_->on_stop([this, &r] { stop(r); });
+    // By its number, because it may be called after the job has ended.
+    r.requester_->on_stop([this, number = r.number] {
+        if (auto* const job = records_.find(number)) {
+            stop(*job);
+        }
+    });
     if (admission == worker_pool::admission::needs_wake) {
         wake_workers();
+    }
+    if (sharing_) {
+        sharing_->on_change();
     }
 }
 
@@ -193,6 +215,7 @@ void job_dispatcher::process_completions() {
     entries_ = std::move(entries);
     functions_ = std::move(functions);
     functions_.clear();
+    report_change();
     update_drain(false);
 }
 
@@ -214,17 +237,22 @@ void job_dispatcher::release_record(job_record& r) {
 
 // -- stopping ------------------------------------------------------------------------------------------------------
 
-// Returns whether the job had not started.
-bool job_dispatcher::stop(job_record& r) {
+job_dispatcher::stopped_job job_dispatcher::stop(job_record& r) {
     pauses_.count_input();
     awaited_ -= r.requester_ && !r.stopped() ? 1 : 0;
     auto callback = r.stop();
+    const bool moved = r.moved_ != 0;
+    if (moved) {
+        sharing_->withdraw(r.moved_);
+        end_move(r, false);
+        return stopped_job::moved;
+    }
     if (workers_.withdraw(r)) {
         ++figures_.withdrawn;
         r.answered_ = true;
         forget_requester(r);
         release_record(r);
-        return true;
+        return stopped_job::waiting;
     }
     workers_.job_stopped(r, clock::now());
     if (callback) {
@@ -234,7 +262,63 @@ bool job_dispatcher::stop(job_record& r) {
                  job->log(level, std::string{to_string(what.verb())} + " '" + std::string{what.task()} + "': " + text);
              }});
     }
-    return false;
+    return stopped_job::started;
+}
+
+// -- jobs that other nodes run -------------------------------------------------------------------------------------
+
+shareable_queue::state job_dispatcher::read_state() const {
+    const auto workers = workers_.read_figures();
+    return {.waiting = workers.queued,
+            .idle = draining_ ? 0 : workers.usable - std::min(workers.running, workers.usable),
+            .workers = workers.usable,
+            .service_time = expected_service_time(workers)};
+}
+
+void job_dispatcher::offer(job_taker& to) {
+    const auto taken = workers_.take(
+        most_offered,
+        [&](const job_record& r, std::size_t ahead) {
+            const auto call = r.requester_ ? r.requester_->node_call() : nullptr;
+            return call && to.wants(*call, ahead);
+        },
+        [&] { return to.full(); });
+    for (auto* r : taken) {
+        ++moved_;
+        r->moved_ = to.take(r->requester_->node_call(), r->request().body(),
+                            [this, r](bool refused) { end_move(*r, refused); });
+    }
+}
+
+// Jobs have ended.
+void job_dispatcher::report_change() {
+    if (!sharing_) {
+        return;
+    }
+    sharing_->on_change();
+    // A job may have answered before its worker is free; then another change follows.
+    const auto workers = workers_.read_figures();
+    const bool frees_soon =
+        workers.queued == 0 && workers.running >= workers.usable && open_ - moved_ < workers.running;
+    if (frees_soon && !workers_.notify_when_free()) {
+        sharing_->on_change();
+    }
+}
+
+// Refused: it returns to the queue. Otherwise it has ended, here at least.
+void job_dispatcher::end_move(job_record& r, bool refused) {
+    r.moved_ = 0;
+    --moved_;
+    if (refused && workers_.put_back(r)) {
+        workers_.wake();
+        return;
+    }
+    r.answered_ = true;
+    forget_requester(r);
+    release_record(r);
+    if (on_drained_) {
+        asio::post(executor_, while_alive(weak_from_this(), [](job_dispatcher& self) { self.update_drain(false); }));
+    }
 }
 
 // -- requests to other nodes ---------------------------------------------------------------------------------------
@@ -261,18 +345,13 @@ void job_dispatcher::delegate(job_ptr job, std::string command, call_options opt
 // -- figures -------------------------------------------------------------------------------------------------------
 
 node_load job_dispatcher::load() const noexcept {
-    constexpr std::chrono::microseconds max_service_time = 1'000s;
     const auto workers = workers_.read_figures();
-    const auto open = static_cast<std::uint32_t>(open_);
+    const auto open = static_cast<std::uint32_t>(open_ - moved_);
     const auto started = open - std::min(workers.queued, open);
-    // While no worker becomes free, the next job waits at least as long as this has lasted. Rounded up, because zero
-    // means that nothing is known.
-    const auto service_time =
-        std::chrono::ceil<std::chrono::microseconds>(std::max(workers.service_time, workers.saturated_for));
     return {.queued = workers.queued,
             .running = std::max(started, workers.running),
             .workers = workers.usable,
-            .service_us = static_cast<std::uint32_t>(std::min(service_time, max_service_time).count())};
+            .service_us = static_cast<std::uint32_t>(expected_service_time(workers).count())};
 }
 
 pool_figures job_dispatcher::figures() const {
@@ -405,22 +484,23 @@ void job_dispatcher::update_drain(bool at_limit) {
 
 // Answers all open jobs, and tells them to stop.
 void job_dispatcher::fail_open_jobs(drain_report& report) {
-    for (std::size_t i = 0; i < records_.size();) {
-        auto& r = records_[i];
+    records_.for_each([&](job_record& r) {
         if (!r.requester_) {
-            ++i;
-            continue; // a withdrawn record leaves the list, and another takes its index
+            return;
         }
-        auto requester = *r.requester_;
-        if (stop(r)) {
+        const auto requester = *r.requester_;
+        const auto was = stop(r);
+        if (was == stopped_job::waiting) {
             ++report.refused;
             requester.refuse("it is shutting down", 1s);
-        } else {
-            ++report.abandoned;
-            requester.fail(errc::unavailable, "it shut down before the job had ended");
+            return;
+        }
+        ++report.abandoned;
+        requester.fail(errc::unavailable, "it shut down before the job had ended");
+        if (was == stopped_job::started) {
             forget_requester(r);
         }
-    }
+    });
 }
 
 std::size_t job_dispatcher::close(std::chrono::milliseconds limit) {
@@ -431,6 +511,7 @@ std::size_t job_dispatcher::close(std::chrono::milliseconds limit) {
     draining_ = true;
     drain_report unreported;
     fail_open_jobs(unreported);
+    sharing_.reset();
     closed_ = true;
     pauses_.close();
     on_drained_ = nullptr;

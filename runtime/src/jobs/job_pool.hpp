@@ -7,6 +7,7 @@
 #include <cles/request.hpp>
 #include <cles/responder.hpp>
 #include <cles/service.hpp>
+#include <cles/sharing.hpp>
 
 #include "jobs/adaptive_mutex.hpp"
 #include "jobs/completion_queue.hpp"
@@ -92,7 +93,7 @@ struct drain_report {
 
 /// Takes the jobs of a pool, on the service's executor, from admission to reply: it is the sequence of these steps, and
 /// its parts keep their state. It lives as long as any job is held.
-class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher> {
+class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>, private shareable_queue {
   public:
     job_dispatcher(boost::asio::any_io_executor executor, pool_options options);
     job_dispatcher(const job_dispatcher&) = delete;
@@ -106,6 +107,9 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     void submit(const request& what, responder answer, std::shared_ptr<const registration> task);
     [[nodiscard]] node_load load() const noexcept;
     [[nodiscard]] pool_figures figures() const;
+    /// From now on, jobs that wait may move to other nodes. \param by made for `queue`
+    void share(std::unique_ptr<job_sharing> by) { sharing_ = std::move(by); }
+    [[nodiscard]] shareable_queue& queue() noexcept { return *this; }
     void drain(std::chrono::milliseconds limit, std::function<void(const drain_report&)> done);
     /// Returns how many threads are abandoned.
     std::size_t close(std::chrono::milliseconds limit);
@@ -138,7 +142,19 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     void process_completions();
     void forget_requester(job_record& r);
     void release_record(job_record& r);
-    bool stop(job_record& r);
+    /// Where a job was when it was stopped.
+    enum class stopped_job : std::uint8_t {
+        waiting, ///< it has ended
+        moved,   ///< it has ended here, and its node is told to stop it
+        started, ///< it has been told to stop
+    };
+    stopped_job stop(job_record& r);
+
+    // shareable_queue
+    [[nodiscard]] state read_state() const override;
+    void offer(job_taker& to) override;
+    void end_move(job_record& r, bool refused);
+    void report_change();
 
     void on_timer();
     void arm_timer();
@@ -159,8 +175,10 @@ class job_dispatcher final : public std::enable_shared_from_this<job_dispatcher>
     stop_notifier stop_notifier_;
 
     job_record_pool records_;
-    std::size_t open_ = 0;    // jobs whose requester has no answer yet
-    std::size_t awaited_ = 0; // of these, those that have not been told to stop
+    std::size_t open_ = 0;                 // jobs whose requester has no answer yet
+    std::size_t awaited_ = 0;              // of these, those that have not been told to stop
+    std::size_t moved_ = 0;                // of these, those that other nodes run
+    std::unique_ptr<job_sharing> sharing_; // null: jobs stay
     bool wake_posted_ = false;
     std::size_t unwoken_jobs_ = 0;
     std::vector<completion_queue::entry> entries_;
@@ -203,6 +221,9 @@ class job_pool {
     /// For announcements and `any:`; cheap.
     [[nodiscard]] node_load load() const noexcept { return dispatcher_->load(); }
     [[nodiscard]] pool_figures figures() const { return dispatcher_->figures(); }
+
+    /// Shares jobs with other nodes: those that wait may move there, and theirs to this pool (docs/sharing.md).
+    void share(service& host) { dispatcher_->share(share_jobs(host, dispatcher_->queue())); }
 
     /// Admits no more jobs, and calls back when all have ended. At the limit it answers those that are left, tells
     /// those that run to stop, and calls back; after that the destructor waits for no job, and `close` only as long as

@@ -35,8 +35,15 @@ bool job_queue::push(item& job) {
     if (size_ >= capacity_) {
         return false;
     }
+    job.order_ = ++last_order_;
     queue_for(job).jobs.push_back(job);
     return true;
+}
+
+void job_queue::put_back(item& job) {
+    auto& jobs = queue_for(job).jobs;
+    jobs.insert(std::find_if(jobs.begin(), jobs.end(), [&](const item& each) { return each.order_ > job.order_; }),
+                job);
 }
 
 void job_queue::push_resumed(item& job) { queue_for(job).jobs.push_front(job); }

@@ -6,7 +6,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <iterator>
 #include <list>
+#include <utility>
+#include <vector>
 
 namespace cles::runtime {
 
@@ -36,6 +39,7 @@ class job_queue {
       private:
         friend job_queue;
         bool queued_ = false;
+        std::uint64_t order_ = 0; // of its first `push`
     };
 
     explicit job_queue(std::size_t capacity) : capacity_(capacity) {}
@@ -48,6 +52,13 @@ class job_queue {
     /// Queues a job that has started and continues: before the new jobs of its requester, and without a limit, because
     /// it has been admitted, and others may wait for it.
     void push_resumed(item& job);
+    /// Queues a job that has been removed but has not started, at its old place among the jobs of its requester, and
+    /// without a limit.
+    void put_back(item& job);
+    /// Calls `see(job, ahead)` with the jobs in the order in which they will be popped, until it returns false. The
+    /// queue must not be changed meanwhile.
+    template <class F>
+    void visit(F see);
     /// The next job; null if there is none.
     item* pop() noexcept;
     /// Removes a job if it is queued.
@@ -69,10 +80,30 @@ class job_queue {
 
     std::size_t capacity_;
     std::size_t size_ = 0;
+    std::uint64_t last_order_ = 0;
     boost::unordered_flat_map<std::uint64_t, requesters::iterator> known_; // those in the next two
     requesters with_jobs_;                                                 // the first is served next
     requesters idle_;                                                      // without jobs
     requesters spare_;                                                     // their memory is reused
 };
+
+template <class F>
+void job_queue::visit(F see) {
+    // Requesters take turns: first the first job of each, then the second of each.
+    std::vector<std::pair<item*, requester_queue*>> turns;
+    for (auto& each : with_jobs_) {
+        turns.emplace_back(&each.jobs.front(), &each);
+    }
+    for (std::size_t ahead = 0; !turns.empty();) {
+        for (auto& [job, of] : turns) {
+            if (!see(*job, ahead++)) {
+                return;
+            }
+            const auto next = std::next(of->jobs.iterator_to(*job));
+            job = next != of->jobs.end() ? &*next : nullptr;
+        }
+        std::erase_if(turns, [](const auto& turn) { return turn.first == nullptr; });
+    }
+}
 
 } // namespace cles::runtime

@@ -53,23 +53,36 @@ void job_record::clear() {
     owned_.clear();
 }
 
+// A number consists of a slot, and how often the slot has been used.
 job_record& job_record_pool::acquire(std::shared_ptr<job_dispatcher> dispatcher) {
+    if (free_slots_.empty()) {
+        free_slots_.push_back(static_cast<std::uint32_t>(slots_.size()));
+        slots_.emplace_back();
+    }
     if (spare_.empty()) {
         spare_.push_back(std::make_unique<job_record>());
     }
-    auto& r = *spare_.back().release();
-    spare_.pop_back();
+    const auto at = free_slots_.back();
+    auto& place = slots_[at];
+    place.record = std::move(spare_.back());
+    auto& r = *place.record;
     r.open(std::move(dispatcher));
-    r.index = in_use_.size();
-    in_use_.push_back(&r);
+    r.number = std::uint64_t{++place.uses} << 32U | at;
+    spare_.pop_back();
+    free_slots_.pop_back();
     return r;
 }
 
+job_record* job_record_pool::find(std::uint64_t number) const noexcept {
+    const auto at = static_cast<std::uint32_t>(number);
+    auto* const r = at < slots_.size() ? slots_[at].record.get() : nullptr;
+    return r != nullptr && r->number == number ? r : nullptr;
+}
+
 void job_record_pool::recycle(job_record& r) {
-    std::unique_ptr<job_record> owned{&r};
-    in_use_.back()->index = r.index;
-    in_use_[r.index] = in_use_.back();
-    in_use_.pop_back();
+    const auto at = static_cast<std::uint32_t>(r.number);
+    auto owned = std::move(slots_[at].record);
+    free_slots_.push_back(at);
     r.clear(); // the dispatcher, which runs, outlives this
     if (spare_.size() < max_spare) {
         spare_.push_back(std::move(owned));
@@ -77,7 +90,11 @@ void job_record_pool::recycle(job_record& r) {
 }
 
 void job_record_pool::close() noexcept {
-    in_use_.clear();
+    for (auto& each : slots_) {
+        static_cast<void>(each.record.release()); // destroys itself
+    }
+    slots_.clear();
+    free_slots_.clear();
     spare_.clear();
 }
 

@@ -110,7 +110,8 @@ class job_record final : public job_queue::item, public detail::call_control {
                 std::shared_ptr<const registration> task);
     /// Releases what belonged to the job, except for some memory.
     void clear();
-    std::size_t index = 0; ///< among the records in use
+    /// Identifies the job among all of its pool; see `job_record_pool::find`.
+    std::uint64_t number = 0;
 
   private:
     friend job_dispatcher;
@@ -148,6 +149,7 @@ class job_record final : public job_queue::item, public detail::call_control {
 
     // -- the executor ----------------------------------------------------------------------------------------------
     std::optional<responder> requester_;
+    std::uint64_t moved_ = 0; // the ticket of a job that another node runs; 0: it is here
     std::vector<progress_report> sent_reports_;
 };
 
@@ -165,9 +167,19 @@ class job_record_pool {
     /// From now on the records in use destroy themselves.
     void close() noexcept;
 
-    /// The records in use, in no particular order: recycling one moves another.
-    [[nodiscard]] std::size_t size() const noexcept { return in_use_.size(); }
-    [[nodiscard]] job_record& operator[](std::size_t index) const noexcept { return *in_use_[index]; }
+    /// The record of a job; null if the job has ended, and the record may be that of another.
+    [[nodiscard]] job_record* find(std::uint64_t number) const noexcept;
+    /// The number of records in use.
+    [[nodiscard]] std::size_t size() const noexcept { return slots_.size() - free_slots_.size(); }
+    /// Calls `f` with each record in use, which it may recycle. It must not acquire one.
+    template <class F>
+    void for_each(F f) {
+        for (const auto& each : slots_) {
+            if (each.record) {
+                f(*each.record);
+            }
+        }
+    }
 
     /// A copy of a requester's identity. All jobs of one requester share it, and it may outlive the link.
     [[nodiscard]] std::shared_ptr<const identity> copy_of(const identity& peer);
@@ -176,8 +188,14 @@ class job_record_pool {
     static constexpr std::size_t max_spare = 1024;
     static constexpr std::size_t max_copies = 1024;
 
+    struct slot {
+        std::unique_ptr<job_record> record{}; // null: free
+        std::uint32_t uses = 0;
+    };
+
     std::vector<std::unique_ptr<job_record>> spare_;
-    std::vector<job_record*> in_use_; // owned; each knows its index
+    std::vector<slot> slots_;
+    std::vector<std::uint32_t> free_slots_;
     boost::unordered_flat_map<const identity*, std::shared_ptr<const identity>> copies_;
 };
 

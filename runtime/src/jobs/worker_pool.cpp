@@ -94,6 +94,22 @@ bool worker_pool::withdraw(job_record& job) {
     return true;
 }
 
+bool worker_pool::put_back(job_record& job) {
+    const std::lock_guard lock{mutex_};
+    if (closed_) {
+        return false;
+    }
+    queue_.put_back(job);
+    job.state = job_record::run_state::queued;
+    return true;
+}
+
+bool worker_pool::notify_when_free() {
+    const std::lock_guard lock{mutex_};
+    notify_free_ = busy_ >= watchdog_.usable();
+    return notify_free_;
+}
+
 void worker_pool::pause() noexcept {
     const std::lock_guard lock{mutex_};
     paused_ = !closed_;
@@ -274,9 +290,13 @@ void worker_pool::work() {
     }
     watchdog_.leave(slot);
     --awake_;
+    const bool notify_free = std::exchange(notify_free_, false);
     lock.unlock();
     finish_job(done, false, batcher, now, dropped);
     job_record::set_current_run(nullptr);
+    if (notify_free) {
+        on_free_();
+    }
     if (executor_late) {
         on_executor_late_();
     }

@@ -38,9 +38,11 @@ class worker_pool {
     /// To be called first. \param self keeps this alive while a worker uses it \param on_executor_late called on a
     /// worker that found the executor late (`set_executor_due`). The worker has put its job back and looks for no
     /// other: the executor has to call `wake` once it has read the input that arrived in the meantime.
-    void start(std::weak_ptr<worker_pool> self, std::function<void()> on_executor_late) {
+    void start(std::weak_ptr<worker_pool> self, std::function<void()> on_executor_late,
+               std::function<void()> on_free = {}) {
         self_ = std::move(self);
         on_executor_late_ = std::move(on_executor_late);
+        on_free_ = std::move(on_free);
     }
 
     // On the service's executor:
@@ -56,6 +58,14 @@ class worker_pool {
     void wake();
     /// Removes a job that has not started. False if it has.
     bool withdraw(job_record& job);
+    /// Removes jobs that have not started: those that `wants(job, ahead)` returns true for, in the order in which they
+    /// would start, until `full()` does. \param most how many are looked at
+    template <class Wants, class Full>
+    [[nodiscard]] std::vector<job_record*> take(std::size_t most, Wants wants, Full full);
+    /// Queues a job that `take` has removed, at its old place. False after `close`.
+    [[nodiscard]] bool put_back(job_record& job);
+    /// Has `on_free` called, on a worker, when the next worker becomes free. False if one is free already.
+    [[nodiscard]] bool notify_when_free();
     /// By when the executor's timer will have run. If it has not, the process was suspended or the executor blocked:
     /// workers may have missed withdrawals, and start no job.
     void set_executor_due(time_point until) noexcept { executor_due_.store(until, std::memory_order_relaxed); }
@@ -111,6 +121,7 @@ class worker_pool {
     worker_threads threads_;
     std::weak_ptr<worker_pool> self_;
     std::function<void()> on_executor_late_;
+    std::function<void()> on_free_;
     std::atomic<time_point> executor_due_{time_point::max()};
     mutable adaptive_mutex mutex_; // of all that follows
     job_queue queue_;
@@ -123,7 +134,26 @@ class worker_pool {
     bool paused_ = false; // no job or continuation starts
     bool closed_ = false; // no job starts
     bool ended_ = false;  // no continuation starts
+    bool notify_free_ = false;
     std::condition_variable_any idle_;
 };
+
+template <class Wants, class Full>
+std::vector<job_record*> worker_pool::take(std::size_t most, Wants wants, Full full) {
+    std::vector<job_record*> taken;
+    const std::lock_guard lock{mutex_};
+    queue_.visit([&](job_queue::item& each, std::size_t ahead) {
+        auto& job = static_cast<job_record&>(each);
+        if (!job.started && wants(job, ahead)) {
+            taken.push_back(&job);
+        }
+        return ahead + 1 < most && !full();
+    });
+    for (auto* job : taken) {
+        queue_.remove(*job);
+        job->state = job_record::run_state::idle;
+    }
+    return taken;
+}
 
 } // namespace cles::runtime

@@ -254,6 +254,7 @@ std::int32_t loaded_plugin::add_task(const cles_task& added) {
                       .info = {.description = std::string{view_of(added.description)},
                                .idempotent = (added.flags & CLES_TASK_IDEMPOTENT) != 0,
                                .inline_ok = (added.flags & CLES_TASK_INLINE_OK) != 0,
+                               .local = (added.flags & CLES_TASK_LOCAL) != 0,
                                .must_be_signed = (added.flags & CLES_TASK_SIGNED) != 0}};
     for (std::size_t i = 0; i < added.parameter_count; ++i) {
         task.info.parameters.emplace_back(view_of(added.parameters[i]));

@@ -86,7 +86,7 @@ void reset_process_state(pid_t parent, int output) {
 
 // In the child. Ends it without exit handlers, which belong to the parent.
 [[noreturn]] void run_child(pid_t parent, const plugin_file& file, const std::string& node, const std::string& config,
-                            int output, int report) {
+                            const std::optional<confinement>& confined, int output, int report) {
     reset_process_state(parent, output);
     std::string step;
     const auto begin_step = [&](const char* next) {
@@ -95,6 +95,9 @@ void reset_process_state(pid_t parent, int output) {
     };
     try {
         begin_step(loading);
+        if (confined) {
+            confine(*confined, file.path());
+        }
         // Never unloaded, as in the daemon.
         const auto& library = *new auto{open_library("", file)};
         begin_step(describing);
@@ -248,7 +251,7 @@ pipe_ends make_pipe() {
 } // namespace
 
 void try_plugin(const std::string& path, const plugin_file& file, const std::string& node, const std::string& config,
-                std::chrono::milliseconds limit) {
+                std::chrono::milliseconds limit, const std::optional<confinement>& confined) {
     const auto end = std::chrono::steady_clock::now() + limit;
     auto output_pipe = make_pipe();
     auto report_pipe = make_pipe();
@@ -258,7 +261,7 @@ void try_plugin(const std::string& path, const plugin_file& file, const std::str
         throw std::system_error(errno, std::generic_category(), "cannot start a process");
     }
     if (child == 0) {
-        run_child(parent, file, node, config, output_pipe.into.get(), report_pipe.into.get());
+        run_child(parent, file, node, config, confined, output_pipe.into.get(), report_pipe.into.get());
     }
     output_pipe.into.close();
     report_pipe.into.close();
@@ -288,6 +291,14 @@ void try_plugin(const std::string& path, const plugin_file& file, const std::str
     }
 }
 
+confinement confinement_of(const isolation_limits& limits, std::size_t threads) {
+    return {.memory = limits.memory,
+            .open_files = limits.open_files,
+            .readable = limits.read,
+            .writable = limits.write,
+            .threads = threads};
+}
+
 std::string plugin_error_message(const config& setup, std::size_t plugin, const plugin_error& why) {
     return setup.location_of("plugins[" + std::to_string(plugin) + "]." + why.key()) + ": " + why.what();
 }
@@ -299,7 +310,8 @@ void try_plugins(config& setup) {
         try {
             const auto path = resolve_plugin_path(setup, wanted);
             const plugin_file file{path, find_plugin(path, rules.folders), rules, wanted.sha256};
-            try_plugin(path, file, setup.node, wanted.config, trial_limit);
+            try_plugin(path, file, setup.node, wanted.config, trial_limit,
+                       wanted.isolated ? std::optional{confinement_of(wanted.limits, 0)} : std::nullopt);
         } catch (const plugin_error& e) {
             wanted.trial_error = plugin_error_message(setup, i, e);
             if (wanted.required) {

@@ -2,11 +2,13 @@
 #pragma once
 
 #include "config/config.hpp"
+#include "isolation/confinement.hpp"
 #include "plugins/plugin_error.hpp"
 #include "plugins/plugin_file.hpp"
 
 #include <chrono>
 #include <cstddef>
+#include <optional>
 #include <string>
 
 namespace cles::runtime {
@@ -20,10 +22,14 @@ namespace cles::runtime {
 /// threads: the child is a copy of this thread only, in which a lock of another thread is never released.
 ///
 /// \param path as written in the configuration \param file its file \param config its settings, a JSON object
+/// \param confined to this, as it will be when it runs
 /// \throws plugin_error if it cannot be used; std::system_error if it cannot be tried, for example because the process
 /// ignores SIGCHLD
 void try_plugin(const std::string& path, const plugin_file& file, const std::string& node, const std::string& config,
-                std::chrono::milliseconds limit);
+                std::chrono::milliseconds limit, const std::optional<confinement>& confined = std::nullopt);
+
+/// What the process of an isolated plugin may use. \param threads that the daemon starts there
+confinement confinement_of(const isolation_limits& limits, std::size_t threads);
 
 /// The message about a plugin that cannot be used: the location in the configuration, of the key that is to blame, and
 /// the reason.

@@ -134,6 +134,7 @@ BOOST_AUTO_TEST_CASE(every_key) {
                         "queue: 512\n"
                         "stuck_after: 250ms\n"
                         "replacements: 1\n"
+                        "sharing: false\n"
                         "drain: 3s\n"
                         "plugin_path: /opt/plugins\n"
                         "plugins:\n"
@@ -165,6 +166,7 @@ BOOST_AUTO_TEST_CASE(every_key) {
     BOOST_TEST(c.queue == 512U);
     BOOST_TEST((c.stuck_after == 250ms));
     BOOST_TEST(c.replacements == 1U);
+    BOOST_TEST(!c.sharing);
     BOOST_TEST((c.drain == 3s));
     BOOST_REQUIRE_EQUAL(c.plugin_path.size(), 1U);
     BOOST_TEST(c.plugin_path[0] == "/opt/plugins");

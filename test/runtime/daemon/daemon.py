@@ -17,6 +17,8 @@ CLESD = os.environ.get("CLESD", "clesd")
 # Plugins with one fault each, and one whose tasks misbehave.
 FAULTY = os.environ.get("FAULTY_PLUGINS", "")
 STUBBORN = os.environ.get("STUBBORN_PLUGIN", "")
+# A plugin to be isolated.
+HOSTILE = os.environ.get("HOSTILE_PLUGIN", "")
 # The folder of the installed plugins.
 PLUGINS = os.environ.get("PLUGINS", "")
 

@@ -16,7 +16,8 @@ COUNTING = os.environ.get("COUNTING_PLUGIN", "")
 class Fleet:
     """Nodes sat1, sat2 ..., each of which routes to all; sat1 is the others' seed."""
 
-    def __init__(self, count):
+    def __init__(self, count, queue=8, more="drain: 500ms\n"):
+        self.queue, self.more = queue, more
         self.names = [f"sat{i + 1}" for i in range(count)]
         with contextlib.ExitStack() as opened:
             self.folder = opened.enter_context(Folder())
@@ -29,8 +30,9 @@ class Fleet:
             self.opened = opened.pop_all()
 
     def start(self, name):
-        seeds = f"seeds: [{self.nodes['sat1'].url}]\n" if self.nodes else ""
-        return Daemon(f"queue: 8\ndrain: 500ms\nplugins: [{{path: {COUNTING}, config: {{marks: {self.marks_file}}}}}]\n"
+        others = [node.url for other, node in self.nodes.items() if other != name and node.process.poll() is None]
+        seeds = f"seeds: [{others[0]}]\n" if others else ""
+        return Daemon(f"queue: {self.queue}\n{self.more}plugins: [{{path: {COUNTING}, config: {{marks: {self.marks_file}}}}}]\n"
                       + seeds, base=DEFAULTS.replace("sat1", name).replace("level: debug", "level: info"))
 
     def __getitem__(self, name):

@@ -139,6 +139,14 @@ class Load:
                 self.next_due = max(self.next_due, now - 0.1) + self.PACE  # a late machine catches up only a little
             self.hear(min(self.next_due, end) - time.monotonic())
 
+    def wait_until(self, condition, what):
+        """Sends none meanwhile."""
+        end = time.monotonic() + PATIENCE
+        while not condition():
+            if time.monotonic() > end or not self.linked:
+                raise AssertionError(f"waited in vain: {what}")
+            self.hear(0.01)
+
     def finish(self):
         """Sends no more, and waits for all answers."""
         end = time.monotonic() + DEADLINE + SLACK

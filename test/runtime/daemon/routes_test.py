@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: BSL-1.0
 """Routes over several hops: daemons without a link to each other reach each other through those between them.
 
-Line, star and ring: each daemon in a network namespace of its own, with a cable to each of its neighbours, and no IP
-forwarding. In the line and the star, `links` is not configured: nothing but the cables forbids other links. Grid: all
-on loopback, and nothing but `links` forbids other links."""
+Line, star, ring and a grid: each daemon in a network namespace of its own, with a cable to each of its neighbours, and
+no IP forwarding. Except in the ring, `links` is not configured: nothing but the cables forbids other links. In another
+grid, all are on loopback, and nothing but `links` forbids other links."""
 
 import collections
 import contextlib
@@ -264,8 +264,8 @@ class Probe:
         self.listener.close()
 
 
-class Topology:
-    """What has to be true of every network. `near` and `far` are as far from each other as any two."""
+class Network:
+    """The daemons of a network. `near` and `far` are as far from each other as any two."""
 
     NAMES, CABLES, NEAR, FAR = [], [], "", ""
     NETWORK = Namespaces
@@ -327,6 +327,13 @@ class Topology:
         cls.say(f"{when}, all nodes have all distances after {took:.2f} s (the first one after "
                 f"{min(right_after.values()):.2f} s)")
         return took
+
+    def listed(self):
+        return "\n".join(f"{name}: {json.dumps(node.peers())}" for name, node in self.nodes.items())
+
+
+class Topology(Network):
+    """What has to be true of every network."""
 
     def marks(self):
         try:
@@ -458,16 +465,13 @@ class Grid(Topology, unittest.TestCase):
     HAS_LINKS = True
 
 
-class Ring(Topology, unittest.TestCase):
-    NAMES = ["n1", "n2", "n3", "n4", "n5"]
-    CABLES = [("n1", "n2"), ("n2", "n3"), ("n3", "n4"), ("n4", "n5"), ("n5", "n1")]
-    NEAR, FAR = "n1", "n3"
-    HAS_LINKS = True
+class Cuts(Network):
+    """What has to be true when a cable is lost that is not the only way."""
 
-    def ask_until_answered(self, links, begun):
-        """Asks from both ends of a cable for the other one, again and again, until both are answered; then waits for
-        all replies. Returns for each end when the first answer came and when its request had been sent, and how many
-        of all requests have ended in which way."""
+    def ask_until_answered(self, links, begun, then):
+        """Asks from both ends of a cable for the other one, again and again, until both are answered; calls `then`, and
+        waits for all replies. Returns for each end when the first answer came and when its request had been sent, and
+        how many of all requests have ended in which way."""
         sent, first = [], {}
         ended = collections.Counter()
         while (busy := len(first) < len(links)) or ended.total() < len(sent) * len(links):
@@ -478,6 +482,8 @@ class Ring(Topology, unittest.TestCase):
                 sent.append(time.monotonic() - begun)
                 for (_, other), link in links.items():
                     link.send(f"PULL {other}:cles id={len(sent)} deadline=1000")
+            elif then:
+                then = then()
             until = time.monotonic() + 0.02
             while (left := until - time.monotonic()) > 0:
                 ready = select.select([link.socket for link in links.values()], [], [], left)[0]
@@ -491,7 +497,7 @@ class Ring(Topology, unittest.TestCase):
 
     def check_cut(self, ends, cut, mend, how):
         one, other = ends
-        (beyond,) = set(self.neighbours[other]) - {one}
+        beyond = min(set(self.neighbours[other]) - {one})
         with ByLine(self.nodes[one]) as here, ByLine(self.nodes[other]) as there, \
                 Updates(self.nodes[one], f"{beyond}:utc") as updates:
             links = {(one, other): here, (other, one): there}
@@ -500,7 +506,10 @@ class Ring(Topology, unittest.TestCase):
             try:
                 cut(one, other)
                 begun = time.monotonic()
-                first, ended = self.ask_until_answered(links, begun)
+                left = [cable for cable in self.CABLES if set(cable) != set(ends)]
+                took = []
+                first, ended = self.ask_until_answered(
+                    links, begun, lambda: took.append(self.wait_for_routes(left, how, begun)))
                 for (asks, target), (at, sent) in first.items():
                     self.say(f"{how}: {target} answers {asks} again after {at:.2f} s (asked after {sent:.2f} s)")
                 self.say(f"{how}: the requests that were sent meanwhile: {dict(ended)}")
@@ -508,12 +517,19 @@ class Ring(Topology, unittest.TestCase):
                 pause = updates.longest_pause()
                 self.say(f"{how}: updates of {beyond}, which came to {one} by {other}, paused for {pause:.2f} s")
                 self.assertLess(pause, INTERVAL + SLACK)
-                self.wait_for_routes([cable for cable in self.CABLES if set(cable) != set(ends)], how, begun)
+                self.assertLess(took[0], INTERVAL + SLACK)
                 for asks, target in links:
                     self.assertEqual(json.loads(self.nodes[asks].ask(f"PULL {target}:cles"))["node"], target)
             finally:
                 mend(one, other)
         self.wait_for_routes(self.CABLES, "mended", time.monotonic())
+
+
+class Ring(Topology, Cuts, unittest.TestCase):
+    NAMES = ["n1", "n2", "n3", "n4", "n5"]
+    CABLES = [("n1", "n2"), ("n2", "n3"), ("n3", "n4"), ("n4", "n5"), ("n5", "n1")]
+    NEAR, FAR = "n1", "n3"
+    HAS_LINKS = True
 
     def test_a_binding_at_the_other_end_of_a_lost_link_moves_too(self):
         one, other = "n4", "n5"
@@ -534,14 +550,21 @@ class Ring(Topology, unittest.TestCase):
                 self.network.end_silence(one, other)
         self.wait_for_routes(self.CABLES, "mended", time.monotonic())
 
-    def listed(self):
-        return "\n".join(f"{name}: {json.dumps(node.peers())}" for name, node in self.nodes.items())
-
     def test_a_cable_is_unplugged(self):
         self.check_cut(("n1", "n2"), self.network.unplug, self.network.plug_in, "unplugged")
 
     def test_a_cable_loses_everything(self):
         self.check_cut(("n3", "n4"), self.network.silence, self.network.end_silence, "silent")
+
+
+class CableGrid(Cuts, unittest.TestCase):
+    NAMES, CABLES, NEAR, FAR = Grid.NAMES, Grid.CABLES, Grid.NEAR, Grid.FAR
+
+    def test_a_cable_at_a_corner_loses_everything(self):
+        self.check_cut(("n01", "n02"), self.network.silence, self.network.end_silence, "silent at a corner")
+
+    def test_a_cable_in_the_middle_loses_everything(self):
+        self.check_cut(("n11", "n12"), self.network.silence, self.network.end_silence, "silent in the middle")
 
 
 if __name__ == "__main__":

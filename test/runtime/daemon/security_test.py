@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: BSL-1.0
 """clesd with security: its configuration, and daemons of one fleet."""
 
+import errno
+import json
 import os
 import pwd
 import shutil
 import subprocess
 import unittest
 
-from daemon import clesd
+from daemon import HOSTILE, clesd
 from secured import Fleet, Node, cles
 from support import PATIENCE, wait_until
 
@@ -126,6 +128,23 @@ class LocalUsers(unittest.TestCase):
                 self.assertIn('"node":"car1"', self.ask_as(nobody, car1, "PULL self:cles"))
                 self.assertIn("denied", self.ask_as(nobody, car1, "PULL self:cles/peers"))
                 self.assertNotIn('"node"', self.ask_as(daemon, car1, "PULL self:cles"))
+
+
+class Isolation(unittest.TestCase):
+    def test_an_isolated_plugin_sees_the_requester_and_not_the_key(self):
+        with Fleet("car1", "car2") as fleet:
+            os.mkdir(fleet.file("plugins"), 0o755)
+            shutil.copy(HOSTILE, fleet.file("plugins"))
+            more = f"plugin_path: {fleet.file('plugins')}\nplugins:\n  - path: hostile.so\n    isolation: process\n"
+            with Node(fleet, "car1", more) as node:
+                code, out, err = cles("pull", "car1:caller", "-k", fleet.keys("car2"), "--at", node.url, "-o", "json")
+                self.assertEqual(code, 0, err)
+                caller = json.loads(out)
+                self.assertEqual((caller["transport"], caller["name"]), ("tls", "car2"))
+                confined = next(each for each in node.messages() if "confined to" in each)
+                if "no Landlock" not in confined:
+                    key = os.path.join(fleet.keys("car1"), "key").replace("/", "%2F")
+                    self.assertEqual(json.loads(node.ask(f"PULL self:reads/{key}"))["value"], errno.EACCES)
 
 
 if __name__ == "__main__":

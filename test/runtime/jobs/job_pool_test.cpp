@@ -65,6 +65,56 @@ BOOST_FIXTURE_TEST_CASE(results_are_the_same_as_inline, fixture) {
     BOOST_TEST(ask("DELEGATE self:refusing") == R"({"error":"denied","message":"car1: not you"})");
 }
 
+namespace {
+
+/// A requester that keeps the callback with which its withdrawal is reported.
+class late_withdrawal final : public cles::detail::call_control {
+  public:
+    explicit late_withdrawal(std::string& outcome) : outcome_(outcome) {}
+    void done(std::string_view json) override { outcome_ = json; }
+    void fail(errc, std::string_view message) override { outcome_ = message; }
+    bool progress(double, std::string_view) override { return false; }
+    void on_stop(std::function<void()> callback) override { withdraw = std::move(callback); }
+    [[nodiscard]] bool stopped() const noexcept override { return false; }
+    void delegate(std::string_view, const cles::call_options&, cles::answer_callback) override {}
+    void log(cles::log_level, std::string_view) override {}
+
+    std::function<void()> withdraw;
+
+  private:
+    std::string& outcome_;
+};
+
+} // namespace
+
+BOOST_FIXTURE_TEST_CASE(a_withdrawal_reported_after_the_job_has_ended_concerns_no_other_job, fixture) {
+    cles::detail::request_data data{.verb = cles::verb::delegate, .node = "car1", .task = "held", .parameters = {}};
+    const cles::identity somebody{
+        .transport = "tcp", .address = "tcp://127.0.0.1:1", .name = "", .uid = std::nullopt, .local = true};
+    data.peer = &somebody;
+    const auto work = [](std::shared_ptr<gate> behind) {
+        return std::make_shared<const cles::registration>(
+            cles::registration{.plain = [behind](const cles::request&, cles::json_writer& w) {
+                if (behind) {
+                    behind->pass();
+                }
+                w.raw("{}");
+            }});
+    };
+    std::string first;
+    std::string second;
+    const auto early = std::make_shared<late_withdrawal>(first);
+    pool->dispatcher()->submit(cles::request{data}, responder{early}, work(nullptr));
+    wait_for([&] { return !first.empty(); });
+    io.poll(); // the job has been released
+    pool->dispatcher()->submit(cles::request{data}, responder{std::make_shared<late_withdrawal>(second)}, work(held_));
+    early->withdraw();
+    hold.open();
+    wait_for([&] { return !second.empty(); });
+    BOOST_TEST(second == "{}");
+    BOOST_TEST(pool->figures().withdrawn == 0U);
+}
+
 BOOST_FIXTURE_TEST_CASE(a_job_may_refuse_with_a_retry_delay, fixture) {
     add("full", [](const responder& job) { job.refuse("no room in the dock", 250ms); });
     tasks->on_delegate("full_too", [](const cles::request&, const cles::responder& answer) {

@@ -52,6 +52,51 @@ BOOST_FIXTURE_TEST_CASE(the_jobs_of_one_requester_keep_their_order, fixture) {
     BOOST_TEST(queue.empty());
 }
 
+BOOST_FIXTURE_TEST_CASE(jobs_are_visited_in_the_order_in_which_they_will_start, fixture) {
+    for (const auto* name : {"a1", "a2", "a3"}) {
+        push(name, 1);
+    }
+    push("b1", 2);
+    push("c1", 3);
+    push("c2", 3);
+    std::string order;
+    const auto see = [&](job_queue::item& job, std::size_t ahead) {
+        order += (order.empty() ? "" : " ") + static_cast<named&>(job).name + std::to_string(ahead);
+        return ahead != 4;
+    };
+    queue.visit(see);
+    BOOST_TEST(order == "a10 b11 c12 a23 c24");
+    BOOST_TEST(pop_all() == "a1 b1 c1 a2 c2 a3");
+    queue.visit([](job_queue::item&, std::size_t) -> bool { throw 1; }); // none
+}
+
+BOOST_FIXTURE_TEST_CASE(a_job_that_is_put_back_has_its_old_place, fixture) {
+    for (const auto* name : {"a1", "a2", "a3", "a4"}) {
+        push(name, 1);
+    }
+    queue.remove(made[1]);
+    queue.remove(made[2]);
+    queue.put_back(made[2]);
+    queue.put_back(made[1]);
+    BOOST_TEST(queue.size() == 4U);
+    BOOST_TEST(pop_all() == "a1 a2 a3 a4");
+    queue.put_back(made[3]); // after its requester's other jobs have started
+    push("a5", 1);
+    queue.put_back(made[0]);
+    BOOST_TEST(pop_all() == "a1 a4 a5");
+}
+
+BOOST_FIXTURE_TEST_CASE(a_job_is_put_back_behind_one_that_has_started, fixture) {
+    push("a1", 1);
+    push("a2", 1);
+    queue.remove(made[0]);
+    queue.remove(made[1]);
+    queue.push_resumed(made[1]); // it continues
+    queue.put_back(made[0]);
+    BOOST_TEST(queue.size() == 2U);
+    BOOST_TEST(pop_all() == "a1 a2");
+}
+
 BOOST_FIXTURE_TEST_CASE(requesters_take_turns, fixture) {
     for (const auto* name : {"a1", "a2", "a3", "a4"}) {
         push(name, 1);

@@ -17,17 +17,16 @@ using cles::runtime::job_record;
 const identity somebody{
     .transport = "tcp", .address = "tcp://127.0.0.1:1", .name = "", .uid = std::nullopt, .local = true};
 
-std::set<const job_record*> all_of(const cles::runtime::job_record_pool& records) {
+std::set<const job_record*> all_of(cles::runtime::job_record_pool& records) {
     std::set<const job_record*> all;
-    for (std::size_t i = 0; i < records.size(); ++i) {
-        all.insert(&records[i]);
-    }
+    records.for_each([&](const job_record& r) { all.insert(&r); });
     return all;
 }
 
 BOOST_AUTO_TEST_CASE(records_in_use_are_found_after_others_are_recycled) {
     cles::runtime::job_record_pool records;
     std::vector<job_record*> taken;
+    taken.reserve(5);
     for (int i = 0; i < 5; ++i) {
         taken.push_back(&records.acquire({}));
     }
@@ -37,6 +36,35 @@ BOOST_AUTO_TEST_CASE(records_in_use_are_found_after_others_are_recycled) {
     BOOST_TEST((all_of(records) == std::set<const job_record*>{taken[2], taken[3]}));
     records.recycle(*taken[2]);
     records.recycle(*taken[3]);
+    BOOST_TEST(records.size() == 0U);
+}
+
+BOOST_AUTO_TEST_CASE(a_job_is_found_by_its_number_until_it_ends) {
+    cles::runtime::job_record_pool records;
+    auto& first = records.acquire({});
+    const auto number = first.number;
+    BOOST_TEST(records.find(number) == &first);
+    records.recycle(first);
+    BOOST_TEST(records.find(number) == nullptr);
+    auto& second = records.acquire({});
+    BOOST_TEST(&second == &first);
+    BOOST_TEST(records.find(number) == nullptr);
+    BOOST_TEST(records.find(second.number) == &second);
+    BOOST_TEST(records.find(4711) == nullptr);
+    records.recycle(second);
+}
+
+BOOST_AUTO_TEST_CASE(records_may_be_recycled_while_they_are_visited) {
+    cles::runtime::job_record_pool records;
+    for (int i = 0; i < 3; ++i) {
+        records.acquire({});
+    }
+    int visited = 0;
+    records.for_each([&](job_record& r) {
+        ++visited;
+        records.recycle(r);
+    });
+    BOOST_TEST(visited == 3);
     BOOST_TEST(records.size() == 0U);
 }
 

@@ -3,6 +3,7 @@
 // (README.md of the folder above).
 #include "simulation/gossip_network.hpp"
 #include "simulation/mesh.hpp"
+#include "simulation/sharing.hpp"
 #include "simulation/world/simulate.hpp"
 
 #include <boost/describe/enum_from_string.hpp>
@@ -15,6 +16,7 @@
 #include <exception>
 #include <iomanip>
 #include <iostream>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -108,8 +110,41 @@ int simulate_meshes(const mesh_options& o) {
         }
         failed += r.violations.empty() ? 0 : 1;
         std::cout << "seed " << seed << ": shortest routes after " << r.converged.count() << " ms, another way after "
-                  << r.rerouted.count() << " ms at most, " << r.answered << " of " << r.asked
-                  << " requests answered, over " << r.longest << " links at most" << std::endl;
+                  << r.rerouted.count() << " ms at most, for all of " << r.cut << " pairs after "
+                  << r.all_rerouted.count() << " ms, " << r.answered << " of " << r.asked << " requests answered, over "
+                  << r.longest << " links at most; a node receives " << r.bytes << " bytes in an interval, "
+                  << r.bytes_of_routes << " of routes" << std::endl;
+    }
+    std::cout << failed << " of " << o.seeds << " failed\n";
+    return failed == 0 ? 0 : 1;
+}
+
+// -- sharing -------------------------------------------------------------------------------------------------------
+
+struct sharing_options {
+    std::uint64_t seed = 1;
+    std::uint64_t seeds = 1;
+    sharing_setup setup{};
+};
+
+int simulate_shared_work(const sharing_options& o, planted fault) {
+    std::uint64_t failed = 0;
+    for (auto seed = o.seed; seed < o.seed + o.seeds; ++seed) {
+        const auto begun = std::chrono::steady_clock::now();
+        const auto r = simulate_sharing(seed, o.setup, fault);
+        const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begun;
+        for (const auto& v : r.violations) {
+            std::cout << "seed " << seed << ": " << to_string(v.broken) << ": " << v.what << '\n';
+        }
+        failed += r.violations.empty() ? 0 : 1;
+        std::cout << "seed " << seed << ": " << r.jobs << " jobs, " << r.succeeded << " succeeded";
+        for (const auto& [code, count] : r.failed) {
+            std::cout << ", " << count << ' ' << code;
+        }
+        std::cout << "; " << r.moved << " moved, " << r.returned << " returned, " << r.grants << " grants; " << r.faults
+                  << " faults; " << std::fixed << std::setprecision(1) << r.seconds << " s in " << took.count()
+                  << " s\n";
+        std::cout.flush();
     }
     std::cout << failed << " of " << o.seeds << " failed\n";
     return failed == 0 ? 0 : 1;
@@ -232,12 +267,29 @@ int main(int argc, char** argv) {
     mesh->add_option("--degree", sparse.setup.mean_degree, "The mean number of links of a node")
         ->capture_default_str()
         ->check(CLI::Range(2, 16));
+    mesh->add_option("--form", sparse.setup.form, "random, line, ring, star or grid")
+        ->transform(CLI::CheckedTransformer(std::map<std::string, mesh_form>{{"random", mesh_form::random},
+                                                                             {"line", mesh_form::line},
+                                                                             {"ring", mesh_form::ring},
+                                                                             {"star", mesh_form::star},
+                                                                             {"grid", mesh_form::grid}}));
     mesh->add_option("--cuts", sparse.setup.cuts, "Links that are lost")->capture_default_str();
     mesh->add_option("--crashes", sparse.setup.crashes, "Nodes that crash")->capture_default_str();
     mesh->add_option("--requests", sparse.setup.requests, "After each change")->capture_default_str();
     mesh->add_flag("!--undeclared", sparse.setup.declared, "The nodes have to find out which links there are");
     mesh->add_option("--seed", sparse.seed, "The first")->capture_default_str();
     mesh->add_option("--seeds", sparse.seeds, "How many")->capture_default_str();
+    sharing_options shared;
+    auto* sharing = program.add_subcommand("sharing", "Simulates nodes that share their jobs");
+    sharing->add_option("--nodes", shared.setup.nodes, "How many")->capture_default_str()->check(CLI::Range(2, 5000));
+    sharing->add_option("--degree", shared.setup.mean_degree, "The mean number of links of a node")
+        ->capture_default_str()
+        ->check(CLI::Range(2, 16));
+    sharing->add_option("--clients", shared.setup.clients, "That submit jobs")->capture_default_str();
+    sharing->add_option("--jobs", shared.setup.jobs, "In all")->capture_default_str();
+    sharing->add_option("--faults", shared.setup.faults_per_minute, "For each node in a minute")->capture_default_str();
+    sharing->add_option("--seed", shared.seed, "The first")->capture_default_str();
+    sharing->add_option("--seeds", shared.seeds, "How many")->capture_default_str();
     auto* gossip = program.add_subcommand("gossip", "Measures gossip among many nodes");
     gossip->add_option("--nodes", many.nodes, "How many")->capture_default_str();
     gossip
@@ -249,7 +301,10 @@ int main(int argc, char** argv) {
         ->check(CLI::IsMember({"start", "short-cut", "long-cut", "weather"}));
     CLI11_PARSE(program, argc, argv);
     try {
-        return *gossip ? measure_gossip(many) : *mesh ? simulate_meshes(sparse) : run(given);
+        return *gossip    ? measure_gossip(many)
+               : *mesh    ? simulate_meshes(sparse)
+               : *sharing ? simulate_shared_work(shared, given.fault)
+                          : run(given);
     } catch (const std::exception& e) {
         std::cerr << "cles_simulation: " << e.what() << '\n';
         return 2;

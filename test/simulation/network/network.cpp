@@ -47,6 +47,22 @@ void network::mute(unsigned from, unsigned to, time_point until) {
     disturbed_ = std::max(disturbed_, until);
 }
 
+// A marker that is split between two packets is missed.
+void network::count(std::string_view bytes, bool& in_routes) noexcept {
+    arrived_.all += bytes.size();
+    while (!bytes.empty()) {
+        constexpr std::string_view begin = "\"routes\":{";
+        const auto end = in_routes ? bytes.find('}') : bytes.find(begin);
+        const auto size = std::min(end, bytes.size());
+        arrived_.routes += in_routes ? size : 0;
+        bytes.remove_prefix(size);
+        if (!bytes.empty()) {
+            in_routes = !in_routes;
+            bytes.remove_prefix(in_routes ? begin.size() : 1);
+        }
+    }
+}
+
 void network::calm() {
     weather_ = {};
     stormy_ = false;

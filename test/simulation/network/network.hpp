@@ -80,6 +80,14 @@ class network {
     void mute(unsigned from, unsigned to, time_point until);
     /// Only these hosts are connected; the others refuse to be dialled.
     void connect_only(std::function<bool(unsigned a, unsigned b)> connected) { connected_ = std::move(connected); }
+    /// Bytes of streams that have arrived anywhere, and those of routes in them.
+    struct traffic {
+        std::uint64_t all = 0;
+        std::uint64_t routes = 0;
+    };
+    [[nodiscard]] const traffic& arrived() const noexcept { return arrived_; }
+    /// `in_routes`: whether the stream's last bytes were part of routes.
+    void count(std::string_view bytes, bool& in_routes) noexcept;
     /// All faults end.
     void calm();
     [[nodiscard]] bool reaches(unsigned from, unsigned to) const;
@@ -152,6 +160,7 @@ class network {
     std::map<std::pair<unsigned, unsigned>, dice> chances_;
     planted fault_;
     weather weather_;
+    traffic arrived_;
     std::function<bool(unsigned a, unsigned b)> connected_; // empty: all are
     bool stormy_ = false;
     bool secured_ = false;

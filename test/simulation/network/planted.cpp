@@ -19,6 +19,9 @@ bool is_push(std::string_view line) {
 }
 // A router's request for a node that it has chosen.
 bool is_choice(std::string_view line) { return line.starts_with("DELEGATE car"); }
+bool is_moved_job(std::string_view line) {
+    return line.starts_with("DELEGATE ") && line.find(" grant=") != std::string_view::npos;
+}
 bool is_result(std::string_view line) {
     return line.starts_with("id=") && line.find(" {\"op\":") != std::string_view::npos &&
            line.find(" progress=") == std::string_view::npos;
@@ -68,7 +71,8 @@ void exchange_ids(text_lines& lines) {
 } // namespace
 
 void tampering::apply(std::string& lines, const std::weak_ptr<place>& sender, dice& chance) {
-    const bool always = fault_ == planted::rebind_forgotten || fault_ == planted::way_repeats;
+    const bool always =
+        fault_ == planted::rebind_forgotten || fault_ == planted::way_repeats || fault_ == planted::moved_twice;
     const bool sometimes =
         fault_ == planted::stream_repeats || fault_ == planted::replies_swapped || fault_ == planted::ids_exchanged;
     if (!always && (!sometimes || chance.chance(500))) {
@@ -79,6 +83,7 @@ void tampering::apply(std::string& lines, const std::weak_ptr<place>& sender, di
     switch (fault_) {
     case planted::rebind_forgotten: swallow_rebinds(each, bound_[sender]); break;
     case planted::way_repeats: repeat(each, is_choice, "9000000"); break; // the reply to the copy matches no request
+    case planted::moved_twice: repeat(each, is_moved_job, "9000000"); break;
     case planted::stream_repeats: repeat(each, is_push, ""); break;
     case planted::replies_swapped: swap_replies(each); break;
     default: exchange_ids(each);

@@ -50,6 +50,9 @@ BOOST_DEFINE_FIXED_ENUM_CLASS(planted, std::uint8_t,
                               stuck_unnoticed,    ///< stuck workers are not detected
                               links_ignored,      ///< the nodes of a mesh state no `links`
                               route_withheld,     ///< a node of a mesh forwards nothing
+                              moved_run_again,    ///< a pool runs a job that another node has been given
+                              moved_twice,        ///< a node forwards each job that it moves twice
+                              slots_overstated,   ///< a pool reports busy workers as free
                               urgent_lost,        ///< a stream loses urgent lines
                               finish_resets,      ///< a link that finishes is reset
                               forgery_taken,      ///< a line that is not sealed counts as that of a member

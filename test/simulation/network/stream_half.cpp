@@ -121,6 +121,7 @@ void stream_half::start(std::shared_ptr<link_events> owner) {
 // -- reading -------------------------------------------------------------------------------------------------------
 
 void stream_half::arrive(std::string_view bytes) {
+    net_.count(bytes, in_routes_);
     if (severed_) {
         return;
     }

@@ -114,8 +114,9 @@ class stream_half final : public link, public std::enable_shared_from_this<strea
     bool severed_ = false;
     std::unique_ptr<stream_gate> gate_; // null: without security
     std::function<void(bool)> opened_;
-    bool opening_ = false; // the peer has not been admitted yet
-    bool removed_ = false; // the peer or this end: nothing is delivered or sent any more
+    bool opening_ = false;   // the peer has not been admitted yet
+    bool removed_ = false;   // the peer or this end: nothing is delivered or sent any more
+    bool in_routes_ = false; // what arrives next
 };
 
 } // namespace cles::simulation

@@ -4,9 +4,11 @@
 #include <cles/error.hpp>
 
 #include "jobs/service_time.hpp"
+#include "node/sharing/sharing_driver.hpp"
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 namespace cles::simulation {
 
@@ -19,8 +21,8 @@ constexpr milliseconds to_stop{5};
 
 } // namespace
 
-work_pool::work_pool(node_run& host)
-    : host_(host), queue_(host.fault() == planted::queue_boundless ? 1'000 : most_queued) {}
+work_pool::work_pool(node_run& host, std::size_t most_queued)
+    : host_(host), most_queued_(most_queued), queue_(host.fault() == planted::queue_boundless ? 1'000 : most_queued) {}
 
 void work_pool::submit(order what) {
     const auto refuse = [&](milliseconds retry) {
@@ -28,7 +30,8 @@ void work_pool::submit(order what) {
                            .message = host_.name() + " is busy",
                            .retry_ms = static_cast<std::uint32_t>(retry.count())});
     };
-    if (watch_.usable() == 0) {
+    check_granted(what);
+    if (draining_ || watch_.usable() == 0) {
         refuse(std::chrono::seconds{1});
         return;
     }
@@ -48,12 +51,17 @@ void work_pool::submit(order what) {
         }
     });
     host_.later({}, [self = shared_from_this()] { self->work(); });
+    report_change();
 }
 
+// Nothing more leaves the node, above all no cancellation of what has moved.
 void work_pool::crash() {
     while (queue_.pop() != nullptr) {
     }
     jobs_.clear();
+    on_drained_ = nullptr;
+    host_.crash();
+    sharing_.reset();
 }
 
 node_load work_pool::load() const noexcept {
@@ -97,6 +105,7 @@ void work_pool::end(std::uint64_t number) {
     jobs_.erase(found);
     answer->done("{}");
     work();
+    report_change();
 }
 
 void work_pool::stop(std::uint64_t number) {
@@ -105,10 +114,14 @@ void work_pool::stop(std::uint64_t number) {
         return;
     }
     auto& j = *found->second;
-    if (j.queued()) {
+    if (j.queued() || j.moved != 0) {
         queue_.remove(j);
+        if (j.moved != 0) {
+            sharing_->withdraw(j.moved);
+        }
         host_.later({}, [keep = std::move(j.what.answer)] {}); // its requester is being notified
         jobs_.erase(found);
+        update_drain(false);
         return;
     }
     j.due = std::min(j.due, host_.now());
@@ -131,12 +144,109 @@ void work_pool::watch() {
     if (watching_) {
         host_.later(watch_every, [self = shared_from_this()] { self->watch(); });
     }
+    report_change();
+}
+
+// -- jobs that other nodes run -------------------------------------------------------------------------------------
+
+void work_pool::share() { sharing_ = core::make_sharing(host_.local(), *this); }
+
+void work_pool::report_change() {
+    if (sharing_) {
+        sharing_->on_change();
+    }
+    update_drain(false);
+}
+
+shareable_queue::state work_pool::read_state() const {
+    const auto usable = watch_.usable();
+    const auto busy = host_.fault() == planted::slots_overstated ? 0 : std::min(at_work_, usable);
+    return {.waiting = static_cast<std::uint32_t>(queue_.size()),
+            .idle = static_cast<std::uint32_t>(draining_ ? 0 : usable - busy),
+            .workers = static_cast<std::uint32_t>(usable),
+            .service_time = std::chrono::ceil<std::chrono::microseconds>(service_time_.value())};
+}
+
+void work_pool::offer(job_taker& to) {
+    std::vector<job*> taken;
+    queue_.visit([&](runtime::job_queue::item& each, std::size_t ahead) {
+        auto& j = static_cast<job&>(each);
+        if (to.wants(*j.what.answer, ahead)) {
+            taken.push_back(&j);
+        }
+        return !to.full();
+    });
+    for (auto* j : taken) {
+        queue_.remove(*j);
+    }
+    for (auto* j : taken) {
+        if (!j->what.answer->wanted().grantee.empty()) {
+            complain(rule::effects_once, "passes on a job that has moved already");
+        }
+        ++sent_;
+        j->moved = to.take(j->what.answer, j->what.body, [weak = weak_from_this(), number = j->number](bool refused) {
+            if (const auto self = weak.lock()) {
+                self->end_move(number, refused);
+            }
+        });
+    }
+}
+
+void work_pool::end_move(std::uint64_t number, bool refused) {
+    const auto found = jobs_.find(number);
+    if (found == jobs_.end()) {
+        return; // its node has crashed
+    }
+    auto& j = *found->second;
+    j.moved = 0;
+    returned_ += refused ? 1 : 0;
+    if (refused || host_.fault() == planted::moved_run_again) {
+        j.returned = true;
+        queue_.put_back(j);
+        host_.later({}, [self = shared_from_this()] { self->work(); });
+        return;
+    }
+    jobs_.erase(found);
+    update_drain(false);
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void work_pool::drain(milliseconds limit, std::function<void()> done) {
+    draining_ = true;
+    on_drained_ = std::move(done);
+    host_.later({}, [self = shared_from_this()] { self->update_drain(false); });
+    host_.later(limit, [self = shared_from_this()] { self->update_drain(true); });
+}
+
+void work_pool::update_drain(bool at_limit) {
+    if (on_drained_ && (at_limit || jobs_.empty())) {
+        const auto done = std::exchange(on_drained_, nullptr);
+        fail_open_jobs();
+        done();
+    }
+}
+
+void work_pool::fail_open_jobs() {
+    std::vector<std::uint64_t> open;
+    for (const auto& [number, j] : jobs_) {
+        open.push_back(number);
+    }
+    for (const auto number : open) {
+        const auto& j = *jobs_.at(number);
+        const auto answer = j.what.answer;
+        const auto code = j.queued() ? errc::busy : errc::unavailable;
+        stop(number);
+        answer->fail({.code = code, .message = host_.name() + " is shutting down"});
+    }
 }
 
 // -- checks --------------------------------------------------------------------------------------------------------
 
 void work_pool::check() {
-    if (queue_.size() > most_queued) {
+    const auto returned = [](const auto& each) { return each.second->returned && each.second->queued(); };
+    if (queue_.size() > most_queued_ &&
+        queue_.size() > most_queued_ + static_cast<std::size_t>(std::ranges::count_if(jobs_, returned))) {
         complain(rule::bounded, "has " + std::to_string(queue_.size()) + " jobs waiting");
     }
     if (at_work_ > workers + replacements) {
@@ -150,6 +260,13 @@ void work_pool::check() {
             host_.now() > std::max(j->due, host_.thawed_at()) + grace + 2 * watch_every) {
             complain(rule::bounded, "does not know that a worker is stuck");
         }
+    }
+}
+
+// The node accepts a job on a grant only for a worker that is free at that moment.
+void work_pool::check_granted(const order& what) {
+    if (!what.answer->wanted().grantee.empty() && at_work_ + queue_.size() >= watch_.usable()) {
+        complain(rule::bounded, "has accepted a job on a grant without a free worker");
     }
 }
 

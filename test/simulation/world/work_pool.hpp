@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cles/peer.hpp>
+#include <cles/sharing.hpp>
 
 #include "jobs/job_queue.hpp"
 #include "jobs/service_time.hpp"
@@ -20,28 +21,37 @@
 namespace cles::simulation {
 
 /// The workers of a daemon, in virtual time. Admission, the order of links and the detection of stuck workers are
-/// decided by the classes of runtime/src; this replaces its worker_pool and job_dispatcher, and must be kept consistent
-/// with them.
-class work_pool final : public std::enable_shared_from_this<work_pool> {
+/// decided by the classes of runtime/src, and which jobs move to other nodes by those of libcles; this replaces
+/// worker_pool and job_dispatcher of the runtime, and must be kept consistent with them.
+class work_pool final : public std::enable_shared_from_this<work_pool>, private shareable_queue {
   public:
     static constexpr std::size_t workers = 2;
     static constexpr std::size_t replacements = 1;
-    static constexpr std::size_t most_queued = 5;
     static constexpr std::chrono::milliseconds grace{300};
 
-    explicit work_pool(node_run& host);
+    /// \param most_queued how many jobs may wait
+    explicit work_pool(node_run& host, std::size_t most_queued = 5);
 
     struct order {
         std::uint64_t requester = 0;
         std::shared_ptr<core::call> answer;
         std::chrono::milliseconds work{0};
         bool heeds = true; ///< stops when it is told to
+        std::string body{};
         std::function<void()> begun;
     };
     void submit(order what);
-    /// Its node has crashed: pending work is discarded.
+    /// Shares its jobs with other nodes from now on.
+    void share();
+    /// Admits no more jobs, and calls back when all have ended. At the limit, those that are left fail.
+    void drain(std::chrono::milliseconds limit, std::function<void()> done);
+    /// Its node crashes: pending work is discarded.
     void crash();
     [[nodiscard]] node_load load() const noexcept;
+    [[nodiscard]] bool draining() const noexcept { return draining_; }
+    /// The jobs that have been sent to other nodes, and those of them that have returned.
+    [[nodiscard]] std::size_t sent() const noexcept { return sent_; }
+    [[nodiscard]] std::size_t returned() const noexcept { return returned_; }
     /// Checks that it stays within its limits, and knows stuck workers.
     void check();
     void check_rest();
@@ -51,6 +61,8 @@ class work_pool final : public std::enable_shared_from_this<work_pool> {
         order what;
         std::uint64_t number = 0;
         std::size_t place = 0;
+        std::uint64_t moved = 0; // the ticket, while another node has it
+        bool returned = false;   // another node has refused it
         bool at_work = false;
         bool known_stuck = false;
         time_point begun{};
@@ -61,15 +73,28 @@ class work_pool final : public std::enable_shared_from_this<work_pool> {
     void end(std::uint64_t number);
     void stop(std::uint64_t number);
     void watch();
+    void fail_open_jobs();
+    void update_drain(bool at_limit);
+    void report_change();
+    [[nodiscard]] state read_state() const override;
+    void offer(job_taker& to) override;
+    void end_move(std::uint64_t number, bool refused);
+    void check_granted(const order& what);
     void complain(rule which, const std::string& what);
 
     node_run& host_;
+    const std::size_t most_queued_;
     runtime::job_queue queue_;
     runtime::worker_watchdog watch_{workers, replacements, grace};
     runtime::service_time service_time_;
     std::map<std::uint64_t, std::unique_ptr<job>> jobs_; // by number
     std::uint64_t last_number_ = 0;
     std::size_t at_work_ = 0;
+    std::size_t sent_ = 0;
+    std::size_t returned_ = 0;
+    std::unique_ptr<job_sharing> sharing_; // null: jobs stay
+    std::function<void()> on_drained_;     // null: it is not being drained, or has been
+    bool draining_ = false;
     bool watching_ = false;
 };
 

@@ -93,6 +93,11 @@ struct counters {
     std::uint64_t tables_failed = 0;          ///< of these: refused, late, or malformed
     std::uint64_t tables_told = 0;            ///< sent to others
     std::uint64_t entries_dropped = 0;        ///< entries of tables that could not be parsed
+    std::uint64_t grants_sent = 0;            ///< of free slots, to other nodes
+    std::uint64_t grants_received = 0;        ///< from other nodes
+    std::uint64_t grants_refused = 0;         ///< jobs that came without a valid grant
+    std::uint64_t jobs_moved_in = 0;          ///< jobs of other nodes that were run here
+    std::uint64_t jobs_moved_out = 0;         ///< jobs that other nodes run, or have run
     std::uint64_t leases_expired = 0;
     std::uint64_t datagrams_withheld = 0; ///< to unverified addresses, beyond their share
     std::uint64_t datagrams_unsealed = 0; ///< dropped with security; filled in when they are shown
@@ -112,15 +117,14 @@ struct counters {
     std::uint64_t handlers_running = 0;
     std::uint64_t routed = 0; ///< of these, requests that wait for other nodes
 };
-BOOST_DESCRIBE_STRUCT(counters, (),
-                      (errors, errors_unsent, housekeeping, housekeeping_errors, handlers_running, routed,
-                       requests_repeated, requests_sent, requests_resent, replies_dropped, updates_published,
-                       nouns_retired, updates_delivered, updates_shed, updates_too_large, updates_received,
-                       updates_dropped, updates_unsigned, announcements_sent, announcements_received,
-                       announcements_dropped, announcements_foreign, peers_known, peers_refused, tables_asked,
-                       tables_failed, tables_told, entries_dropped, leases_expired, datagrams_withheld,
-                       datagrams_unsealed, group_received, group_dropped, group_repeated, group_sent, group_unsent,
-                       group_leases, links_open, links_accepted, links_refused, links_evicted, links_lost,
-                       bytes_received, bytes_sent))
+BOOST_DESCRIBE_STRUCT(
+    counters, (),
+    (errors, errors_unsent, housekeeping, housekeeping_errors, handlers_running, routed, requests_repeated,
+     requests_sent, requests_resent, replies_dropped, updates_published, nouns_retired, updates_delivered, updates_shed,
+     updates_too_large, updates_received, updates_dropped, updates_unsigned, announcements_sent, announcements_received,
+     announcements_dropped, announcements_foreign, peers_known, peers_refused, tables_asked, tables_failed, tables_told,
+     entries_dropped, grants_sent, grants_received, grants_refused, jobs_moved_in, jobs_moved_out, leases_expired,
+     datagrams_withheld, datagrams_unsealed, group_received, group_dropped, group_repeated, group_sent, group_unsent,
+     group_leases, links_open, links_accepted, links_refused, links_evicted, links_lost, bytes_received, bytes_sent))
 
 } // namespace cles::core

@@ -69,16 +69,6 @@ bool direct_links::on_failure(std::string_view node, time_point now) {
     return is_new;
 }
 
-std::vector<std::string> direct_links::doubtful(time_point before) const {
-    std::vector<std::string> found;
-    for (const auto& [node, f] : failed_) {
-        if (!f.alive && f.first <= before) {
-            found.push_back(node);
-        }
-    }
-    return found;
-}
-
 void direct_links::on_alive(std::string_view node) {
     if (const auto at = failed_.find(node); at != failed_.end()) {
         at->second.alive = true;

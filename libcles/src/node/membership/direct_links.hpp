@@ -46,9 +46,7 @@ class direct_links {
 
     /// A link to the node could not be opened, or the node does not reply on it. Returns whether that is new.
     bool on_failure(std::string_view node, time_point now);
-    /// Nodes to which attempts have failed since before that time, and of which it is not known whether they are alive.
-    [[nodiscard]] std::vector<std::string> doubtful(time_point before) const;
-    /// Another node has a link to it.
+    /// It is reached by others.
     void on_alive(std::string_view node);
     /// Nodes to which a link is lost, each once.
     [[nodiscard]] std::vector<std::string> take_lost(const membership& others);

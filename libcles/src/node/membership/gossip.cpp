@@ -94,7 +94,7 @@ void gossip::on_answer(std::uint64_t ticket, std::string_view json, time_point n
         if (security_ == nullptr) { // otherwise the announcement states its addresses
             others_.prefer_address(table.node, table.epoch, c->url);
         }
-        reach_.on_reply(table, c->sent);
+        reach_.on_reply(table);
         push_routes(now);
     }
     if (table.node == self_.name && table.epoch == self_.epoch) {
@@ -269,28 +269,26 @@ void gossip::on_gone(std::string_view node, std::string_view where, time_point n
 // At once, so that a lost link is known as soon as the messages arrive, instead of after a turn for each node on the
 // way.
 void gossip::push_routes(time_point now) {
-    const auto nodes = reach_.take_unsent(now);
-    if (nodes.empty() || reach_.need(now) == 0) {
+    const auto news = reach_.take_unsent(now);
+    if (news.empty() || reach_.need(now) == 0) {
         return;
     }
     for (auto& c : contacts_) {
-        if (c.node.empty() || !reach_.is_usable(c.node)) {
-            continue;
-        }
-        std::vector<peer_table::route> routes;
-        for (const auto& node : nodes) {
-            if (routes.size() >= max_pushed_routes) { // the others are asked for anyway
-                break;
+        for (auto next = news.begin(); !c.node.empty() && reach_.is_usable(c.node) && next != news.end();) {
+            std::vector<peer_table::route> routes;
+            std::vector<peer_table::route> wanted;
+            for (; next != news.end() && std::max(routes.size(), wanted.size()) < max_pushed_routes; ++next) {
+                const auto item = others_.entry_of(next->first);
+                if (const auto advert = item ? reach_.advert_of(*item, c.node) : std::nullopt) {
+                    routes.push_back({item->epoch, *advert});
+                }
+                if (item && next->second) {
+                    wanted.push_back({item->epoch, *next->second});
+                }
             }
-            const auto item = others_.entry_of(node);
-            if (const auto advert = item ? reach_.advert_of(*item, c.node) : std::nullopt) {
-                routes.push_back({item->epoch, *advert});
-            }
-        }
-        if (!routes.empty()) {
             std::string table;
             json_writer w{table};
-            write_routes(w, {self_.name, self_.epoch}, others_.pool(), routes);
+            write_routes(w, {self_.name, self_.epoch}, others_.pool(), routes, wanted);
             out_.push(c.url, table);
         }
     }
@@ -348,6 +346,7 @@ void gossip::review(time_point now) {
 }
 
 void gossip::drop_unresponsive(time_point now) {
+    const bool takes_turns = reach_.need(now) <= 1 || contacts_.count(part::chosen) >= max_neighbours;
     for (auto& c : contacts_) {
         if (c.ticket != 0 && now - c.sent > limit * 2) { // no outcome was reported
             c.ticket = 0;
@@ -358,7 +357,8 @@ void gossip::drop_unresponsive(time_point now) {
         }
         const auto known = others_.find_member(c.node);
         // Nodes chosen while few were known would be the same for all, and changes would come only from them.
-        const bool had_its_time = c.until <= now || (c.as == part::chosen && others_.size() >= 2 * c.among);
+        const bool had_its_time =
+            takes_turns && (c.until <= now || (c.as == part::chosen && others_.size() >= 2 * c.among));
         if (!known || (!can_be_asked(*known, now) && c.ticket == 0) || c.failures >= max_failures ||
             (had_its_time && c.ticket == 0)) {
             end(c, c.failures != 0, now);

@@ -64,7 +64,7 @@ class gossip : private deadline {
     static constexpr int intervals_of_stay = 30;         ///< of a random node
     static constexpr std::size_t bytes_a_second = 4096;  ///< average for tables that are always sent whole
     static constexpr std::size_t max_neighbours = 16;    ///< that are asked for routes
-    static constexpr std::size_t max_pushed_routes = 32; ///< at once: they fit into a datagram
+    static constexpr std::size_t max_pushed_routes = 20; ///< in a message: they fit into a datagram
 
     struct self {
         std::string name;

@@ -691,6 +691,9 @@ std::optional<delta_entry> membership::description_of(std::uint32_t epoch) const
 }
 
 std::optional<delta_entry> membership::entry_of(std::string_view node) const {
+    if (node == own_name_ && own_) {
+        return delta_entry::of(delta_entry::kind::heartbeat, own_name_, *own_, peer_state::live);
+    }
     const auto at = peers_.find(node);
     return at == peers_.end() ? std::nullopt
                               : std::optional{delta_entry::of(delta_entry::kind::heartbeat, at->first, at->second.owner,

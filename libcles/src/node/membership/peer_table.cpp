@@ -306,7 +306,7 @@ bool read_route(json_reader& r, route_advert& out) {
     return r.ok();
 }
 
-bool read_routes(json_reader& r, std::size_t most, peer_table& out) {
+bool read_routes(json_reader& r, std::size_t most, std::vector<peer_table::route>& out) {
     return read_members(r, [&](std::string_view key) {
         const auto epoch = protocol::parse_epoch(key);
         if (!epoch || most == 0) {
@@ -317,7 +317,7 @@ bool read_routes(json_reader& r, std::size_t most, peer_table& out) {
         if (!read_route(r, found.advert)) {
             return false;
         }
-        out.routes.push_back(found);
+        out.push_back(found);
         return true;
     });
 }
@@ -366,17 +366,22 @@ void write_own_entry(json_writer& w, const incarnation& own, time_point now) {
 }
 
 void write_routes(json_writer& w, const table_owner& who, std::string_view pool,
-                  const std::vector<peer_table::route>& routes) {
+                  const std::vector<peer_table::route>& routes, const std::vector<peer_table::route>& wanted) {
     w.begin_object();
     write_owner(w, who, pool);
     w.plain_key("peers");
     w.raw("[]");
-    w.plain_key("routes");
-    w.begin_object();
-    for (const auto& [epoch, advert] : routes) {
-        write_route(w, epoch, advert);
+    for (const auto* const part : {&routes, &wanted}) {
+        if (part->empty()) {
+            continue;
+        }
+        w.plain_key(part == &routes ? "routes" : "wanted");
+        w.begin_object();
+        for (const auto& [epoch, advert] : *part) {
+            write_route(w, epoch, advert);
+        }
+        w.end_object();
     }
-    w.end_object();
     w.end_object();
 }
 
@@ -389,7 +394,8 @@ bool read_table(std::string_view json, std::size_t max_entries, std::chrono::mil
         has_peers = has_peers || key == "peers";
         return key == "peers"    ? read_entries(r, max_entries, usual, form, out)
                : key == "beats"  ? read_heartbeats(r, max_entries, out)
-               : key == "routes" ? read_routes(r, max_entries, out)
+               : key == "routes" ? read_routes(r, max_entries, out.routes)
+               : key == "wanted" ? read_routes(r, max_entries, out.wanted)
                : key == "node"   ? r.read(out.node)
                : key == "epoch"  ? r.read(out.epoch)
                : key == "pool"   ? r.read(out.pool)

@@ -67,12 +67,13 @@ struct peer_table {
         route_advert advert;
     };
     std::vector<route> routes;   ///< from the node that replies
+    std::vector<route> wanted;   ///< numbers that it needs; hops: over how many links that may still spread
     std::size_t bad_entries = 0; ///< that could not be read, and were skipped
 };
 
-/// Writes the body of `PUSH self:cles/peers` with routes that have changed.
+/// Writes the body of `PUSH self:cles/peers` with routes that have changed, and numbers that are needed.
 void write_routes(json_writer& w, const table_owner& who, std::string_view pool,
-                  const std::vector<peer_table::route>& routes);
+                  const std::vector<peer_table::route>& routes, const std::vector<peer_table::route>& wanted);
 
 /// How the entries of tables are written.
 enum class entry_form : std::uint8_t {

@@ -10,6 +10,8 @@ namespace cles::core {
 namespace {
 
 constexpr std::uint64_t max_number = std::uint64_t{1} << 62U; // leaves room to count
+// By so much greater than the known one: no node reaches it by itself within an interval.
+constexpr std::uint64_t number_of_life = 2;
 
 } // namespace
 
@@ -133,10 +135,9 @@ std::optional<route_advert> reachability::advert_of(const delta_entry& item, std
     return routes_.advertise(item.node, item.epoch, direct, usable(), to);
 }
 
-void reachability::on_reply(const peer_table& table, time_point asked) {
+void reachability::on_reply(const peer_table& table) {
     on_reached(table.node);
     apply(table);
-    find_lost_links(table.node, asked);
 }
 
 void reachability::apply(const peer_table& table) {
@@ -160,26 +161,65 @@ void reachability::apply(const peer_table& table) {
         const auto after = routes_.in_use(name, works);
         if (before != after) {
             others_.touch(name);
+            request_if_needed(name);
         }
         if (before.by != after.by) {
-            unsent_.insert(name);
             out_.on_route_changed(name);
+        }
+        const auto number = routes_.requested(name);
+        if (advert.hops && advert.seq >= number) {
+            direct_.on_alive(name);
+        }
+        if (before.by.empty() != after.by.empty() || before.hops != after.hops ||
+            (before.seq < number && after.seq >= number)) {
+            unsent_.try_emplace(name);
         }
         if (was_offered && !advert.hops && name != table.node) {
             out_.on_route_lost(name, address_of(table.node));
         }
     }
+    report_lost_links();
 }
 
-// A neighbour that still has a link to a node, after the time in which it would have noticed a crash, shows that the
-// node is alive.
-void reachability::find_lost_links(std::string_view neighbour, time_point asked) {
-    for (const auto& node : direct_.doubtful(asked - silence() - interval() / turns_per_interval)) {
-        if (node != neighbour && routes_.is_offered(node, neighbour)) {
-            direct_.on_alive(node);
-        }
+void reachability::on_pushed(const peer_table& table) {
+    apply(table);
+    for (const auto& each : table.wanted) {
+        answer(each, table.node);
     }
-    report_lost_links();
+}
+
+// With its own number, or with a route that has the number; or by asking others (Babel, RFC 8966, section 3.8.1.2).
+void reachability::answer(const peer_table::route& wanted, std::string_view neighbour) {
+    const auto& [epoch, asked] = wanted;
+    if (others_.own() != nullptr && others_.own()->epoch == epoch) {
+        number_ = std::max(number_, std::min(asked.seq, number_ + number_of_life));
+        others_.touch(own_name_);
+        unsent_.try_emplace(own_name_);
+        return;
+    }
+    const auto* const node = others_.owner_of(epoch);
+    if (node == nullptr || !out_.forwards()) {
+        return;
+    }
+    const auto item = others_.entry_of(*node);
+    const auto known = advert_of(*item, neighbour);
+    if (known && known->hops && known->seq >= asked.seq) {
+        unsent_.try_emplace(*node);
+    } else if (asked.hops.value_or(0) > 1 && asked.seq <= routes_.newest(*node) + route_table::max_late) {
+        request(*node, asked.seq, std::min(*asked.hops, everywhere) - 1);
+    }
+}
+
+void reachability::request(const std::string& node, std::uint64_t number, unsigned distance) {
+    if (const auto item = others_.entry_of(node); item && routes_.request(node, item->epoch, number)) {
+        unsent_[node] = route_advert{number, distance};
+    }
+}
+
+void reachability::request_if_needed(const std::string& node) {
+    if (const auto missing = is_usable(node) ? 0 : routes_.missing_number(node, usable())) {
+        request(node, missing, everywhere);
+    }
 }
 
 void reachability::report_lost_links() {
@@ -194,14 +234,15 @@ void reachability::lose(std::string_view neighbour, time_point now) {
         return;
     }
     reconsider(neighbour);
-    ++number_; // the routes to this node that lead over the lost link are out of date
-    others_.touch(own_name_);
-    for (auto& name : routes_.destinations_by(neighbour)) {
+    for (const auto& name : routes_.destinations_by(neighbour)) {
         if (name != neighbour) {
             out_.on_route_lost(name, address_of(neighbour));
         }
-        unsent_.insert(std::move(name));
+        unsent_.try_emplace(name);
+        request_if_needed(name);
     }
+    // A number that the node can have stated only after that shows that it is alive.
+    request(std::string{neighbour}, routes_.newest(neighbour) + number_of_life, everywhere);
 }
 
 // Whether that neighbour can be used has changed.
@@ -213,11 +254,11 @@ void reachability::reconsider(std::string_view neighbour) {
     }
 }
 
-std::set<std::string> reachability::take_unsent(time_point now) {
+reachability::news reachability::take_unsent(time_point now) {
     if (unsent_.empty() || now < next_push_) {
         return {};
     }
-    next_push_ = now + interval() / turns_per_interval;
+    next_push_ = now + interval() / pushes_per_interval;
     return std::exchange(unsent_, {});
 }
 

@@ -12,8 +12,9 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -45,6 +46,7 @@ class reachability {
     static constexpr unsigned everywhere = route_table::max_hops; ///< how far the need for routes spreads
     static constexpr int intervals_of_need = 4;                   ///< until others' need is forgotten
     static constexpr int turns_per_interval = 8;                  ///< in which neighbours are asked
+    static constexpr int pushes_per_interval = 32;                ///< of changed routes, at most
 
     reachability(std::string own_name, listener& out, membership& others, std::size_t max_nodes)
         : own_name_(std::move(own_name)), out_(out), others_(others), direct_(own_name_), routes_(max_nodes) {}
@@ -93,25 +95,29 @@ class reachability {
     [[nodiscard]] std::optional<route_advert> advert_of(const delta_entry& item, std::string_view to);
     /// The node has replied.
     void on_reached(std::string_view node);
-    /// The neighbour has replied to what it was asked at that time.
-    void on_reply(const peer_table& table, time_point asked);
-    /// It has sent routes without being asked.
-    void on_pushed(const peer_table& table) { apply(table); }
+    /// The neighbour has replied.
+    void on_reply(const peer_table& table);
+    /// It has sent routes without being asked, or asks for numbers.
+    void on_pushed(const peer_table& table);
     /// It does not reply: what it has advertised does not count until it does.
     void lose(std::string_view neighbour, time_point now);
     /// Whether there are routes to be pushed to neighbours.
     [[nodiscard]] bool has_unsent() const noexcept { return !unsent_.empty(); }
-    /// When they may be: at once, but at most once a turn, because nodes that lose their routes may change each other's
+    /// When they may be: at once, but not too often, because nodes that lose their routes may change each other's
     /// several times.
     [[nodiscard]] time_point next_push() const noexcept { return next_push_; }
-    /// The nodes to which routes have changed since the last call; none if it is too early.
-    [[nodiscard]] std::set<std::string> take_unsent(time_point now);
+    /// The nodes to which routes have changed since the last call, each with a request for a greater number of it, if
+    /// needed; none if it is too early.
+    using news = std::map<std::string, std::optional<route_advert>, std::less<>>;
+    [[nodiscard]] news take_unsent(time_point now);
 
   private:
     [[nodiscard]] std::chrono::milliseconds interval() const noexcept { return interval_among(others_.size()); }
     [[nodiscard]] unsigned own_need(time_point now) const;
     void apply(const peer_table& table);
-    void find_lost_links(std::string_view neighbour, time_point asked);
+    void answer(const peer_table::route& wanted, std::string_view neighbour);
+    void request(const std::string& node, std::uint64_t number, unsigned distance);
+    void request_if_needed(const std::string& node);
     [[nodiscard]] std::string node_at(std::string_view url) const;
     void report_lost_links();
     void reconsider(std::string_view neighbour);
@@ -132,8 +138,8 @@ class reachability {
     time_point others_need_until_{};
     std::uint64_t number_ = 1; // of this node's interval, for routes to it
     time_point interval_began_{};
-    std::set<std::string> unsent_;
-    time_point next_push_ = time_point::min();
+    news unsent_;
+    time_point next_push_{};
 };
 
 } // namespace cles::core

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 namespace cles::core {
 
@@ -106,6 +107,30 @@ std::string_view route_table::next_hop(std::string_view name, const usable_funct
 std::optional<unsigned> route_table::hops_to(std::string_view name, const usable_function& usable) const {
     const auto* const found = find(name, usable);
     return found == nullptr ? std::nullopt : std::optional{found->hops + 1};
+}
+
+std::uint64_t route_table::missing_number(std::string_view name, const usable_function& usable) const {
+    const auto at = destinations_.find(name);
+    if (at == destinations_.end() || at->second.hops > max_hops) {
+        return 0;
+    }
+    const auto* const chosen = best(at->second, usable, {});
+    return chosen != nullptr && at->second.is_feasible(*chosen) ? 0 : at->second.seq + 1;
+}
+
+bool route_table::request(std::string_view name, std::uint32_t epoch, std::uint64_t number) {
+    auto& d = entry_of(name, epoch);
+    return number > std::exchange(d.requested, std::max(d.requested, number));
+}
+
+std::uint64_t route_table::newest(std::string_view name) const {
+    const auto at = destinations_.find(name);
+    return at == destinations_.end() ? 0 : at->second.newest;
+}
+
+std::uint64_t route_table::requested(std::string_view name) const {
+    const auto at = destinations_.find(name);
+    return at == destinations_.end() ? 0 : at->second.requested;
 }
 
 route_advert route_table::advertise(std::string_view name, std::uint32_t epoch, bool direct,

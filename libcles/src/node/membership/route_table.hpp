@@ -62,13 +62,23 @@ class route_table {
     [[nodiscard]] route in_use(std::string_view name, const usable_function& usable) const;
     /// The length of the route in use, in links; nothing: there is none.
     [[nodiscard]] std::optional<unsigned> hops_to(std::string_view name, const usable_function& usable) const;
+    /// Without a number of at least that, no route to the destination can be advertised again; 0: there is one, or
+    /// none was ever advertised.
+    [[nodiscard]] std::uint64_t missing_number(std::string_view name, const usable_function& usable) const;
+    /// Remembers that this number is asked for. Returns whether that is new.
+    bool request(std::string_view name, std::uint32_t epoch, std::uint64_t number);
+    /// The greatest number that is known; 0: none.
+    [[nodiscard]] std::uint64_t newest(std::string_view name) const;
+    /// The greatest number that was asked for; 0: none.
+    [[nodiscard]] std::uint64_t requested(std::string_view name) const;
     [[nodiscard]] std::size_t size() const noexcept { return destinations_.size(); }
 
   private:
     using offer = route;
     struct destination {
         std::uint32_t epoch = 0;
-        std::uint64_t newest = 0; ///< number that is known
+        std::uint64_t newest = 0;    ///< number that is known
+        std::uint64_t requested = 0; ///< number that was asked for
         std::vector<offer> offers{};
         // The newest and shortest that was advertised: the feasibility distance.
         std::uint64_t seq = 0;

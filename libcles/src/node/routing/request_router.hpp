@@ -42,6 +42,7 @@ class request_router : public router, public std::enable_shared_from_this<reques
     void bind(const protocol::request_line& request, std::string_view requester, relayed_bindings& place,
               time_point due, time_point now, inbound& from) override;
     std::shared_ptr<relays> relayed() override { return relays_; }
+    [[nodiscard]] const service_registry& registry() const noexcept override { return service_registry_; }
     void hold() noexcept override { waits_for_discovery_ = true; }
     void release() override;
     void begin_ready(time_point now) override;

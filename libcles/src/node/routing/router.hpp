@@ -16,6 +16,7 @@ class inbound;
 class local_node;
 class relayed_bindings;
 class relays;
+class service_registry;
 
 /// The routing of a node. Serves its requests for `any`, `all` and other nodes (docs/protocol.md, "Routing"). They have
 /// been checked: the client is authorised, this node is not in `via`, and the body is valid. An interface, so that a
@@ -40,6 +41,9 @@ class router {
                       time_point due, time_point now, inbound& from) = 0;
     /// The source of the relayed bindings.
     virtual std::shared_ptr<relays> relayed() = 0;
+
+    /// The other nodes and their tasks.
+    [[nodiscard]] virtual const service_registry& registry() const = 0;
 
     /// `any` and `all` wait, because discovery is still in progress.
     virtual void hold() = 0;

@@ -127,9 +127,13 @@ void service_registry::on_member_seen(std::string_view name) {
     ask(now);
 }
 
-known_node* service_registry::find(std::string_view name) noexcept {
+const known_node* service_registry::find(std::string_view name) const noexcept {
     const auto at = nodes_.find(name);
     return at == nodes_.end() ? nullptr : at->second.get();
+}
+
+known_node* service_registry::find(std::string_view name) noexcept {
+    return const_cast<known_node*>(std::as_const(*this).find(name)); // NOLINT(cppcoreguidelines-pro-type-const-cast)
 }
 
 service_registry::digest_group* service_registry::digest_group_of(const known_node& n) noexcept {

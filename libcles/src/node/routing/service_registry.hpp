@@ -112,6 +112,11 @@ class service_registry final : private deadline {
     [[nodiscard]] bool expects_more() const noexcept { return !expected_.empty(); }
     /// Null if it is not known.
     [[nodiscard]] known_node* find(std::string_view name) noexcept;
+    [[nodiscard]] const known_node* find(std::string_view name) const noexcept;
+    /// By name.
+    [[nodiscard]] const std::map<std::string, std::unique_ptr<known_node>, std::less<>>& nodes() const noexcept {
+        return nodes_;
+    }
 
   private:
     /// The nodes with one digest.

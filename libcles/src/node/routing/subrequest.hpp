@@ -32,9 +32,10 @@ struct subrequest_failure {
 using subrequest_outcome = std::function<void(std::string_view json, subrequest_failure* why)>;
 
 /// The part of a request for a client that another node serves: waits for its reply.
-class subrequest final : public detail::pending {
+class subrequest : public detail::pending {
   public:
     explicit subrequest(subrequest_outcome then) noexcept : then_(std::move(then)) {}
+    virtual ~subrequest() = default;
 
     verdict offer(std::string_view json) override;
     void fail(boost::system::error_code code, std::string_view message) override;

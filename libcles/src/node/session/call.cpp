@@ -48,6 +48,9 @@ void call::done(std::string_view json) {
             return;
         }
     }
+    if (!terms_.grantee.empty() && node_->sharing != nullptr) {
+        head_ = node_->sharing->grant_another(terms_.grantee);
+    }
     end().answer(*this, json);
 }
 
@@ -58,6 +61,10 @@ void call::fail(protocol::failure why) {
     const auto keep = shared_from_this();
     if (!terms_.routed) {
         why = after_run(std::move(why));
+        if (!terms_.grantee.empty()) { // its sender takes any failure that does not say so for a refusal
+            why.ran = why.code != errc::busy || why.ran;
+            node_->counts.jobs_moved_in -= why.ran ? 0 : 1;
+        }
     }
     end().refuse(*this, why);
 }
@@ -76,6 +83,16 @@ task_sink& call::end() {
         node_->handler_time.record(node_->time.now() - started_);
     }
     return owner;
+}
+
+void call::leave_to_others() noexcept {
+    terms_.routed = true;
+    ++node_->counts.routed;
+}
+
+void call::take_back() noexcept {
+    terms_.routed = false;
+    --node_->counts.routed;
 }
 
 bool call::progress(double fraction, std::string_view json) {

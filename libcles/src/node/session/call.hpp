@@ -7,6 +7,7 @@
 #include "node/base/memory_budget.hpp"
 #include "node/node_state.hpp"
 #include "node/session/task_execution.hpp"
+#include "node/sharing/movable_request.hpp"
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
@@ -31,13 +32,15 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
         /// Those that the request line states.
         explicit terms(const protocol::request_line& r)
             : carried_adverbs(r.carried()), verb(r.verb), id(r.id), wants_reply(r.wants_reply),
-              wants_progress(r.wants_progress) {}
+              wants_progress(r.wants_progress),
+              grantee(r.grant != 0 ? protocol::last_in_via(r.via) : std::string_view{}) {}
 
         cles::verb verb;
         std::uint64_t id;
         bool wants_reply;
         bool wants_progress;
         bool routed = false;      ///< other nodes serve it
+        std::string grantee{};    ///< the node that has forwarded it on a grant of this one; empty: none
         std::string publish_path; ///< path of a request to publish; else empty
         std::string publish_body;
     };
@@ -78,6 +81,13 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     void set_head(std::string adverbs) { head_ = std::move(adverbs); }
     [[nodiscard]] const std::string& head() const noexcept { return head_; }
 
+    /// What is needed to move it to another node; null if it stays.
+    [[nodiscard]] const movable_request* movable() const noexcept { return movable_.get(); }
+    void set_movable(std::unique_ptr<const movable_request> how) { movable_ = std::move(how); }
+    /// Another node serves it from now on; or it does not after all.
+    void leave_to_others() noexcept;
+    void take_back() noexcept;
+
     [[nodiscard]] const std::shared_ptr<node_state>& host() const noexcept { return node_; }
     /// The account in which memory is reserved; null if it is not counted.
     [[nodiscard]] const std::shared_ptr<memory_account>& memory() const noexcept { return held_.account(); }
@@ -100,6 +110,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     double reported_ = 0;
     std::string head_;
     std::function<void()> on_stop_;
+    std::unique_ptr<const movable_request> movable_;
     bool stopped_ = false;
 };
 

@@ -192,8 +192,9 @@ void outbound::on_reply(const protocol::reply_line& reply) {
         auto* operation = e->operation.release();
         ended = true; // an exception comes from its handler
         node_.completions.now([&] {
-            ended = (reply.mark ? operation->offer_marked(reply.body, *reply.mark) : operation->offer(reply.body)) ==
-                    detail::pending::verdict::completed;
+            ended = (reply.mark         ? operation->offer_marked(reply.body, *reply.mark)
+                     : reply.grant != 0 ? operation->offer_granted(reply.body, reply.grant)
+                                        : operation->offer(reply.body)) == detail::pending::verdict::completed;
         });
         if (!ended) {
             e->operation.reset(operation);

@@ -55,7 +55,8 @@ bool is_exempt(const protocol::noun_view& noun) noexcept {
         return false;
     }
     const auto what = noun.parameters.front();
-    return what == "cancel" || what == "roster" || what == "hello" || what == "announced" || what == "leaving";
+    return what == "cancel" || what == "roster" || what == "hello" || what == "announced" || what == "leaving" ||
+           what == "slots";
 }
 
 // For `any` and `all`, the rights are checked for each node that is asked.
@@ -183,7 +184,7 @@ std::optional<protocol::failure> no_capacity_to_run(const node_state& n) {
 }
 
 protocol::failure after_run(protocol::failure why) {
-    why.ran = why.code == errc::too_large;
+    why.ran = why.code == errc::too_large || why.code == errc::no_target || why.code == errc::no_task;
     return why;
 }
 

@@ -25,7 +25,8 @@ namespace cles::core {
 [[gnu::cold]] protocol::failure overlong(const node_state& n, std::size_t datagram);
 /// `busy` if the node runs as many handlers as it may, else nothing.
 std::optional<protocol::failure> no_capacity_to_run(const node_state& n);
-/// The failure once the handler has run: `too_large` says so, since repeating the request would repeat its effect.
+/// The failure once the handler has run: codes after which the request might be repeated say so, since that would
+/// repeat its effect. (`busy` is the handler's own promise that it has done nothing.)
 [[gnu::cold]] protocol::failure after_run(protocol::failure why);
 
 [[gnu::cold]] std::string failure_text(const protocol::failure& why);

@@ -10,6 +10,7 @@
 #include "node/membership/peer_table.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/security_protocol.hpp"
+#include "node/sharing/movable_request.hpp"
 #include "port/node_security.hpp"
 
 #include <array>
@@ -34,6 +35,9 @@ void write_task(json_writer& w, std::string_view verb, std::string_view task, co
     }
     if (info.idempotent) {
         write_member(w, "idempotent", true);
+    }
+    if (info.local) {
+        write_member(w, "local", true);
     }
     if (info.must_be_signed) {
         write_member(w, "signed", true);
@@ -182,6 +186,8 @@ void serve_reserved(node_state& host, reply_writer& replies, const protocol::req
         } else {
             replies.fail(r, errc::bad_request, host.name + ": the body is not a table of nodes");
         }
+    } else if (r.verb == verb::push && parameters.size() == 1 && parameters[0] == "slots" && host.sharing != nullptr) {
+        host.sharing->serve_slots(replies, r, peer, host.time.now());
     } else if (host.secured && host.secured->serve_reserved(replies, r)) {
         return;
     } else if (r.verb == verb::push && parameters.size() == 2 && parameters[0] == "cancel") {

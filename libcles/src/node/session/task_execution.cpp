@@ -7,6 +7,7 @@
 #include "node/session/call.hpp"
 #include "node/session/handler_failure.hpp"
 #include "node/session/request_checks.hpp"
+#include "node/sharing/movable_request.hpp"
 
 #include <algorithm>
 #include <cstdint>
@@ -38,6 +39,19 @@ void task_registry::add(cles::verb verb, std::string_view task, handler entry) {
     auto& slot = tasks_[std::string{task}][static_cast<std::size_t>(verb)];
     slot = std::move(entry);
     slot.present = true;
+}
+
+std::unique_ptr<handler> task_registry::remove(cles::verb verb, std::string_view task) {
+    const auto found = tasks_.find(task);
+    if (found == tasks_.end() || find(verb, task) == nullptr) {
+        return nullptr;
+    }
+    auto& all = found->second;
+    auto removed = std::make_unique<handler>(std::exchange(all[static_cast<std::size_t>(verb)], handler{}));
+    if (std::none_of(all.begin(), all.end(), [](const handler& each) { return each.present; })) {
+        tasks_.erase(found);
+    }
+    return removed;
 }
 
 void task_registry::add_signed(std::string_view task) {
@@ -134,6 +148,7 @@ void task_execution::run(task_sink& to, const std::shared_ptr<memory_account>& m
             return;
         } catch (...) {
             why = after_run(describe(std::current_exception()));
+            why->ran = why->ran || (line_.grant != 0 && why->code != errc::busy);
         }
     }
     to.refuse(*this, *why);
@@ -144,8 +159,13 @@ std::optional<protocol::failure> task_execution::refusal(const memory_account* m
     if (handler_ == nullptr) {
         return no_such_task(*node_, line_);
     }
-    if (auto why = capacity_refusal(memory)) { // first: a challenge is valid once
+    if (auto why = capacity_refusal(memory)) { // first: a challenge and a slot are used once
         return why;
+    }
+    if (line_.grant != 0 && line_.verb == verb::delegate) {
+        if (auto why = grant_refusal()) {
+            return why;
+        }
     }
     return handler_->info.must_be_signed && line_.verb != verb::bind ? signature_refusal() : std::nullopt;
 }
@@ -158,6 +178,15 @@ std::optional<protocol::failure> task_execution::capacity_refusal(const memory_a
         return busy(node_->name + ": '" + std::string{line_.noun.task} + "' has reached its limit of nouns");
     }
     return handler_->plain ? std::nullopt : no_capacity_to_run(*node_);
+}
+
+std::optional<protocol::failure> task_execution::grant_refusal() {
+    if (node_->sharing == nullptr) {
+        return protocol::failure{.code = errc::denied, .message = node_->name + " does not share work"};
+    }
+    auto why = node_->sharing->use_grant(line_, *data_.peer, now_);
+    node_->counts.jobs_moved_in += why ? 0 : 1;
+    return why;
 }
 
 std::optional<protocol::failure> task_execution::signature_refusal() {
@@ -190,6 +219,9 @@ void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>&
     if (!c) {
         to.refuse(*this, no_memory(*node_));
         return;
+    }
+    if (node_->sharing != nullptr) {
+        c->set_movable(node_->sharing->movable(line_, *data_.peer));
     }
     to.keep(*this, c);
     started_ = true;

@@ -42,6 +42,10 @@ class task_registry {
     /// `max_signed_names`
     [[gnu::cold]] void add(cles::verb verb, std::string_view task, handler entry);
 
+    /// Removes a handler and returns it, because it may be running; null if there is none. Nouns of a signed task are
+    /// signed even then.
+    [[gnu::cold]] std::unique_ptr<handler> remove(cles::verb verb, std::string_view task);
+
     /// The handler, or null.
     [[nodiscard]] const handler* find(cles::verb verb, std::string_view task) const noexcept;
     /// Whether a BIND of the task is served: BIND or UPDATE is registered for it.
@@ -129,6 +133,7 @@ class task_execution {
   private:
     [[nodiscard]] std::optional<protocol::failure> refusal(const memory_account* memory);
     [[nodiscard]] std::optional<protocol::failure> capacity_refusal(const memory_account* memory);
+    [[nodiscard, gnu::cold]] std::optional<protocol::failure> grant_refusal();
     [[nodiscard, gnu::cold]] std::optional<protocol::failure> signature_refusal();
     void start(task_sink& to, const std::shared_ptr<memory_account>& memory);
     [[nodiscard]] std::string_view publish_path() { return protocol::canonical_path(line_.noun, path_); }

@@ -464,4 +464,25 @@ BOOST_AUTO_TEST_CASE(a_route_that_a_neighbour_pushes_is_used_and_pushed_to_the_o
     BOOST_TEST(pushed[url_of(1)] == R"({"node":"car5","epoch":"00000005","peers":[],"routes":{"00000003":[5]}})");
 }
 
+BOOST_AUTO_TEST_CASE(a_number_that_a_neighbour_asks_for_is_asked_for_elsewhere) {
+    gossip.reach().allow_only({"car1", "car2"});
+    begin({url_of(1), url_of(2)});
+    live_among(3, 1s);
+    const auto ask = [&](int car, const std::string& wanted) {
+        return gossip.on_pushed_table(R"({"node":")" + name_of(car) + R"(","epoch":"0000000)" + std::to_string(car) +
+                                          R"(","peers":[],"wanted":)" + wanted + "}",
+                                      {"10.0.0.1", false}, clock.now());
+    };
+    pushed.clear();
+    BOOST_TEST(!ask(1, R"({"00000003":"soon"})"));
+    BOOST_TEST(!ask(1, R"({"00000003":[]})"));
+    BOOST_TEST(ask(3, R"({"00000003":[1,16]})")); // no neighbour
+    BOOST_TEST(ask(1, R"({"nobody":[1,16]})"));
+    BOOST_TEST(pushed.empty());
+    BOOST_TEST(ask(1, R"({"00000003":[1,16]})"));
+    BOOST_TEST(
+        pushed[url_of(2)] ==
+        R"({"node":"car5","epoch":"00000005","peers":[],"routes":{"00000003":[0]},"wanted":{"00000003":[1,15]}})");
+}
+
 BOOST_AUTO_TEST_SUITE_END()

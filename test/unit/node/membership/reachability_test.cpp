@@ -3,9 +3,11 @@
 
 #include <boost/test/unit_test.hpp>
 
-#include <map>
+#include <algorithm>
+#include <cstdint>
 #include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -41,7 +43,27 @@ struct fixture : cles::core::reachability::listener {
         cles::core::peer_table table;
         table.node = by;
         table.routes = {{.epoch = 0xF, .advert = advert}};
-        reach.on_reply(table, now);
+        reach.on_reply(table);
+    }
+    /// The neighbour asks for a number.
+    void ask(const std::string& by, std::uint32_t epoch, route_advert number) {
+        cles::core::peer_table table;
+        table.node = by;
+        table.wanted = {{.epoch = epoch, .advert = number}};
+        reach.on_pushed(table);
+    }
+    /// What is to be pushed, after the pause between pushes.
+    cles::core::reachability::news news() {
+        now = std::max(now, reach.next_push());
+        return reach.take_unsent(now);
+    }
+    /// The number that is asked for with it, and how far that may spread; empty: none.
+    std::string wanted(const std::string& node) {
+        const auto sent = news();
+        const auto at = sent.find(node);
+        return at == sent.end() || !at->second
+                   ? ""
+                   : "[" + std::to_string(at->second->seq) + "," + std::to_string(*at->second->hops) + "]";
     }
     [[nodiscard]] auto advert(std::string_view of, std::string_view to) {
         using cles::core::delta_entry;
@@ -115,10 +137,10 @@ BOOST_AUTO_TEST_CASE(a_number_that_others_state_for_this_node_is_not_ahead_of_it
     cles::core::peer_table table;
     table.node = "car1";
     table.routes = {{.epoch = 0xA, .advert = {900, 1}}};
-    reach.on_reply(table, now);
+    reach.on_reply(table);
     BOOST_TEST(advert("me", "car1").value().seq == 900U);
     table.routes = {{.epoch = 0xA, .advert = {~std::uint64_t{0}, 1}}};
-    reach.on_reply(table, now);
+    reach.on_reply(table);
     BOOST_TEST(advert("me", "car1").value().seq == 900U);
     reply("car1", {~std::uint64_t{0}, std::nullopt});
     reply("car2", {5, 1});
@@ -155,21 +177,107 @@ BOOST_AUTO_TEST_CASE(changes_are_pushed_once_a_turn) {
     BOOST_TEST(reach.take_unsent(now).size() == 1U);
 }
 
-// It would have noticed a crash by then.
-BOOST_AUTO_TEST_CASE(a_node_that_others_still_reach_has_not_crashed) {
-    reply("car1", {5, 1});
-    cles::core::peer_table table;
-    table.node = "car1";
-    table.routes = {{.epoch = 0xC, .advert = {3, 1}}};
-    reach.on_reply(table, now);
+// It has stated a number that it would not have reached by itself.
+BOOST_AUTO_TEST_CASE(a_node_that_answers_others_has_not_crashed) {
+    const auto hear_of_car2 = [&](std::uint64_t number) {
+        cles::core::peer_table table;
+        table.node = "car1";
+        table.routes = {{.epoch = 0xC, .advert = {number, 1}}};
+        reach.on_reply(table);
+    };
+    hear_of_car2(3);
     reach.lose("car2", now);
+    BOOST_TEST(wanted("car2") == "[5,16]");
     BOOST_TEST(reach.next_hop_to("car2", {}) == "car2"); // it may have crashed
-    reach.on_reply(table, now + reach.silence());
+    hear_of_car2(4);
     BOOST_TEST(reach.next_hop_to("car2", {}) == "car2");
-    reach.on_reply(table, now + reach.silence() + 125ms);
+    hear_of_car2(5);
     BOOST_TEST(reach.next_hop_to("car2", {}) == "car1");
     BOOST_TEST(reach.hops_to("car2").value() == 2U);
 }
+
+// -- requests for a greater number -----------------------------------------------------------------------------------
+
+BOOST_AUTO_TEST_CASE(a_node_whose_last_route_cannot_be_advertised_asks_for_a_greater_number_once) {
+    reply("car2", {5, 1});
+    BOOST_TEST(advert("far", "car1").value().hops.value() == 2U);
+    reply("car1", {5, 2});
+    BOOST_TEST(wanted("far").empty());
+    reach.lose("car2", now);
+    BOOST_TEST(wanted("far") == "[6,16]");
+    reply("car1", {5, 3});
+    BOOST_TEST(wanted("far").empty());
+    reply("car1", {6, 3});
+    BOOST_TEST(advert("far", "car9").value().hops.value() == 4U);
+}
+
+BOOST_AUTO_TEST_CASE(a_node_that_has_advertised_nothing_asks_for_nothing) {
+    reply("car2", {5, 1});
+    reach.lose("car2", now);
+    BOOST_TEST(wanted("far").empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_request_spreads_once_for_each_number_one_link_less_far) {
+    reply("car2", {5, 1});
+    ask("car1", 0xF, {6, 16});
+    BOOST_TEST(wanted("far") == "[6,15]");
+    ask("car1", 0xF, {6, 16});
+    ask("car2", 0xF, {6, 9});
+    BOOST_TEST(wanted("far").empty());
+    ask("car2", 0xF, {7, 900});
+    BOOST_TEST(wanted("far") == "[7,15]");
+}
+
+BOOST_AUTO_TEST_CASE(a_request_does_not_spread) {
+    reply("car2", {5, 1});
+    ask("car1", 0xF, {6, 1});            // over no further link
+    ask("car1", 0xF, {6, std::nullopt}); // or over none at all
+    ask("car1", 0xF, {10, 16});          // for a number that nobody needs
+    ask("car1", 0x9, {6, 16});           // about a node that is not known
+    routes = false;
+    ask("car1", 0xF, {6, 16});
+    BOOST_TEST(wanted("far").empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_request_is_answered_by_a_node_with_a_route) {
+    reply("car2", {6, 1});
+    news();
+    ask("car1", 0xF, {6, 16});
+    BOOST_TEST(news().contains("far"));
+    ask("car1", 0xF, {5, 16});
+    const auto sent = news();
+    BOOST_TEST(sent.contains("far"));
+    BOOST_TEST(!sent.at("far"));
+    ask("car2", 0xF, {6, 16}); // to which it would lead back
+    BOOST_TEST(wanted("far") == "[6,15]");
+}
+
+BOOST_AUTO_TEST_CASE(a_route_that_was_asked_for_is_pushed_when_it_arrives) {
+    reply("car2", {5, 1});
+    ask("car1", 0xF, {6, 16});
+    news();
+    reply("car2", {5, 1});
+    BOOST_TEST(news().empty());
+    reply("car2", {6, 1});
+    BOOST_TEST(news().contains("far"));
+    reply("car2", {7, 1});
+    BOOST_TEST(news().empty());
+}
+
+BOOST_AUTO_TEST_CASE(a_node_raises_its_number_when_it_is_asked_to_but_not_by_much) {
+    cles::core::announcement said{.node = "me"};
+    others.announce_self(said, 1, now);
+    ask("car1", 0xA, {3, 16});
+    BOOST_TEST(news().contains("me"));
+    BOOST_TEST(advert("me", "car1").value().seq == 3U);
+    ask("car1", 0xA, {2, 16});
+    BOOST_TEST(news().contains("me"));
+    BOOST_TEST(advert("me", "car1").value().seq == 3U);
+    ask("car1", 0xA, {~std::uint64_t{0}, 16});
+    BOOST_TEST(advert("me", "car1").value().seq == 5U);
+}
+
+// -- what follows ----------------------------------------------------------------------------------------------------
 
 BOOST_AUTO_TEST_CASE(feeds_leave_a_link_that_is_lost) {
     hear("car2", 0xC, {}, 2);

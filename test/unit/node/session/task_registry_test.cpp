@@ -37,6 +37,24 @@ BOOST_AUTO_TEST_CASE(a_verb_and_task_are_registered_once) {
                           [](const cles::error& e) { return e.code() == errc::already_registered; });
 }
 
+BOOST_AUTO_TEST_CASE(a_removed_task_is_not_found_and_may_be_added_again) {
+    cles::core::task_registry tasks;
+    tasks.add(verb::pull, "speed", {.info = {.description = "in m/s"}});
+    tasks.add(verb::push, "speed", {});
+    BOOST_TEST(!tasks.remove(verb::delegate, "speed"));
+    BOOST_TEST(!tasks.remove(verb::pull, "spee"));
+    const auto removed = tasks.remove(verb::pull, "speed");
+    BOOST_REQUIRE(removed);
+    BOOST_TEST(removed->info.description == "in m/s");
+    BOOST_TEST(tasks.find(verb::pull, "speed") == nullptr);
+    BOOST_TEST(tasks.find(verb::push, "speed") != nullptr);
+    BOOST_TEST(!tasks.remove(verb::pull, "speed"));
+    tasks.add(verb::pull, "speed", {});
+    tasks.remove(verb::pull, "speed");
+    tasks.remove(verb::push, "speed");
+    BOOST_TEST(tasks.tasks().empty());
+}
+
 BOOST_AUTO_TEST_CASE(a_task_has_a_valid_name_other_than_cles) {
     cles::core::task_registry tasks;
     for (const std::string bad : {"", "a b", "a/b", "a:b", "cles", "\xC3\xA4"}) {

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/error.hpp>
+#include <cles/json_writer.hpp>
+#include <cles/registrar.hpp>
+
+#include "isolation/log_budget.hpp"
+#include "isolation/plugin_session.hpp"
+#include "isolation/restart_policy.hpp"
+#include "plugins/loaded_plugin.hpp"
+#include "plugins/plugin_host.hpp"
+
+#include <boost/asio/any_io_executor.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <boost/describe/class.hpp>
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace cles::runtime {
+
+/// What an isolated plugin uses of the node. Called on the executor.
+struct isolated_plugin_node {
+    boost::asio::any_io_executor executor;
+    std::function<void(registration)> add; ///< on workers; throws as `registrar::add`
+    std::function<void(cles::verb, std::string_view task)> remove;
+    std::function<void(std::string_view noun, json_text)> publish; ///< throws as `service::update`
+    std::function<void(std::string_view noun)> retire;
+    plugin_log log;
+};
+
+/// The state of an isolated plugin, for metrics.
+struct isolated_plugin_figures {
+    std::string name;
+    std::string state;         ///< running, starting, withdrawn
+    std::uint64_t process = 0; ///< its id; 0: none
+    std::uint64_t ended = 0;   ///< how often its process has ended unexpectedly
+    std::uint64_t jobs = 0;    ///< without an answer
+};
+BOOST_DESCRIBE_STRUCT(isolated_plugin_figures, (), (name, state, process, ended, jobs))
+
+/// A plugin that runs in a process of its own (docs/plugins.md, "Isolation"): it is started again when it ends, and its
+/// tasks are withdrawn when it ends too often.
+class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
+  public:
+    /// \param loading what the process is told
+    isolated_plugin(isolated_plugin_node node, load_message loading, session_options session);
+    isolated_plugin(const isolated_plugin&) = delete;
+    isolated_plugin& operator=(const isolated_plugin&) = delete;
+    ~isolated_plugin() = default;
+
+    // All on the executor.
+    /// Starts it and registers its tasks. Blocks until it has started. \throws plugin_error
+    void start();
+    /// Offers the tasks again if they were withdrawn.
+    void retry();
+    /// Asks the plugin to stop, without waiting.
+    void begin_stop();
+    /// Waits for its end, and kills it at that time. Returns whether it had to be killed.
+    bool finish_stop(std::chrono::steady_clock::time_point until);
+
+    [[nodiscard]] isolated_plugin_figures figures() const;
+
+  private:
+    void run(const request& what, const responder& answer);
+    std::shared_ptr<plugin_session> session_for(const responder& answer);
+    void launch();
+    session_events events_of(std::uint64_t run);
+    void on_started(const started_message& what);
+    void on_ended(std::uint64_t run, const std::string& how);
+    void fail_to_start(const std::string& why);
+    void judge_end(std::string how);
+    bool relaunch(std::string& failure);
+    void offer(const std::vector<offered_task>& tasks);
+    void withdraw();
+    void publish(std::string_view noun, std::string_view json);
+    void log(log_level level, std::string_view text);
+    void log_output(log_level level, std::string_view text);
+
+    const isolated_plugin_node node_;
+    const load_message loading_;
+    const session_options session_options_;
+    std::string name_; // the path until it is known
+    restart_policy policy_;
+    log_budget budget_;
+    std::vector<offered_task> offered_;
+    std::set<std::string, std::less<>> published_; // nouns, to be retired when it is withdrawn
+    std::shared_ptr<plugin_session> starting_;     // until it has started
+    std::optional<boost::asio::steady_timer> start_limit_;
+    std::uint64_t run_ = 0; // which one is the latest
+    std::optional<refused_message> refused_;
+    std::string start_failure_;
+    std::string last_output_;
+    bool first_start_ = true;
+    bool stopping_ = false;
+
+    mutable std::mutex mutex_; // of all that follows, which workers use
+    std::shared_ptr<plugin_session> current_;
+    std::optional<time_point> missing_since_; // there is no process that takes jobs
+    bool unavailable_ = false;                // withdrawn, or the daemon stops
+    std::string why_unavailable_;
+    std::condition_variable changed_;
+};
+
+} // namespace cles::runtime

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/convert.hpp>
+
+#include <boost/describe/class.hpp>
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+/// What the daemon and the process of an isolated plugin tell each other with the reserved task `cles`, as bodies of
+/// their lines. The requests of the plugin's own tasks, and their replies, are those of the language.
+
+namespace cles::runtime {
+
+/// The reserved task.
+inline constexpr std::string_view control_task = "cles";
+
+/// `PUSH self:cles/load`: the first line, from the daemon.
+struct load_message {
+    std::string node;
+    std::string path;   ///< of the plugin, as `plugin_host::load` takes it
+    std::string config; ///< its settings, JSON
+    std::string sha256;
+    std::vector<std::string> folders; ///< where plugins are searched for
+    bool secured = false;
+    std::uint64_t memory = 0;
+    std::uint64_t open_files = 0;
+    std::vector<std::string> readable;
+    std::vector<std::string> writable;
+};
+BOOST_DESCRIBE_STRUCT(load_message, (),
+                      (node, path, config, sha256, folders, secured, memory, open_files, readable, writable))
+
+struct offered_task {
+    std::string verb;
+    std::string task;
+    std::string description;
+    std::vector<std::string> parameters;
+    bool idempotent = false;
+    bool local = false;
+    bool must_be_signed = false;
+    bool handled = true; ///< false: it can only be bound
+
+    bool operator==(const offered_task&) const = default;
+};
+BOOST_DESCRIBE_STRUCT(offered_task, (),
+                      (verb, task, description, parameters, idempotent, local, must_be_signed, handled))
+
+/// `PUSH self:cles/started`, from the plugin's process.
+struct started_message {
+    std::string name;
+    std::string version;
+    std::string confinement; ///< what `confine` returned
+    std::vector<offered_task> tasks;
+};
+BOOST_DESCRIBE_STRUCT(started_message, (), (name, version, confinement, tasks))
+
+/// `PUSH self:cles/refused`, from the plugin's process, which ends then.
+struct refused_message {
+    std::string why;
+    std::optional<std::string> setting;
+};
+BOOST_DESCRIBE_STRUCT(refused_message, (), (why, setting))
+
+/// `PUSH self:cles/log` and `PUSH self:cles/log/<id>`, from the plugin's process.
+struct log_message {
+    std::uint32_t level = 0;
+    std::string text;
+};
+BOOST_DESCRIBE_STRUCT(log_message, (), (level, text))
+
+/// `DELEGATE self:cles/ask/<id>/<ticket>`, from the plugin's process: a request on behalf of a job.
+struct ask_message {
+    std::string command;
+    std::string at;
+    bool urgent = false;
+    std::int64_t deadline_ms = 0;
+    bool progress = false;
+};
+BOOST_DESCRIBE_STRUCT(ask_message, (), (command, at, urgent, deadline_ms, progress))
+
+} // namespace cles::runtime

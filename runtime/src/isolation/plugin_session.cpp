@@ -1,0 +1,676 @@
+// SPDX-License-Identifier: BSL-1.0
+#include "isolation/plugin_session.hpp"
+
+#include <cles/json_reader.hpp>
+#include <cles/json_writer.hpp>
+
+#include <boost/asio/post.hpp>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <exception>
+#include <utility>
+
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/time.h>
+
+namespace cles::runtime {
+
+namespace asio = boost::asio;
+using clock = time_point::clock;
+using namespace std::chrono_literals;
+
+namespace {
+
+constexpr std::size_t max_control_read = 65536;
+// What the process may leave unread. It reads at once, unless it has been stopped.
+constexpr std::size_t max_pending = 64U << 20U;
+constexpr std::size_t max_output_line = 1000;
+
+// A worker that waits looks this often whether its job is overdue.
+std::chrono::microseconds wait_interval(std::chrono::nanoseconds grace) {
+    return std::clamp<std::chrono::microseconds>(std::chrono::ceil<std::chrono::microseconds>(grace) / 8, 2ms, 100ms);
+}
+
+void set_socket_timeouts(int socket, std::chrono::microseconds span) {
+    const timeval value{.tv_sec = span.count() / 1'000'000, .tv_usec = span.count() % 1'000'000};
+    ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &value, sizeof value);
+    ::setsockopt(socket, SOL_SOCKET, SO_SNDTIMEO, &value, sizeof value);
+}
+
+std::string grace_text(std::chrono::nanoseconds span) {
+    const auto ms = std::chrono::duration_cast<std::chrono::milliseconds>(span).count();
+    return ms % 1000 == 0 ? std::to_string(ms / 1000) + " s" : std::to_string(ms) + " ms";
+}
+
+// Takes the first whole line, without its LF. False if there is none.
+bool take_line(std::string& input, std::string& line) {
+    const auto end = input.find('\n');
+    if (end == std::string::npos) {
+        return false;
+    }
+    line.assign(input, 0, end);
+    input.erase(0, end + 1);
+    return true;
+}
+
+void append_request(std::string& to, std::uint64_t id, const request& what) {
+    wire_line_writer line{to, what.verb(), what.task()};
+    for (const auto parameter : what.parameters()) {
+        line.parameter(parameter);
+    }
+    const auto& peer = what.peer();
+    line.adverb("id", static_cast<std::int64_t>(id));
+    if (what.deadline() != time_point{}) {
+        line.adverb("due", std::int64_t{what.deadline().time_since_epoch().count()});
+    }
+    line.adverb("transport", peer.transport).adverb("address", peer.address);
+    if (!peer.name.empty()) {
+        line.adverb("name", peer.name);
+    }
+    if (peer.uid) {
+        line.adverb("uid", std::int64_t{*peer.uid});
+    }
+    if (peer.local) {
+        line.adverb("local", std::int64_t{1});
+    }
+    line.body(what.body());
+}
+
+std::string job_label(const request& what) {
+    return std::string{to_string(what.verb())} + " '" + std::string{what.task()} + "'";
+}
+
+} // namespace
+
+plugin_session::plugin_session(asio::any_io_executor executor, std::string name, session_options options,
+                               session_events events)
+    : executor_(std::move(executor)), options_(std::move(options)), events_(std::move(events)),
+      process_(options_.program, options_.lanes), control_(process_.control.get()), output_(process_.output.get()),
+      name_(std::move(name)), lanes_(options_.lanes) {
+    const auto interval = wait_interval(options_.grace);
+    for (std::size_t i = 0; i < lanes_.size(); ++i) {
+        lanes_[i].socket = process_.lanes[i].get();
+        set_socket_timeouts(lanes_[i].socket, interval);
+        free_lanes_.push_back(&lanes_[i]);
+    }
+}
+
+// -- jobs, on workers ----------------------------------------------------------------------------------------------
+
+plugin_session::lane* plugin_session::take_lane() {
+    std::unique_lock lock{mutex_};
+    // There are as many as workers, so one becomes free soon.
+    lane_freed_.wait(lock, [this] { return !free_lanes_.empty() || ended_; });
+    if (ended_) {
+        return nullptr;
+    }
+    auto* taken = free_lanes_.back(); // the one that was used last
+    free_lanes_.pop_back();
+    return taken;
+}
+
+void plugin_session::give_back(lane* used) {
+    const std::scoped_lock lock{mutex_};
+    free_lanes_.push_back(used);
+    lane_freed_.notify_one();
+}
+
+bool plugin_session::serve(const request& what, const responder& answer) {
+    auto* on = take_lane();
+    if (on == nullptr) {
+        return false;
+    }
+    const auto until = what.deadline() == time_point{} ? time_point::max() : what.deadline();
+    const auto here = std::make_shared<job>(answer, job_label(what), until);
+    const auto id = ++last_id_;
+    {
+        const std::scoped_lock lock{mutex_};
+        jobs_.emplace(id, here);
+    }
+    answer.on_stop([weak = weak_from_this(), id] {
+        if (const auto self = weak.lock()) {
+            self->stop(id);
+        }
+    });
+    std::string line;
+    append_request(line, id, what);
+    std::string reply;
+    const auto how = exchange(*on, line, *here, reply);
+    if (how != exchanged::replied) {
+        // Nothing else uses the lane any more.
+        const bool started = how == exchanged::lost;
+        if (const auto left = take(id); left && started) {
+            fail(*left);
+        }
+        return started;
+    }
+    give_back(on);
+    const auto read = read_wire_line(reply);
+    if (!read || !read->is_reply || read->id != id) {
+        kill("it sent a reply that is not one");
+        if (const auto left = take(id)) {
+            fail(*left);
+        }
+        return true;
+    }
+    if (!read->adverb("later").empty()) { // it has returned; what it has not answered ends with the process
+        here->on_lane = false;
+        if (ended_) {
+            if (const auto left = take(id)) {
+                fail(*left);
+            }
+        }
+    } else if (const auto done = take(id)) {
+        settle(*done, read->body);
+    }
+    return true;
+}
+
+// Sends a line, and waits for the line that answers it: when the handler, or the callback, has returned.
+plugin_session::exchanged plugin_session::exchange(lane& on, std::string_view line, const job& by, std::string& reply) {
+    // An error after the process has ended says whether it had read what was sent.
+    const auto lost = [](int code) {
+        return code == EPIPE || code == ECONNRESET ? exchanged::unread : exchanged::lost;
+    };
+    const auto waits = [&](int code) {
+        if ((code != EAGAIN && code != EINTR) || ended_) {
+            return false; // or another process still holds the other end
+        }
+        kill_if_overdue(by);
+        return true;
+    };
+    while (!line.empty()) {
+        const auto sent = ::send(on.socket, line.data(), line.size(), MSG_NOSIGNAL);
+        if (sent >= 0) {
+            line.remove_prefix(static_cast<std::size_t>(sent));
+        } else if (!waits(errno)) {
+            ended_ = true;
+            return lost(errno);
+        }
+    }
+    std::array<char, 4096> part; // NOLINT(*-member-init): it is written before it is read
+    while (!take_line(on.input, reply)) {
+        const auto size = ::recv(on.socket, part.data(), part.size(), 0);
+        if (size > 0) {
+            on.input.append(part.data(), static_cast<std::size_t>(size));
+            if (on.input.size() > options_.max_line) {
+                kill("it sent a line of more than " + std::to_string(options_.max_line) + " bytes");
+                return exchanged::lost;
+            }
+        } else if (size == 0 || !waits(errno)) {
+            ended_ = true;
+            return size == 0 ? exchanged::lost : lost(errno);
+        }
+    }
+    return exchanged::replied;
+}
+
+void plugin_session::kill_if_overdue(const job& by) {
+    const auto due = by.due.load();
+    // Somewhat earlier, so that the pool does not take its worker for stuck.
+    if (due != time_point::max() && clock::now() - due > options_.grace - 2 * wait_interval(options_.grace)) {
+        kill(by.label + " did not end within " + grace_text(options_.grace) + " of its deadline or cancellation");
+    }
+}
+
+void plugin_session::kill(const std::string& why) {
+    {
+        const std::scoped_lock lock{mutex_};
+        if (killed_because_.empty()) {
+            killed_because_ = why;
+        }
+    }
+    process_.kill();
+}
+
+std::shared_ptr<plugin_session::job> plugin_session::take(std::uint64_t id) {
+    const std::scoped_lock lock{mutex_};
+    const auto found = jobs_.find(id);
+    if (found == jobs_.end()) {
+        return nullptr;
+    }
+    auto taken = std::move(found->second);
+    jobs_.erase(found);
+    return taken;
+}
+
+std::shared_ptr<plugin_session::job> plugin_session::find(std::uint64_t id) {
+    const std::scoped_lock lock{mutex_};
+    const auto found = jobs_.find(id);
+    return found == jobs_.end() ? nullptr : found->second;
+}
+
+void plugin_session::settle(const job& of, std::string_view body) {
+    if (const auto failed = read_failure(body)) {
+        if (failed->retry_ms) {
+            of.answer.refuse(failed->message, std::chrono::milliseconds{*failed->retry_ms});
+        } else {
+            of.answer.fail(errc_from_wire(failed->code), failed->message);
+        }
+    } else if (body == "{}") {
+        of.answer.done();
+    } else {
+        of.answer.done(json_text{std::string{body}}); // checked, because the process may send anything
+    }
+}
+
+std::string plugin_session::how_it_ended() {
+    const auto how = process_.end();
+    const std::scoped_lock lock{mutex_};
+    return killed_because_.empty() ? how : "was ended because " + killed_because_;
+}
+
+// The process has ended.
+void plugin_session::fail(const job& of) {
+    const auto how = how_it_ended();
+    std::string name;
+    std::string left;
+    {
+        const std::scoped_lock lock{mutex_};
+        name = name_;
+        left = left_because_;
+    }
+    if (left.empty()) {
+        of.answer.fail(errc::failed, "the plugin '" + name + "' " + how);
+    } else {
+        of.answer.fail(errc::unavailable, left);
+    }
+}
+
+// Called on the thread of `on_stop`.
+void plugin_session::stop(std::uint64_t id) {
+    const auto stopped = find(id);
+    if (!stopped) {
+        return;
+    }
+    stopped->due = std::min(stopped->due.load(), clock::now());
+    std::string line;
+    wire_line_writer{line, verb::push, control_task}.parameter("cancel").parameter(id).adverb("reply", "no").body("{}");
+    say(line);
+}
+
+// Runs a callback of a job that has started. Called on a worker, as a part of the job.
+void plugin_session::resume(const std::shared_ptr<job>& by, std::string_view line) {
+    auto* on = take_lane();
+    if (on == nullptr) {
+        return; // the job has been answered
+    }
+    std::string reply;
+    if (exchange(*on, line, *by, reply) == exchanged::replied) {
+        give_back(on);
+    }
+}
+
+// -- the control connection ----------------------------------------------------------------------------------------
+
+void plugin_session::say(std::string_view lines) {
+    const std::scoped_lock lock{out_mutex_};
+    if (closed_ || ended_) {
+        return;
+    }
+    pending_.append(lines);
+    send_pending();
+    if (pending_.size() > max_pending) {
+        process_.kill();
+    } else if (!pending_.empty() && control_stream_ && !std::exchange(write_wait_, true)) {
+        asio::post(executor_, [self = shared_from_this()] { self->wait_to_write(); });
+    }
+}
+
+// With the lock.
+void plugin_session::send_pending() {
+    while (!pending_.empty()) {
+        const auto sent = ::send(control_, pending_.data(), pending_.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+        if (sent < 0 && errno == EINTR) {
+            continue;
+        }
+        if (sent < 0) {
+            if (errno != EAGAIN) {
+                pending_.clear(); // the process has ended
+            }
+            return;
+        }
+        pending_.erase(0, static_cast<std::size_t>(sent));
+    }
+}
+
+void plugin_session::wait_to_write() {
+    if (!control_stream_) {
+        return;
+    }
+    control_stream_->async_wait(asio::posix::stream_descriptor::wait_write,
+                                [self = shared_from_this()](boost::system::error_code failed) {
+                                    const std::scoped_lock lock{self->out_mutex_};
+                                    self->send_pending();
+                                    self->write_wait_ = !failed && !self->closed_ && !self->pending_.empty();
+                                    if (self->write_wait_) {
+                                        self->wait_to_write();
+                                    }
+                                });
+}
+
+void plugin_session::load(const load_message& what) {
+    std::string line;
+    wire_line_writer{line, verb::push, control_task}.parameter("load").body(what);
+    say(line);
+}
+
+void plugin_session::leave(std::string_view why) {
+    {
+        const std::scoped_lock lock{mutex_};
+        left_because_ = why;
+    }
+    std::string line;
+    wire_line_writer{line, verb::push, control_task}.parameter("leaving").adverb("reply", "no").body("{}");
+    say(line);
+}
+
+void plugin_session::set_name(std::string name) {
+    const std::scoped_lock lock{mutex_};
+    name_ = std::move(name);
+}
+
+std::size_t plugin_session::open_jobs() const {
+    const std::scoped_lock lock{mutex_};
+    return jobs_.size();
+}
+
+bool plugin_session::wait_for_start(std::chrono::milliseconds limit) {
+    const auto end = std::chrono::steady_clock::now() + limit;
+    while (!answered_load_) {
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(end - std::chrono::steady_clock::now());
+        if (left.count() <= 0) {
+            kill("it did not start in time");
+            return false;
+        }
+        std::array<pollfd, 2> watched{
+            {{.fd = control_, .events = POLLIN, .revents = 0}, {.fd = output_, .events = POLLIN, .revents = 0}}};
+        if (::poll(watched.data(), watched.size(), static_cast<int>(left.count())) <= 0) {
+            continue;
+        }
+        if (watched[0].revents != 0 && !read_control()) {
+            ended_ = true;
+            return true;
+        }
+        if (watched[1].revents != 0) {
+            read_output();
+        }
+    }
+    return true;
+}
+
+void plugin_session::run() {
+    control_stream_.emplace(executor_, process_.control.release());
+    output_stream_.emplace(executor_, process_.output.release());
+    end_stream_.emplace(executor_, ::dup(process_.handle()));
+    wait_to_read();
+    wait_for_output();
+    wait_for_end();
+}
+
+void plugin_session::wait_to_read() {
+    control_stream_->async_wait(asio::posix::stream_descriptor::wait_read,
+                                [self = shared_from_this()](boost::system::error_code failed) {
+                                    if (!failed && self->control_stream_ && self->read_control()) {
+                                        self->wait_to_read();
+                                    }
+                                });
+}
+
+void plugin_session::wait_for_output() {
+    output_stream_->async_wait(asio::posix::stream_descriptor::wait_read,
+                               [self = shared_from_this()](boost::system::error_code failed) {
+                                   if (failed || !self->output_stream_) {
+                                       return;
+                                   }
+                                   self->read_output();
+                                   if (self->output_ >= 0) {
+                                       self->wait_for_output();
+                                   }
+                               });
+}
+
+void plugin_session::wait_for_end() {
+    end_stream_->async_wait(asio::posix::stream_descriptor::wait_read,
+                            [self = shared_from_this()](boost::system::error_code failed) {
+                                if (!failed) {
+                                    self->finish();
+                                }
+                            });
+}
+
+// Reads once, so that a process that says much delays nothing else. False at the end of the stream.
+bool plugin_session::read_control() {
+    std::string part(max_control_read, '\0');
+    const auto size = ::recv(control_, part.data(), part.size(), MSG_DONTWAIT);
+    if (size < 0) {
+        return errno == EAGAIN || errno == EINTR;
+    }
+    if (size == 0) {
+        return false;
+    }
+    input_.append(part, 0, static_cast<std::size_t>(size));
+    std::size_t begin = 0;
+    for (auto end = input_.find('\n'); end != std::string::npos; end = input_.find('\n', begin)) {
+        on_line(std::string_view{input_}.substr(begin, end - begin));
+        begin = end + 1;
+    }
+    input_.erase(0, begin);
+    if (input_.size() > options_.max_line) {
+        kill("it sent a line of more than " + std::to_string(options_.max_line) + " bytes");
+        return false;
+    }
+    return true;
+}
+
+void plugin_session::read_output() {
+    std::array<char, 4096> part; // NOLINT(*-member-init): it is written before it is read
+    const auto size = ::read(output_, part.data(), part.size());
+    if (size == 0 || (size < 0 && errno != EAGAIN && errno != EINTR)) {
+        output_ = -1;
+    }
+    output_text_.append(part.data(), static_cast<std::size_t>(std::max<ssize_t>(size, 0)));
+    std::string line;
+    while (take_line(output_text_, line)) {
+        events_.output(line);
+    }
+    if (output_text_.size() > max_output_line || (output_ < 0 && !output_text_.empty())) {
+        events_.output(output_text_);
+        output_text_.clear();
+    }
+}
+
+void plugin_session::on_line(std::string_view line) {
+    const auto read = read_wire_line(line);
+    try {
+        if (!read) {
+            throw error(errc::bad_request, "it is not a line");
+        }
+        read->is_reply ? on_reply(*read) : on_request(*read);
+    } catch (const std::exception& e) {
+        kill("what it said is invalid: " + std::string{e.what()});
+    }
+}
+
+// A report of progress, or a reply that was given later.
+void plugin_session::on_reply(const wire_line& line) {
+    const auto progress = line.adverb("progress");
+    if (progress.empty()) {
+        if (const auto done = take(line.id)) {
+            settle(*done, line.body);
+        }
+        return;
+    }
+    const auto of = find(line.id);
+    double fraction = 0;
+    if (!of || of->unwanted || !json_reader{progress}.read(fraction)) {
+        return;
+    }
+    if (!of->answer.progress(fraction, json_text{std::string{line.body}}) && !of->answer.stopped()) {
+        of->unwanted = true;
+        std::string answer;
+        wire_line_writer{answer, verb::push, control_task}
+            .parameter("unwanted")
+            .parameter(line.id)
+            .adverb("reply", "no")
+            .body("{}");
+        say(answer);
+    }
+}
+
+namespace {
+
+template <class T>
+T body_of(const wire_line& line) {
+    T read{};
+    std::string why;
+    if (!from_json(line.body, read, &why)) {
+        throw error(errc::bad_request, why);
+    }
+    return read;
+}
+
+} // namespace
+
+void plugin_session::on_request(const wire_line& line) {
+    const auto what = line.task == control_task && !line.parameters.empty() ? line.parameters.front() : std::string{};
+    if (what == "publish" && line.parameters.size() == 2) {
+        events_.publish(line.parameters[1], line.body);
+    } else if (what == "ask") {
+        ask(line);
+    } else if (what == "log") {
+        const auto entry = body_of<log_message>(line);
+        const auto level = static_cast<log_level>(std::min<std::uint32_t>(entry.level, 3));
+        if (const auto of = find(line.number_at(1))) {
+            of->answer.log(level, entry.text);
+        } else {
+            events_.log(level, entry.text);
+        }
+    } else if (what == "started" && !answered_load_) {
+        answered_load_ = true;
+        events_.started(body_of<started_message>(line));
+    } else if (what == "refused" && !answered_load_) {
+        answered_load_ = true;
+        events_.refused(body_of<refused_message>(line));
+    } else {
+        throw error(errc::bad_request, "it is no request to the daemon");
+    }
+}
+
+// A request to another node, on behalf of a job. Its answer, and reports of its progress, continue the job on a worker.
+void plugin_session::ask(const wire_line& line) {
+    const auto ticket = line.number_at(2);
+    const auto wanted = body_of<ask_message>(line);
+    const auto answered = [weak = weak_from_this(), ticket](const std::shared_ptr<job>& by,
+                                                            boost::system::error_code code, std::string_view json,
+                                                            std::string_view message) {
+        const auto self = weak.lock();
+        if (!self) {
+            return;
+        }
+        std::string text;
+        wire_line_writer reply{text, verb::push, control_task};
+        reply.parameter("answered").parameter(ticket);
+        if (code) {
+            const auto known = code.category() == error_category() ? static_cast<errc>(code.value()) : errc::failed;
+            reply.adverb("code", wire_name(known)).adverb("message", message);
+        }
+        reply.body(json.empty() ? std::string_view{"{}"} : json);
+        by ? self->resume(by, text) : self->say(text);
+    };
+    const auto by = find(line.number_at(1));
+    if (!by) {
+        answered(nullptr, errc::cancelled, "{}", "the requester of the job no longer waits");
+        return;
+    }
+    if (asks_.fetch_add(1) >= options_.max_asks) {
+        --asks_;
+        answered(nullptr, errc::busy, "{}", "too many requests at once");
+        return;
+    }
+    call_options options;
+    options.urgent(wanted.urgent).at(wanted.at).deadline(std::chrono::milliseconds{wanted.deadline_ms});
+    if (wanted.progress) {
+        options.on_progress([weak = weak_from_this(), by, ticket](double fraction, std::string_view json) {
+            if (const auto self = weak.lock()) {
+                std::string number;
+                json_writer{number}.value(fraction);
+                std::string text;
+                wire_line_writer{text, verb::push, control_task}
+                    .parameter("reported")
+                    .parameter(ticket)
+                    .adverb("progress", number)
+                    .body(json);
+                self->resume(by, text);
+            }
+        });
+    }
+    by->answer.delegate(wanted.command, options,
+                        [weak = weak_from_this(), by, answered](boost::system::error_code code, std::string_view json,
+                                                                std::string_view message) {
+                            answered(by, code, json, message);
+                            if (const auto self = weak.lock()) {
+                                --self->asks_;
+                            }
+                        });
+}
+
+// -- the end -------------------------------------------------------------------------------------------------------
+
+void plugin_session::finish() {
+    if (std::exchange(finished_, true)) {
+        return;
+    }
+    ended_ = true;
+    const auto how = how_it_ended();
+    // What it said last. A process that it has started may still hold the connection, so this has a limit.
+    pollfd said{.fd = control_, .events = POLLIN, .revents = 0};
+    for (int i = 0; i < 64 && ::poll(&said, 1, 0) > 0 && read_control(); ++i) {
+    }
+    if (output_ >= 0) {
+        read_output();
+    }
+    std::vector<std::shared_ptr<job>> left;
+    {
+        const std::scoped_lock lock{mutex_};
+        for (auto& [id, each] : jobs_) {
+            if (!each->on_lane) {
+                left.push_back(each);
+            }
+        }
+        boost::unordered::erase_if(jobs_, [](const auto& each) { return !each.second->on_lane; });
+        lane_freed_.notify_all();
+    }
+    for (const auto& each : left) {
+        fail(*each);
+    }
+    {
+        const std::scoped_lock lock{out_mutex_};
+        closed_ = true;
+        control_stream_.reset();
+        executor_ = {};
+    }
+    output_stream_.reset();
+    end_stream_.reset();
+    events_.ended(how);
+}
+
+bool plugin_session::close(std::chrono::steady_clock::time_point until) {
+    bool late = false;
+    pollfd watched{.fd = process_.handle(), .events = POLLIN, .revents = 0};
+    while (!finished_) {
+        const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - std::chrono::steady_clock::now());
+        const auto ready = ::poll(&watched, 1, static_cast<int>(std::max<std::int64_t>(left.count(), 0)));
+        late = ready == 0;
+        if (ready >= 0) {
+            break;
+        }
+    }
+    finish();
+    return late;
+}
+
+} // namespace cles::runtime

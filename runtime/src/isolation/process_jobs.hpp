@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/publisher.hpp>
+#include <cles/registrar.hpp>
+#include <cles/responder.hpp>
+
+#include "isolation/wire_line.hpp"
+#include "jobs/stop_notifier.hpp"
+
+#include <boost/unordered/unordered_flat_map.hpp>
+#include <boost/unordered/unordered_flat_set.hpp>
+
+#include <atomic>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <utility>
+
+namespace cles::runtime {
+
+/// The connection to the daemon that is not a lane. Lines of several threads do not mix.
+class control_connection {
+  public:
+    explicit control_connection(int socket) noexcept : socket_(socket) {}
+    control_connection(const control_connection&) = delete;
+    control_connection& operator=(const control_connection&) = delete;
+
+    /// Waits until the daemon has read enough to take it.
+    void say(std::string_view lines);
+    /// How many lines this thread has said, to keep what follows in order.
+    [[nodiscard]] static std::uint64_t said_here() noexcept;
+
+  private:
+    int socket_;
+    std::mutex mutex_;
+};
+
+/// The jobs in the process of an isolated plugin: its tasks, and what the daemon tells about its jobs.
+///
+/// All functions may be called from any thread once the tasks have been added.
+class process_jobs {
+  public:
+    explicit process_jobs(control_connection& daemon) noexcept : daemon_(daemon) {}
+    process_jobs(const process_jobs&) = delete;
+    process_jobs& operator=(const process_jobs&) = delete;
+
+    void add(registration task);
+
+    /// Runs the handler of a request from a lane. Returns the line that ends it there: its reply, or that it replies
+    /// later.
+    std::string serve(const wire_line& line, std::string_view node);
+    /// Runs a callback of a job: a request that it has sent is answered, or reports progress.
+    void resume(const wire_line& line);
+
+    // From the control connection:
+    void cancel(std::uint64_t id);
+    void unwanted(std::uint64_t id);
+    /// The same as `resume`, on another thread.
+    void resume_elsewhere(const wire_line& line);
+
+  private:
+    class call;
+    struct asked {
+        answer_callback answered;
+        std::function<void(double, std::string_view)> progress;
+    };
+
+    std::uint64_t open_request(std::shared_ptr<asked> what);
+    void close_request(std::uint64_t ticket);
+    void forget(std::uint64_t id);
+
+    control_connection& daemon_;
+    std::map<std::pair<verb, std::string>, async_handler, std::less<>> tasks_;
+    stop_notifier notifier_;
+    std::mutex mutex_; // of all that follows
+    boost::unordered_flat_map<std::uint64_t, call*> calls_;
+    boost::unordered_flat_map<std::uint64_t, std::shared_ptr<asked>> requests_;
+    std::uint64_t last_ticket_ = 0;
+    // A cancellation may overtake its request, which comes by another connection.
+    std::deque<std::uint64_t> cancelled_early_;
+};
+
+} // namespace cles::runtime

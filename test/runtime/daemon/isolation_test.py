@@ -1,0 +1,598 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""clesd with a plugin in a process of its own: it serves as in the daemon, and whatever it does ends only that process."""
+
+import errno
+import hashlib
+import json
+import os
+import re
+import signal
+import unittest
+
+from daemon import DEFAULTS, HOSTILE, PLUGINS, STUBBORN, Daemon, Folder, body, clesd, wait_until_running
+from support import PATIENCE, cles, wait_until
+
+# Sanitizers turn some ends into others, and need more memory than a limit allows.
+SANITIZED = os.environ.get("SANITIZED", "") != ""
+
+
+EXITED = "ended itself with exit code "  # that of a sanitizer, if it cannot look for leaks by tracing the process
+LAST_WORDS = "it said last: " + ("" if SANITIZED else "about to crash")  # a sanitizer says more
+PATIENT = f"deadline={int(PATIENCE * 1000)}"
+
+
+def plugin(more="", limits="", path=HOSTILE, neighbour=f"{PLUGINS}/libcles-primes.so"):
+    """The entry of an isolated plugin, beside one in the daemon."""
+    text = f"plugins:\n  - {neighbour}\n  - path: {path}\n    isolation: process\n"
+    if limits:
+        text += f"    limits: {{{limits}}}\n"
+    if more:
+        text += f"    config: {{{more}}}\n"
+    return text
+
+
+def exists(process):
+    """Whether it runs: not even as a zombie."""
+    try:
+        with open(f"/proc/{process}/stat", encoding="utf-8") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+class Isolated(unittest.TestCase):
+    """One daemon for each test."""
+
+    MORE = ""
+    LIMITS = ""
+    CONFIG = ""
+
+    def setUp(self):
+        self.daemon = Daemon(plugin(self.CONFIG, self.LIMITS) + "stuck_after: 400ms\ndrain: 500ms\n" + self.MORE)
+        self.addCleanup(self.daemon.__exit__)
+
+    def tearDown(self):
+        """The daemon has not noticed."""
+        if self.daemon.process.poll() is None:
+            self.assertEqual(body(self.daemon.ask("PULL sat1:prime/7")), {"value": True})
+            self.assertEqual(self.daemon.stop()[0], 0)
+
+    def figures(self):
+        return json.loads(self.daemon.ask("PULL self:cles/metrics"))["isolated"][0]
+
+    def process(self):
+        return json.loads(self.daemon.ask("PULL self:process"))["value"]
+
+    def stop_counts(self):
+        return json.loads(self.daemon.ask("PULL self:stops"))
+
+
+class Ends(Isolated):
+    """Each of these ends the process, and costs the jobs that ran there one `failed` each."""
+
+    def ends(self, command, words, own=True, code="failed"):
+        """Runs a command that ends the process, next to a job that runs there and one that runs in the daemon."""
+        before = self.process()
+        with self.daemon.connect() as link:
+            link.send(f"DELEGATE self:listens id=1 {PATIENT}")
+            wait_until(lambda: self.figures()["jobs"] == 1, "it runs there")
+            link.send(f'DELEGATE self:primes id=2 {PATIENT} {{"below":20000000}}')
+            link.send(f"{command} id=3")
+            replies = {}
+            while len(replies) < 3:
+                reply = link.read()
+                replies[reply.split()[0]] = body(reply)
+        self.assertEqual(replies["id=2"], {"count": 1270607, "largest": 19999999})
+        self.assertEqual(replies["id=1"]["error"], "failed")
+        self.assertIn(words, replies["id=1"]["message"])
+        self.assertIn("the plugin 'hostile'", replies["id=1"]["message"])
+        self.assertEqual(replies["id=3"]["error"], code)
+        if own:
+            self.assertEqual(replies["id=3"]["message"], replies["id=1"]["message"])
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+        self.assertNotEqual(self.process(), before)
+        wait_until(lambda: not exists(before), "the old process is gone")
+        entry = self.daemon.wait_for_entry("it is started again")
+        self.assertEqual(entry["level"], "error")
+        self.assertIn("hostile: its process ", entry["message"])
+        self.assertIn(words, entry["message"])
+        figures = self.figures()
+        self.assertEqual((figures["name"], figures["state"], figures["ended"]), ("hostile", "running", 1))
+
+    def test_segmentation_fault(self):
+        # A sanitizer reports it, and ends the process in a way of its own.
+        self.ends("DELEGATE self:crashes", "ended" if SANITIZED else "was ended by signal 11 (SIGSEGV)")
+
+    def test_abort(self):
+        self.ends("DELEGATE self:aborts", "was ended by signal 6 (SIGABRT)")
+
+    def test_exit(self):
+        self.ends("DELEGATE self:exits/0", EXITED if SANITIZED else EXITED + "0")
+
+    def test_exit_with_a_code(self):
+        self.ends("DELEGATE self:exits/7", EXITED if SANITIZED else EXITED + "7")
+
+    def test_kill(self):
+        self.ends("DELEGATE self:kills_itself", "was ended by signal 9 (SIGKILL)")
+
+    def test_endless_loop(self):
+        self.ends("DELEGATE self:loops deadline=100",
+                  "was ended because DELEGATE 'loops' did not end within 400 ms of its deadline or cancellation",
+                  own=False, code="deadline")
+        metrics = json.loads(self.daemon.ask("PULL self:cles/metrics"))["pool"]
+        self.assertEqual((metrics["stuck"], metrics["stuck_now"]), (0, 0))
+
+    def test_an_endless_loop_that_is_cancelled(self):
+        with self.daemon.connect() as link:
+            link.send(f"DELEGATE self:loops id=1 {PATIENT}")
+            wait_until_running(self.daemon, 1)
+            link.send("PUSH self:cles/cancel/1 reply=no")
+            self.assertEqual(body(link.read())["error"], "cancelled")
+        self.daemon.wait_for_entry("DELEGATE 'loops' did not end within 400 ms")
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+
+    def test_it_closes_its_connections(self):
+        self.ends("DELEGATE self:closes_everything", "was ended by signal 9 (SIGKILL)")
+
+    def test_it_says_nonsense(self):
+        self.ends("DELEGATE self:says_nonsense", "was ended because what it said is invalid")
+
+    def test_somebody_kills_it(self):
+        before = self.process()
+        os.kill(before, signal.SIGKILL)
+        wait_until(lambda: self.figures()["ended"] == 1, "the daemon notices")
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+
+
+class Queue(Isolated):
+    """With one worker, jobs wait for those that crash."""
+
+    def setUp(self):
+        base = DEFAULTS.replace("workers: 2", "workers: 1")
+        self.daemon = Daemon(plugin() + "stuck_after: 400ms\n", base=base)
+        self.addCleanup(self.daemon.__exit__)
+
+    def test_queued_jobs_run_after_the_restart(self):
+        with self.daemon.connect() as link:
+            link.send("DELEGATE self:ages/100 id=1\nDELEGATE self:aborts id=2\n" +
+                      "\n".join(f"PULL self:quick id={i}" for i in range(3, 40)))
+            replies = {}
+            for _ in range(39):
+                reply = link.read()
+                replies[int(reply.split()[0][3:])] = reply
+        self.assertEqual(body(replies[1]), {"value": "aged"})
+        self.assertEqual(body(replies[2])["error"], "failed")
+        for i in range(3, 40):
+            self.assertEqual(replies[i], f'id={i} {{"value":42}}')
+        pool = json.loads(self.daemon.ask("PULL self:cles/metrics"))["pool"]
+        self.assertGreaterEqual(pool["admitted"], 39)
+
+
+class Withdrawal(Isolated):
+    def crash(self):
+        self.assertEqual(body(self.daemon.ask("DELEGATE self:aborts"))["error"], "failed")
+
+    def tasks(self):
+        return {task["task"] for task in json.loads(self.daemon.ask("PULL self:cles"))["tasks"]}
+
+    def test_three_ends_withdraw_the_tasks_until_sighup(self):
+        self.assertEqual(self.daemon.ask("PUSH self:publish/7"), "{}")
+        wait_until(lambda: "topic" in self.tasks() and
+                   self.daemon.ask("BIND self:topic/7") == '{"value":7}', "it is published")
+        for _ in range(3):
+            self.crash()
+        self.daemon.wait_for_entry("for the third time within 60 s: its tasks are withdrawn until SIGHUP")
+        self.assertEqual(body(self.daemon.ask("PULL self:quick"))["error"], "no_task")
+        tasks = self.tasks()
+        self.assertFalse({"aborts", "caller", "notice", "silent"} & tasks, tasks)
+        self.assertIn("primes", tasks)
+        figures = self.figures()
+        self.assertEqual((figures["state"], figures["ended"], figures["process"]), ("withdrawn", 3, 0))
+        self.daemon.send_signal(signal.SIGHUP)
+        self.daemon.wait_for_entry("its tasks were withdrawn; it is started again")
+        wait_until(lambda: self.daemon.ask("PULL self:quick") == '{"value":42}', "it is back")
+        self.assertTrue({"aborts", "caller", "topic", "notice", "silent"} <= self.tasks())
+        self.crash()  # the past is forgotten
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+
+    def test_other_nodes_are_told(self):
+        base = DEFAULTS.replace("sat1", "sat2")
+        with Daemon(f"seeds: {self.daemon.url}\n", base=base) as other:
+            def ask():
+                return body(other.ask("PULL any:quick deadline=2000"))
+
+            wait_until(lambda: ask() == {"value": 42}, "it is found")
+            for _ in range(3):
+                self.crash()
+            wait_until(lambda: ask().get("error") in ("no_task", "no_target"), "it is gone")
+            self.daemon.send_signal(signal.SIGHUP)
+            wait_until(lambda: ask() == {"value": 42}, "it is found again")
+            self.assertEqual(other.stop()[0], 0)
+
+    @unittest.skipUnless(os.environ.get("CLES_COMMAND"), "the command is not built")
+    def test_the_doctor_says_so(self):
+        for _ in range(3):
+            self.crash()
+        wait_until(lambda: self.figures()["state"] == "withdrawn", "they are withdrawn")
+        _, out, err = cles("doctor", "-o", "table", "--at", self.daemon.url, "-m", "off")
+        self.assertIn("the tasks of the plugin hostile of sat1 are withdrawn", out, err)
+
+    def test_sighup_does_not_touch_a_plugin_that_runs(self):
+        before = self.process()
+        self.daemon.send_signal(signal.SIGHUP)
+        self.daemon.wait_for_entry("reloaded the configuration")
+        self.assertEqual(self.process(), before)
+
+
+class Restart(unittest.TestCase):
+    def test_a_plugin_that_crashes_whenever_it_is_started_again(self):
+        with Folder() as f:
+            broken = f.file("broken")
+            with Daemon(plugin(f"crash_while: {broken}", f"read: [{f.path}]")) as d:
+                self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
+                f.write("", "broken")
+                self.assertEqual(body(d.ask("DELEGATE self:aborts"))["error"], "failed")
+                d.wait_for_entry("while it was started again")
+                entry = d.wait_for_entry("its tasks are withdrawn")
+                self.assertIn(LAST_WORDS, entry["message"])
+                self.assertEqual(body(d.ask("PULL self:quick"))["error"], "no_task")
+                os.unlink(broken)
+                d.send_signal(signal.SIGHUP)
+                wait_until(lambda: d.ask("PULL self:quick") == '{"value":42}', "it is back")
+                self.assertEqual(d.stop()[0], 0)
+
+
+class Start(unittest.TestCase):
+    def refused(self, entry, words, check=True):
+        """A required one prevents the start; without another one the daemon continues."""
+        with Folder() as f:
+            file = f.write(DEFAULTS + entry)
+            if check:
+                self.assertEqual(clesd("--config", file, "--check")[0], 2)
+            code, out, err = clesd("--config", file)
+            said = err.splitlines()[-1]
+            self.assertEqual((code, out), (2, ""), err)
+            self.assertIn(words, said)
+            self.assertIn(": plugins[1].", said)
+        with Daemon(entry + "    required: false\n") as d:
+            entry = d.wait_for_entry("continuing without it")
+            self.assertIn(words, entry["message"])
+            self.assertNotIn("error", json.loads(d.ask("PULL self:cles/metrics")))
+            self.assertEqual(body(d.ask("PULL sat1:caller"))["error"], "no_task")
+            self.assertEqual(d.stop()[0], 0)
+
+    def test_its_file_is_checked(self):
+        with open(HOSTILE, "rb") as file:
+            digest = hashlib.sha256(file.read()).hexdigest()
+        with Daemon(plugin() + f"    sha256: {digest}\n") as d:
+            self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
+            self.assertEqual(body(d.ask("DELEGATE self:aborts"))["error"], "failed")
+            self.assertEqual(d.ask("PULL self:quick"), '{"value":42}')
+            self.assertEqual(d.stop()[0], 0)
+        self.refused(plugin() + f"    sha256: {'0' * 64}\n", "not the configured one")
+
+    def test_it_crashes_at_its_start(self):
+        """In the daemon, this would end the daemon."""
+        self.refused(plugin("crash_at_start: true"), LAST_WORDS, check=False)
+
+    def test_its_settings_are_wrong(self):
+        self.refused(plugin("crash_at_stat: true"), "it has no setting 'crash_at_stat'")
+
+    def test_another_plugin_has_a_task(self):
+        with Folder() as f:
+            copy = f.file("copy.so")
+            with open(STUBBORN, "rb") as source, open(copy, "wb") as out:
+                out.write(source.read())
+            self.refused(plugin(path=copy, neighbour=STUBBORN), "quick", check=False)
+
+    def test_a_path_that_it_may_use_is_missing(self):
+        self.refused(plugin(limits="read: [/nowhere/at/all]"), "/nowhere/at/all: No such file or directory")
+
+    def test_settings(self):
+        for entry, words in (("isolation: thread", "'thread' is neither process nor none"),
+                             ("limits: {memory: 1GiB}", "has 'limits', which require 'isolation: process'"),
+                             ("isolation: process\n    limits: {memory: 1MiB}", "memory"),
+                             ("isolation: process\n    limits: {read: models}", "'models' is not an absolute path"),
+                             ("isolation: process\n    limits: {cores: 1}",
+                              "unknown key; known here: memory, open_files, read, write")):
+            with self.subTest(entry), Folder() as f:
+                file = f.write(DEFAULTS + f"plugins:\n  - path: {HOSTILE}\n    {entry}\n")
+                code, _, err = clesd("--config", file, "--check")
+                self.assertEqual(code, 2)
+                self.assertIn(words, err)
+
+    def test_the_settings_are_printed(self):
+        with Folder() as f:
+            file = f.write(DEFAULTS + plugin(limits="memory: 512MiB, write: /dev/null"))
+            code, out, err = clesd("--config", file, "--print-config")
+            self.assertEqual((code, err), (0, ""))
+            self.assertIn("    isolation: process\n    limits: {memory: 536870912, open_files: 256, read: [], "
+                          'write: ["/dev/null"]}', out)
+            again = f.write(out, "again.yaml")
+            self.assertEqual(clesd("--config", again, "--check")[0], 0)
+
+    def test_the_mode_is_not_for_people(self):
+        code, _, err = clesd("--plugin-process", "1", "x")
+        self.assertEqual((code, "the daemon itself starts this" in err), (2, True))
+
+
+class End(Isolated):
+    def test_it_ends_with_the_daemon(self):
+        process = self.process()
+        code, took = self.daemon.stop()
+        self.assertEqual(code, 0)
+        self.assertLess(took, 4)
+        self.assertFalse(exists(process))
+        self.assertFalse([e for e in self.daemon.entries() if e["level"] == "error"])
+
+    def test_it_ends_when_the_daemon_is_killed(self):
+        process = self.process()
+        self.daemon.process.kill()
+        self.daemon.process.wait()
+        wait_until(lambda: not exists(process), "it ends")
+
+    def test_a_job_that_does_not_end(self):
+        process = self.process()
+        with self.daemon.connect() as link:
+            link.send(f"DELEGATE self:loops id=1 {PATIENT}")
+            wait_until_running(self.daemon, 1)
+            code, took = self.daemon.stop()
+            self.assertEqual(code, 0)
+            self.assertLess(took, 6)
+            self.assertEqual(body(link.read())["error"], "unavailable")
+        self.assertFalse(exists(process))
+
+    def test_a_second_signal(self):
+        process = self.process()
+        with self.daemon.connect() as link:
+            link.send(f"DELEGATE self:loops id=1 {PATIENT}")
+            wait_until_running(self.daemon, 1)
+            self.daemon.send_signal(signal.SIGTERM)
+            self.daemon.wait_for_entry("stopping on SIGTERM")
+            self.daemon.send_signal(signal.SIGTERM)
+            self.assertEqual(self.daemon.end()[0], 0)
+        wait_until(lambda: not exists(process), "it ends")
+
+
+class Confinement(Isolated):
+    def setUp(self):
+        self.folder = Folder()
+        self.addCleanup(self.folder.__exit__)
+        for name in ("readable/file", "writable/file", "else/file"):
+            self.folder.write("text", name)
+        self.LIMITS = (f"memory: 256MiB, open_files: 32, read: [{self.folder.file('readable')}], "
+                       f"write: {self.folder.file('writable')}")
+        super().setUp()
+        self.in_force = self.daemon.wait_for_entry("confined to")["message"]
+
+    def outcome(self, task, what):
+        return json.loads(self.daemon.ask(f"PULL self:{task}/{str(what).replace('/', '%2F')}"))["value"]
+
+    def test_files(self):
+        if "Landlock" not in self.in_force or "no Landlock" in self.in_force:
+            self.skipTest("this kernel has no Landlock")
+        f = self.folder
+        for path, reads, writes in ((f.file("readable/file"), 0, errno.EACCES),
+                                    (f.file("writable/file"), 0, 0),
+                                    (f.file("writable/new"), 0, 0),
+                                    (f.file("else/file"), errno.EACCES, errno.EACCES),
+                                    (self.daemon.config, errno.EACCES, errno.EACCES),
+                                    ("/proc/meminfo", 0, errno.EACCES),
+                                    (f"/proc/{self.daemon.process.pid}/environ", errno.EACCES, errno.EACCES),
+                                    ("/etc/shadow", errno.EACCES, errno.EACCES),
+                                    ("/dev/null", 0, 0)):
+            with self.subTest(path):
+                self.assertEqual(self.outcome("writes", path), writes)
+                self.assertEqual(self.outcome("reads", path), reads)
+
+    def test_other_processes(self):
+        if "a filter of system calls" not in self.in_force:
+            self.skipTest("this kernel has no seccomp")
+        daemon = self.daemon.process.pid
+        for task in ("signals", "traces"):
+            self.assertEqual(self.outcome(task, daemon), errno.EPERM, task)
+        self.assertEqual(self.outcome("signals", self.process()), 0)
+        self.assertEqual(self.outcome("signals", -1), errno.EPERM)
+
+    def test_its_limits(self):
+        with open(f"/proc/{self.process()}/limits", encoding="utf-8") as file:
+            limits = {line[:26].strip(): line[26:].split()[0] for line in file}
+        self.assertEqual(limits["Max core file size"], "0")
+        self.assertLess(int(limits["Max open files"]), 100)
+        if not SANITIZED:
+            self.assertEqual(limits["Max data size"], str(256 << 20))
+        with open(f"/proc/{self.process()}/status", encoding="utf-8") as file:
+            self.assertRegex(file.read(), "CapPrm:\t0+\nCapEff:\t0+\n(.*\n)*NoNewPrivs:\t1\n")
+
+    @unittest.skipIf(SANITIZED, "a sanitizer needs too much memory for a limit")
+    def test_memory(self):
+        """The job gets an exception, and the process goes on."""
+        before = self.process()
+        answer = body(self.daemon.ask("DELEGATE self:exhausts_memory"))
+        self.assertEqual(answer["error"], "failed")
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+        self.assertEqual(self.process(), before)
+
+    @unittest.skipIf(SANITIZED, "a sanitizer opens files")
+    def test_it_inherits_nothing(self):
+        """Control and the lanes: workers and replacements."""
+        self.assertEqual(json.loads(self.daemon.ask("PULL self:descriptors")), list(range(3, 3 + 1 + 6)))
+
+    def test_its_output_is_logged(self):
+        self.assertEqual(self.daemon.ask("PUSH self:says/hello"), "{}")
+        for words in ("hostile: hello", "hostile: hello too"):
+            self.assertEqual(self.daemon.wait_for_entry(words)["level"], "info")
+
+    def test_much_output_is_cut(self):
+        self.assertEqual(self.daemon.ask("PUSH self:says_much deadline=30000"), "{}")
+        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+        wait_until(lambda: self.daemon.log().count("hostile: line ") >= 200, "a part of it is logged")
+        self.assertLess(self.daemon.log().count("hostile: line "), 5000)
+
+
+class Shipped(unittest.TestCase):
+    """The plugins that are part of CLES work in a process of their own."""
+
+    def test_each(self):
+        if not PLUGINS:
+            self.skipTest("they are not built")
+        names = ("system", "primes", "sgd", "fmv", "strike")
+        entries = "".join(f"  - path: {PLUGINS}/libcles-{name}.so\n    isolation: process\n" for name in names)
+        with Daemon("plugins:\n" + entries) as d:
+            self.assertIn("seconds", body(d.ask("PULL self:utc")))
+            for task in ("load", "memory", "disk", "network", "processes"):
+                with self.subTest(task):
+                    self.assertNotIn("error", body(d.ask(f"PULL self:{task}")))
+            self.assertEqual(body(d.ask('DELEGATE self:primes {"below":100000}')), {"count": 9592, "largest": 99991})
+            self.assertEqual(body(d.ask('DELEGATE self:primes_in_parts {"below":100000,"parts":4}'))["count"], 9592)
+            with d.connect() as link:
+                self.assertIn("seconds", body(link.ask("BIND self:utc")) or {"seconds": 0})
+                self.assertTrue(link.read().startswith("UPDATE sat1:utc "))
+            self.assertEqual(len(json.loads(d.ask("PULL self:cles/metrics"))["isolated"]), len(names))
+            self.assertEqual(d.stop()[0], 0)
+
+
+class Same(unittest.TestCase):
+    """A plugin serves the same in the daemon and in a process of its own."""
+
+    @classmethod
+    def setUpClass(cls):
+        alone = f"plugins:\n  - path: {HOSTILE}\n"
+        cls.here = Daemon(alone)
+        cls.there = Daemon(alone + "    isolation: process\n")
+
+    @classmethod
+    def tearDownClass(cls):
+        for d in (cls.here, cls.there):
+            code, _ = d.stop()
+            d.__exit__()
+            assert code == 0
+
+    def both(self, talk):
+        """What a conversation returns, in both."""
+        said = []
+        for d in (self.here, self.there):
+            with d.connect() as link:
+                said.append(talk(link, d))
+        self.assertEqual(said[0], said[1])
+        return said[0]
+
+    def test_replies(self):
+        for line in ("PULL self:quick", "PULL self:caller", "PULL self:caller/a%20b/%C3%A4%25", "PUSH sat1:caller/1",
+                     'PUSH self:caller {"x": [1, 2], "y": "\\u00e4"}', 'DELEGATE self:caller id=7 [1, 2]',
+                     "PULL self:caller/" + "/".join("abcdefghijklmnopqrstuvwxyzabcd"), "PULL self:text",
+                     "PULL self:list", 'PUSH self:swap {"x":1,"y":2}', 'PUSH self:swap {"x":1,"z":2}', "PUSH self:nothing",
+                     "PULL self:large", "PULL self:too_large", "PULL self:looks_failed", "PULL self:throws",
+                     "PULL self:denies", "PULL self:refuses", "PULL self:forgets", "PULL self:twice", "PULL self:later",
+                     "PULL self:nowhere", "DELEGATE self:quick", "BIND self:topic", "BIND self:topic/7",
+                     "BIND self:silent", "BIND self:nowhere", "UPDATE self:notice", "DELEGATE self:reports",
+                     "PULL self:caller reply=no", "DELEGATE self:passes_on/PULL%20self%3Aquick",
+                     "DELEGATE self:passes_on/PULL%20self%3Anowhere", "DELEGATE self:passes_on/PULL%20self%3Acaller",
+                     "DELEGATE self:passes_on/nonsense", "DELEGATE self:passes_on/PULL%20car9%3Aspeed"):
+            with self.subTest(line):
+                self.both(lambda link, d: link.ask(line))
+
+    def test_its_description(self):
+        self.both(lambda link, d: json.loads(link.ask("PULL self:cles"))["tasks"])
+
+    def test_progress(self):
+        def talk(link, d):
+            link.send("DELEGATE self:reports id=7 progress=yes")
+            return [link.read() for _ in range(5)]
+
+        said = self.both(talk)
+        self.assertEqual(said[1], 'id=7 progress=0.5 {"x":2,"y":0}')
+        self.assertEqual(said[-1], 'id=7 {"value":"done"}')
+
+    def test_much_progress(self):
+        """Reports are left out when they come too fast, and the last line is the reply."""
+        for d in (self.here, self.there):
+            with d.connect() as link:
+                link.send("DELEGATE self:reports_much id=7 progress=yes")
+                last = 0
+                for line in iter(link.read, 'id=7 {"value":"done"}'):
+                    fraction = float(re.match(r"id=7 progress=(\S+) \{\}$", line)[1])
+                    self.assertGreaterEqual(fraction, last)
+                    last = fraction
+
+    def test_progress_of_a_request_that_is_passed_on(self):
+        def talk(link, d):
+            link.send("DELEGATE self:passes_on/DELEGATE%20self%3Areports id=7 progress=yes")
+            return [line for line in iter(link.read, 'id=7 {"value":"done"}')]
+
+        self.assertEqual(self.both(talk), [f"id=7 progress={f} {{}}" for f in ("0.125", "0.25", "0.375", "0.5")])
+
+    def test_updates(self):
+        def talk(link, d):
+            said = [link.ask("BIND self:topic/7"), link.ask("BIND self:notice")]
+            link.send("PUSH self:publish/7 id=1")
+            said += [re.sub("epoch=[0-9a-f]{8} ", "", line) for line in sorted([link.read(), link.read()])]
+            link.send('UPDATE self:notice id=2 {"text":"x"}')
+            said += [re.sub("epoch=[0-9a-f]{8} ", "", line) for line in sorted([link.read(), link.read()])]
+            return said
+
+        said = self.both(talk)
+        self.assertEqual(said[2], 'UPDATE sat1:topic/7 seq=1 {"value":7}')
+
+    def test_stops(self):
+        """Cancellation, a deadline and a lost link reach a job while its handler runs, and after it has returned."""
+        for d in (self.here, self.there):
+            for task in ("waits", "listens"):
+                with self.subTest(task), d.connect() as control:
+                    def counts():
+                        return json.loads(control.ask("PULL self:stops"))
+
+                    before = counts()
+
+                    def begun(number):
+                        wait_until(lambda: counts()[2] - before[2] == number, "it runs")
+
+                    with d.connect() as link:
+                        link.send(f"DELEGATE self:{task} id=1 {PATIENT}")
+                        begun(1)
+                        link.send(f"DELEGATE self:{task} id=2 deadline=1000")
+                        begun(2)
+                        self.assertEqual(link.read().split()[:1], ["id=2"])
+                        link.send("PUSH self:cles/cancel/1 id=3")
+                        self.assertEqual({link.read().split()[0], link.read().split()[0]}, {"id=1", "id=3"})
+                        link.send(f"DELEGATE self:{task} id=4 {PATIENT}")
+                        begun(3)
+                    wait_until(lambda: counts()[1] - before[1] == 3, "all are told")
+                    if task == "waits":
+                        wait_until(lambda: counts()[0] - before[0] == 3, "all have ended")
+
+    def test_jobs_are_counted_by_the_pool(self):
+        for d in (self.here, self.there):
+            with d.connect() as link:
+                for i in range(1, 4):
+                    link.send(f"DELEGATE self:waits id={i} {PATIENT}")
+                wait_until_running(d, 2)
+                pool = json.loads(d.ask("PULL self:cles/metrics"))["pool"]
+                self.assertEqual((pool["queued"], pool["running"]), (1, 2))
+            wait_until_running(d, 0)
+
+
+class Crowd(Isolated):
+    def test_many_jobs_while_it_crashes(self):
+        """Each request gets exactly one reply; those that were lost are `failed`."""
+        with self.daemon.connect() as link:
+            count = 2000
+            for begin in range(1, count, 100):
+                link.send("\n".join(f"PULL self:quick id={i}" for i in range(begin, begin + 100)))
+                if begin in (501, 1201):
+                    link.send("DELEGATE self:aborts id=900000")
+                    while True:
+                        reply = link.read()
+                        if reply.startswith("id=900000 "):
+                            break
+                        self.assertIn(body(reply).get("error", "failed"), ("failed",))
+                        count -= 1
+            codes = {"failed": 0, None: 0}
+            for _ in range(count):
+                codes[body(link.read()).get("error")] += 1
+            self.assertLessEqual(codes["failed"], 12)
+
+
+if __name__ == "__main__":
+    unittest.main()

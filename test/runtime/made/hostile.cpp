@@ -1,0 +1,273 @@
+// SPDX-License-Identifier: BSL-1.0
+// A plugin to be run in a process of its own, which some of its tasks end or try to leave. The others do what plugins
+// do, to be compared with the same plugin in the daemon.
+#include <cles/plugin.hpp>
+
+#include <boost/describe/class.hpp>
+#include <boost/system/error_code.hpp>
+
+#include <atomic>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <sys/ptrace.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+namespace {
+
+using namespace std::chrono_literals;
+
+struct settings {
+    std::optional<bool> crash_at_start;
+    std::optional<std::string> crash_while; ///< this file exists
+};
+BOOST_DESCRIBE_STRUCT(settings, (), (crash_at_start, crash_while))
+
+struct caller {
+    std::string node, transport, name;
+    bool has_address = false, local = false;
+    std::vector<std::string> parameters;
+    std::string body;
+    bool has_deadline = false;
+};
+BOOST_DESCRIBE_STRUCT(caller, (), (node, transport, name, has_address, local, parameters, body, has_deadline))
+
+struct point {
+    double x = 0, y = 0;
+};
+BOOST_DESCRIBE_STRUCT(point, (), (x, y))
+
+caller describe(const cles::request& asked) {
+    const auto left = asked.deadline() - cles::time_point::clock::now();
+    return {.node = std::string{asked.node()},
+            .transport = asked.peer().transport,
+            .name = asked.peer().name,
+            .has_address = asked.peer().address.starts_with("tcp://127.0.0.1:"),
+            .local = asked.peer().local,
+            .parameters = {asked.parameters().begin(), asked.parameters().end()},
+            .body = std::string{asked.body()},
+            .has_deadline = left > 0s && left < 60s};
+}
+
+void crash() {
+    volatile int* nowhere = nullptr;
+    *nowhere = 1; // NOLINT: this is what it is for
+}
+
+void until_stopped(const cles::responder& answer) {
+    while (!answer.stopped()) {
+        std::this_thread::sleep_for(1ms);
+    }
+}
+
+// -- what ends the process -----------------------------------------------------------------------------------------
+
+void register_ends(cles::registrar& to) {
+    to.on_delegate("crashes", [] { crash(); });
+    to.on_delegate("aborts", [] { std::abort(); });
+    to.on_delegate("exits", [](const cles::request& asked) { std::exit(asked.parameter<int>(0)); });
+    to.on_delegate("kills_itself", [] {
+        ::kill(::getpid(), SIGKILL);
+        ::pause();
+    });
+    to.on_delegate("loops", [] {
+        for (std::atomic<bool> forever{true}; forever;) {
+        }
+    });
+    to.on_delegate("closes_everything", [] {
+        for (int fd = 3; fd < 64; ++fd) {
+            ::close(fd);
+        }
+        std::this_thread::sleep_for(1h);
+    });
+    to.on_delegate("says_nonsense", [] {
+        const std::string line = "id=99999999999999999999 nonsense\n";
+        (void)::send(3, line.data(), line.size(), 0);
+        std::this_thread::sleep_for(1h);
+    });
+    to.on_delegate("exhausts_memory", [] {
+        std::vector<std::unique_ptr<char[]>> all;
+        for (;;) {
+            constexpr std::size_t size = 16U << 20U;
+            all.push_back(std::make_unique<char[]>(size)); // written with zeros
+        }
+    });
+}
+
+// -- what it must not do -------------------------------------------------------------------------------------------
+
+int outcome(long result) { return result < 0 ? errno : 0; }
+
+void register_attempts(cles::registrar& to) {
+    to.on_pull("process", [] { return static_cast<int>(::getpid()); });
+    to.on_pull("signals", [](const cles::request& asked) { return outcome(::kill(asked.parameter<int>(0), 0)); });
+    to.on_pull("traces", [](const cles::request& asked) {
+        return outcome(::ptrace(PTRACE_SEIZE, asked.parameter<int>(0), nullptr, nullptr));
+    });
+    to.on_pull("reads", [](const cles::request& asked) {
+        const int fd = ::open(std::string{asked.parameter(0)}.c_str(), O_RDONLY | O_CLOEXEC);
+        const int failed = outcome(fd);
+        ::close(fd);
+        return failed;
+    });
+    to.on_pull("writes", [](const cles::request& asked) {
+        const int fd = ::open(std::string{asked.parameter(0)}.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0600);
+        const int failed = outcome(fd);
+        ::close(fd);
+        return failed;
+    });
+    // Which descriptors it has, besides those of its output.
+    to.on_pull("descriptors", [] {
+        std::vector<int> open;
+        for (int fd = 3; fd < 1024; ++fd) {
+            if (::fcntl(fd, F_GETFD) >= 0) {
+                open.push_back(fd);
+            }
+        }
+        return open;
+    });
+    to.on_push("says", [](const cles::request& asked) {
+        std::printf("%s\n", std::string{asked.parameter(0)}.c_str());
+        std::fflush(stdout);
+        std::fprintf(stderr, "%s too\n", std::string{asked.parameter(0)}.c_str());
+    });
+    to.on_push("says_much", [] {
+        for (int i = 0; i < 20'000; ++i) {
+            std::printf("line %d\n", i);
+        }
+        std::fflush(stdout);
+    });
+}
+
+// -- what plugins do -----------------------------------------------------------------------------------------------
+
+void register_replies(cles::registrar& to) {
+    to.on_pull("quick", [] { return 42; }, {.description = "a number", .idempotent = true});
+    to.on_pull("caller", describe, {.description = "who asks", .parameters = {"a", "b"}});
+    to.on_push("caller", describe);
+    to.on_delegate("caller", describe);
+    to.on_pull("text", [] { return std::string{"a \"b\" \n \xC3\xA4"}; });
+    to.on_pull("list", [] { return std::vector{1, 2, 3}; });
+    to.on_push("swap", [](const point& p) { return point{p.y, p.x}; });
+    to.on_push("nothing", [] {});
+    to.on_pull("large", [] { return std::string(300'000, 'x'); });
+    to.on_pull("too_large", [] { return std::string(2'000'000, 'x'); });
+    to.on_pull("looks_failed", [] { return cles::json_text{R"({"error":"busy"})"}; });
+    to.on_pull("throws", [] { throw std::runtime_error{"it broke"}; });
+    to.on_pull("denies", [] { throw cles::error(cles::errc::denied, "not you"); });
+    to.on_pull("refuses",
+               [](const cles::request&, const cles::responder& answer) { answer.refuse("the dock is full", 250ms); });
+    to.on_pull("forgets", [](const cles::request&, const cles::responder&) {});
+    to.on_pull("twice", [](const cles::request&, const cles::responder& answer) {
+        answer.done(1);
+        answer.done(2);
+    });
+    to.on_pull("later", [](const cles::request&, const cles::responder& answer) {
+        std::thread{[answer] {
+            std::this_thread::sleep_for(5ms);
+            answer.done("late");
+        }}.detach();
+    });
+    to.on_delegate("reports", [](const cles::request&, const cles::responder& answer) {
+        for (int i = 1; i <= 4; ++i) {
+            answer.progress(i / 4.0, point{static_cast<double>(i), 0});
+        }
+        answer.done("done");
+    });
+    to.on_delegate("reports_much", [](const cles::request&, const cles::responder& answer) {
+        for (int i = 1; i <= 50'000; ++i) {
+            answer.progress(i / 50'000.0);
+        }
+        answer.done("done");
+    });
+}
+
+void register_jobs(cles::registrar& to) {
+    // Until the request is cancelled or its deadline has passed. Counts how often that happened, and how.
+    struct ends {
+        std::atomic<int> stopped{0}, called{0}, begun{0};
+    };
+    const auto counts = std::make_shared<ends>();
+    to.on_pull("stops", [counts] {
+        return std::vector{counts->stopped.load(), counts->called.load(), counts->begun.load()};
+    });
+    to.on_delegate("waits", [counts](const cles::request&, const cles::responder& answer) {
+        answer.on_stop([counts] { ++counts->called; });
+        ++counts->begun;
+        until_stopped(answer);
+        ++counts->stopped;
+        answer.fail(cles::errc::cancelled, "stopped");
+    });
+    // Its handler returns at once.
+    to.on_delegate("listens", [counts](const cles::request&, const cles::responder& answer) {
+        answer.on_stop([counts, answer] {
+            ++counts->called;
+            answer.fail(cles::errc::cancelled, "stopped");
+        });
+        ++counts->begun;
+    });
+    to.on_delegate("ages", [](const cles::request& asked) {
+        std::this_thread::sleep_for(std::chrono::milliseconds{asked.parameter<int>(0)});
+        return "aged";
+    });
+    // Passes on a command, and reports the progress of it.
+    to.on_delegate("passes_on", [](const cles::request& asked, const cles::responder& answer) {
+        const auto command = std::string{asked.parameter(0)};
+        answer.delegate(
+            command,
+            cles::call_options{}.on_progress([answer](double done, std::string_view) { answer.progress(done / 2); }),
+            [answer](boost::system::error_code code, std::string_view json, std::string_view message) {
+                if (code) {
+                    answer.fail(cles::errc::failed, std::string{code.message()} + ": " + std::string{message});
+                } else {
+                    answer.done(cles::json_text{std::string{json}});
+                }
+            });
+    });
+}
+
+void register_updates(cles::registrar& to) {
+    const auto updates = std::make_shared<cles::publisher>(to.make_publisher());
+    to.on_push("publish", [updates](const cles::request& asked) {
+        updates->update("topic/" + std::string{asked.parameter(0)}, asked.parameter<int>(0));
+    });
+    to.on_bind("topic", [](const cles::request& asked) {
+        if (asked.parameters().empty()) {
+            throw cles::error(cles::errc::bad_request, "which one?");
+        }
+    });
+    to.on_update("notice", [](const cles::request& asked) {
+        if (asked.body() == "{}") {
+            throw cles::error(cles::errc::bad_request, "say something");
+        }
+    });
+    to.on_bind("silent");
+}
+
+void register_tasks(cles::registrar& to, const settings& how) {
+    if (how.crash_at_start.value_or(false) || (how.crash_while && ::access(how.crash_while->c_str(), F_OK) == 0)) {
+        std::fputs("about to crash\n", stderr);
+        crash();
+    }
+    register_ends(to);
+    register_attempts(to);
+    register_replies(to);
+    register_jobs(to);
+    register_updates(to);
+}
+
+} // namespace
+
+CLES_PLUGIN("hostile", "1.0", register_tasks)

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: BSL-1.0
+#pragma once
+
+#include <cles/sharing.hpp>
+
+#include "node/routing/service_registry.hpp"
+#include "node/sharing/work_sharing.hpp"
+#include "protocol/request_line.hpp"
+#include "support/routing_fixture.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace cles::test {
+
+/// A queue whose workers are those of the test.
+class test_queue final : public shareable_queue {
+  public:
+    struct job {
+        std::shared_ptr<core::call> call;
+        std::string body;
+        std::uint64_t ticket = 0; ///< of a moved job
+    };
+
+    [[nodiscard]] state read_state() const override {
+        auto now = figures;
+        now.waiting = static_cast<std::uint32_t>(waiting.size());
+        return now;
+    }
+    void offer(job_taker& to) override {
+        std::vector<std::size_t> wanted;
+        for (std::size_t i = 0; i < waiting.size() && !to.full(); ++i) {
+            if (to.wants(*waiting[i].call, i)) {
+                wanted.push_back(i);
+            }
+        }
+        auto left = std::exchange(waiting, {});
+        for (std::size_t i = 0; i < left.size(); ++i) {
+            if (std::find(wanted.begin(), wanted.end(), i) == wanted.end()) {
+                waiting.push_back(left[i]);
+                continue;
+            }
+            auto call = left[i].call;
+            auto body = left[i].body;
+            moved.push_back({call, body, to.take(call, body, [this, call, body](bool refused) {
+                                 ended += refused ? 0 : 1;
+                                 std::erase_if(moved, [&](const job& each) { return each.call == call; });
+                                 if (refused) {
+                                     waiting.push_back({call, body, 0});
+                                 }
+                             })});
+        }
+    }
+
+    state figures{.workers = 1, .service_time = std::chrono::milliseconds{10}};
+    std::vector<job> waiting;
+    std::vector<job> moved;
+    int ended = 0; ///< moved jobs that have been answered
+};
+
+/// The node car1, which shares the jobs of a queue with car2; the test plays the others.
+struct sharing_fixture : routing_fixture, private core::work_sharing::client {
+    sharing_fixture() { start(); }
+    sharing_fixture(std::shared_ptr<core::node_security> security, const std::string& client)
+        : routing_fixture(std::move(security), client) {
+        start();
+    }
+    ~sharing_fixture() {
+        if (sharing) {
+            sharing->withdraw_all();
+        }
+    }
+
+    /// A job for car1 arrives on the link, and waits.
+    void submit(const std::string& line) {
+        link.ask(line);
+        if (!node.started.empty()) {
+            queue.waiting.push_back({node.started.back()->call, node.started.back()->body, 0});
+        }
+    }
+    /// The reply of car1 to a grant for so many jobs by car2.
+    std::string grant(unsigned slots, const std::string& number = "00000000000000aa", const std::string& by = "car2") {
+        return link.ask("PUSH self:cles/slots id=900 grant=" + number + R"( {"node":")" + by + R"(","free":)" +
+                        std::to_string(slots) + "}");
+    }
+    /// The newest request to car2.
+    [[nodiscard]] recorded_next_hop::sent& sent() { return ways.to("car2"); }
+    /// The grant that car1 has sent to a node; empty: it has sent something else.
+    std::string granted_to(const std::string& name) {
+        const auto& text = ways.to(name).text;
+        const auto at = text.find(" grant=");
+        return text.starts_with("PUSH " + name + ":cles/slots") && at != std::string::npos ? text.substr(at + 7, 16)
+                                                                                           : std::string{};
+    }
+    [[nodiscard]] core::counters& counts() const { return node.counts(); }
+
+    test_queue queue;
+    std::unique_ptr<core::work_sharing> sharing =
+        std::make_unique<core::work_sharing>(*node.host, static_cast<core::work_sharing::client&>(*this), queue, 7);
+
+  private:
+    void start() {
+        node.on_later(verb::delegate, "work");
+        offer("car2", task("DELEGATE", "work"), {.workers = 1});
+    }
+
+    void list_neighbours(std::vector<core::work_sharing::neighbour>& to) const override {
+        for (const auto& [name, other] : routing->registry().nodes()) {
+            to.push_back({name, other->load, node.host->peers.last_seen(name)});
+        }
+    }
+    [[nodiscard]] bool offers(std::string_view name, std::string_view task) const override {
+        const auto* const other = routing->registry().find(name);
+        return other != nullptr && other->tasks &&
+               std::any_of(other->tasks->entries.begin(), other->tasks->entries.end(),
+                           [&](const auto& each) { return each.verb == verb::delegate && each.task == task; });
+    }
+    void push_slots(std::string_view name, std::uint64_t grant, std::string_view body) override {
+        const auto noun = std::string{name} + ":cles/slots";
+        const auto adverbs = grant != 0 ? "grant=" + protocol::grant_text(grant) : std::string{};
+        ways.send({.verb = verb::push, .noun = noun, .adverbs = adverbs, .body = body},
+                  node.clock.now() + core::slot_grants::valid_for,
+                  detail::pending_ptr{new core::subrequest(
+                      [this, name = std::string{name}, grant](std::string_view json, core::subrequest_failure*) {
+                          sharing->on_reply(name, grant, json, node.clock.now());
+                      })},
+                  {}, {});
+    }
+    std::uint64_t forward(const protocol::outgoing_request& r, time_point due, detail::pending_ptr reply,
+                          core::outbound::progress_function progress) override {
+        return ways.send(r, due, std::move(reply), std::move(progress), {});
+    }
+    void cancel(std::uint64_t ticket) override { ways.cancel(ticket); }
+    std::uint32_t random() override { return ++drawn_; }
+
+    std::uint32_t drawn_ = 0;
+};
+
+} // namespace cles::test
