@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: BSL-1.0
+"""Checks the model of work sharing with spin: its properties hold, each of its transitions is taken, broken variants fail.
+
+    check_model.py             checks everything; prints a table; exits 1 if a check has another result than expected
+    check_model.py NAME...     only the checks with these names
+    check_model.py --table     prints the transitions of sharing.pml, one a line: `holder.waiting worker_free holder.running`
+
+Each search is exhaustive. Under fairness there are several times as many states: there, one job stands for both with datagrams,
+and with all faults of a stream at once. The test is skipped (77) where spin is not
+installed; scripts/setup installs it.
+"""
+
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+MODEL = Path(__file__).with_name("sharing.pml")
+TRANSITION = re.compile(r"(;?)\s*/\* T (\w+\.\w+) --(\w+)--> (\w+\.\w+) \*/")
+MEMORY_MB = 2000  # of one search
+SECONDS = 150     # the same
+
+# Of each kind of search: how pan is compiled, and run. Without partial order reduction, which would save nothing here.
+KINDS = {
+    "safety": (["-DSAFETY", "-DNOCLAIM"], []),               # assertions, invalid end states
+    "answered": (["-DNFAIR=3"], ["-a", "-f"]),               # the LTL formula, under weak fairness
+    "rest": (["-DNP", "-DNOCLAIM", "-DNFAIR=3"], ["-l", "-f"]),  # no endless execution under weak fairness
+}
+# What a search may find, as pan says it.
+TWICE, CROWD, DEADLOCK, ENDLESS = "a job runs twice", "more jobs than workers", "deadlock", "a job is never answered"
+FINDINGS = {r"assertion violated \(ran\[": TWICE, r"assertion violated \(+own==": CROWD, "invalid end state": DEADLOCK,
+            "acceptance cycle": ENDLESS}
+
+
+
+@dataclass(frozen=True)
+class Check:
+    name: str
+    kind: str
+    defines: str
+    refuted_by: str = ""  # what the search has to find; empty: nothing
+    covers: bool = False  # whether every transition has to be taken
+
+
+CHECKS = [
+    Check("stream", "safety", "STREAM PATIENCE", covers=True),
+    Check("stream, 2 jobs", "answered", "STREAM LIVENESS BREAKS=0"),
+    Check("stream, 1 job", "answered", "STREAM LIVENESS ONE_JOB"),
+    Check("stream, 1 job", "rest", "STREAM LIVENESS ONE_JOB"),
+    Check("stream, no faults", "rest", "STREAM LIVENESS BREAKS=0 CRASHES=0 STOPS=0"),
+    Check("datagram", "safety", "DATAGRAM BREAKS=0", covers=True),
+    Check("datagram, false loss", "safety", "DATAGRAM PATIENCE ONE_JOB"),
+    Check("datagram, 1 job", "answered", "DATAGRAM LIVENESS ONE_JOB"),
+    Check("datagram, 1 job", "rest", "DATAGRAM LIVENESS BREAKS=0 ONE_JOB"),
+    Check("RERUN_LOST", "safety", "STREAM RERUN_LOST", TWICE),
+    Check("BUSY_WHEN_BEGUN", "safety", "STREAM BUSY_WHEN_BEGUN", TWICE),
+    Check("FAILURE_REFUSES", "safety", "STREAM FAILURE_REFUSES", TWICE),
+    Check("LATE_GRANT", "safety", "STREAM LATE_GRANT", CROWD),
+    Check("NO_OWN_FIRST", "safety", "STREAM NO_OWN_FIRST", CROWD),
+    Check("LOSS_UNNOTICED", "safety", "STREAM PATIENCE LOSS_UNNOTICED", DEADLOCK),
+    Check("NO_DEDUP", "safety", "DATAGRAM BREAKS=0 NO_DEDUP", TWICE),
+    Check("TRUST_UNKNOWN", "safety", "DATAGRAM BREAKS=0 TRUST_UNKNOWN", TWICE),
+    Check("NO_DEADLINE", "answered", "STREAM LIVENESS BREAKS=0 NO_DEADLINE", ENDLESS),
+]
+
+
+def table(text: str) -> list[str]:
+    """The transitions of the model, in its order, each once."""
+    return list(dict.fromkeys(" ".join(match.group(2, 3, 4)) for match in TRANSITION.finditer(text)))
+
+
+def instrumented(text: str) -> str:
+    """The model, which also prints the number of each transition in the table when it is first taken."""
+    numbers = {transition: number for number, transition in enumerate(table(text))}
+
+    def count(match: re.Match) -> str:
+        number = numbers[" ".join(match.group(2, 3, 4))]
+        return f'; c_code {{ if (!taken[{number}]) {{ taken[{number}] = 1; printf("taken {number}\\n"); }} }}{match.group(1)}'
+
+    return f"c_decl {{ static unsigned char taken[{len(numbers)}]; }}\n" + TRANSITION.sub(count, text)
+
+
+def limit_memory() -> None:
+    size = 2 * MEMORY_MB * 1024 * 1024
+    resource.setrlimit(resource.RLIMIT_AS, (size, size))
+
+
+def run(command: list[str], folder: Path) -> str:
+    done = subprocess.run(command, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False,
+                          preexec_fn=limit_memory, timeout=SECONDS)
+    if done.returncode != 0:
+        raise RuntimeError(f"{' '.join(command)}\n{done.stdout}")
+    return done.stdout
+
+
+def found(pattern: str, text: str) -> str:
+    match = re.search(pattern, text, re.MULTILINE)
+    return match[1] if match else ""
+
+
+def check(what: Check, text: str, folder: Path) -> str:
+    """Prints the row of one check. Returns what is wrong, or nothing."""
+    compiled, options = KINDS[what.kind]
+    (folder / "model.pml").write_text(instrumented(text) if what.covers else text, encoding="utf-8")
+    run(["spin", *(f"-D{name}" for name in what.defines.split()), "-a", "model.pml"], folder)
+    # A variant is refuted so soon that optimising takes longer.
+    run(["cc", "-w", "-O0" if what.refuted_by else "-O2", "-DNOREDUCE", f"-DMEMLIM={MEMORY_MB}", *compiled, "-o", "pan", "pan.c"], folder)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    said = run(["./pan", "-n", "-m50000", "-w23", *options], folder)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    errors = found(r"errors: (\d+)", said)
+    states = found(r"^\s*([\d.e+]+) states, stored", said)
+    memory = found(r"^\s*([\d.]+)\s+total actual memory usage", said)
+    failure = found(r"^pan:\d+: (.*)$", said)
+    finding = next((name for pattern, name in FINDINGS.items() if re.match(pattern, failure)), "")
+
+    wrong = ""
+    incomplete = ("max search depth", "out of memory", *([] if what.refuted_by else ["Search not completed"]))
+    if not errors or any(sign in said for sign in incomplete):
+        wrong = f"the search is not complete\n{said}"
+    elif what.refuted_by:
+        if errors == "0" or finding != what.refuted_by:
+            wrong = f"expected: {what.refuted_by}; found: {failure or 'nothing'}"
+    elif errors != "0":
+        wrong = failure
+    missing = []
+    if what.covers:
+        taken = {int(number) for number in re.findall(r"^taken (\d+)$", said, re.MULTILINE)}
+        missing = [transition for number, transition in enumerate(table(text)) if number not in taken]
+        if missing and not wrong:
+            wrong = "never taken: " + ", ".join(missing)
+    result = "WRONG" if wrong else f"refuted: {finding}" if what.refuted_by else "holds"
+    if what.covers and not wrong:
+        result += f", takes all {len(table(text))} transitions"
+    print(f"{what.name:20} {what.kind:9} {float(states or 0):11,.0f} {float(memory or 0):8.0f} {seconds:8.1f}  {result}", flush=True)
+    return f"{what.name}: {wrong}" if wrong else ""
+
+
+def main(arguments: list[str]) -> int:
+    text = MODEL.read_text(encoding="utf-8")
+    if arguments == ["--table"]:
+        print("\n".join(table(text)))
+        return 0
+    for program in ("spin", "cc"):
+        if shutil.which(program) is None:
+            print(f"skipped: {program} is not installed")
+            return 77
+    unknown = set(arguments) - {what.name for what in CHECKS}
+    if unknown:
+        print(f"there is no check {', '.join(sorted(unknown))}")
+        return 2
+    print(f"{'check':20} {'search':9} {'states':>11} {'MB':>8} {'CPU s':>8}  result")
+    wrong = []
+    for what in CHECKS:
+        if arguments and what.name not in arguments:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            try:
+                wrong.append(check(what, text, Path(folder)))
+            except (RuntimeError, subprocess.TimeoutExpired) as failure:
+                wrong.append(f"{what.name}: {failure}")
+    wrong = [line for line in wrong if line]
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    print(f"{usage.ru_utime + usage.ru_stime:.0f} s of CPU in all, compilation included")
+    print("\n".join(wrong))
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
