@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: BSL-1.0
-"""Demonstrates a pool of four daemons: they find each other and share jobs, and one of them is killed meanwhile.
+"""Demonstrates a pool of four daemons: they find each other and share jobs, and one of them is killed meanwhile. Then a
+chain of four, in which each has a link to its neighbours only: requests pass through, and waiting jobs move.
 
     demo_cluster.py [FOLDER]
 
@@ -25,6 +26,7 @@ NAMES = ["sat1", "sat2", "sat3", "sat4"]
 FIRST, ASKED = "sat1", "sat2"  # the seed of the others; the daemon that gets all requests
 PATIENCE = 30  # seconds; everything takes far less
 SPREAD, UNDER_FIRE = 60, 80  # jobs
+CHAIN = ["car1", "car2", "car3", "car4"]
 JOB_SECONDS = 0.1  # intended duration of a job
 BOLD, PLAIN = ("\033[1m", "\033[0m") if sys.stdout.isatty() and not os.environ.get("NO_COLOR") else ("", "")
 
@@ -34,6 +36,15 @@ listen: [tcp://127.0.0.1:0]         # a free port
 multicast: off                      # with multicast, no seeds are needed
 seeds: [{seeds}]{padding}# nodes that are asked for the others
 workers: 2
+plugins: [libcles-primes.so]
+"""
+CHAIN_CONFIG = """\
+node: {name}
+listen: [tcp://127.0.0.1:0]
+multicast: off
+seeds: [{seeds}]
+links: [{links}]{padding}# the only nodes that this one may have links to
+workers: 1
 plugins: [libcles-primes.so]
 """
 
@@ -175,7 +186,7 @@ class Cluster:
             peers = link.ask("PULL self:cles/peers")["peers"]
         return {peer["node"] for peer in peers if peer["state"] == "live"}
 
-    def close(self):
+    def end(self):
         for process in self.started:
             process.terminate()
         for process in self.started:
@@ -185,7 +196,29 @@ class Cluster:
                 process.kill()
                 process.wait()
             process.stdout.close()
+        self.started.clear()
+
+    def close(self):
+        self.end()
         shutil.rmtree(self.folder, ignore_errors=True)
+
+
+class Chain(Cluster):
+    """Each daemon knows the one before, and may only talk to that and the next."""
+
+    def config_of(self, name):
+        at = CHAIN.index(name)
+        before, after = CHAIN[max(0, at - 1):at], CHAIN[at + 1:at + 2]
+        links = ", ".join(before + after)
+        return CHAIN_CONFIG.format(name=name, seeds="".join(self.urls[each] for each in before), links=links,
+                                   padding=" " * max(1, 27 - len(links)))
+
+    def is_complete(self):
+        """Whether requests of the first reach the last."""
+        with Link(self.urls[CHAIN[0]]) as link:
+            peers = {peer["node"]: peer for peer in link.ask("PULL self:cles/peers")["peers"]}
+            return set(peers) == set(CHAIN[1:]) and all(peers[name].get("hops", 1) == at + 1
+                                                        for at, name in enumerate(CHAIN[1:]))
 
 
 def jobs_done(link):
@@ -203,9 +236,9 @@ def show_share(name, share, remark=""):
     show(f"{name} {share:4} {'#' * share}{remark}")
 
 
-def run_jobs(link, count, below, after_answer=lambda answers: None):
+def run_jobs(link, count, below, after_answer=lambda answers: None, target="any"):
     """Sends the jobs. Returns their outcomes, the time for all, and one line in each direction."""
-    command = "DELEGATE any:primes id={} {{\"below\":" + str(below) + "}}"
+    command = "DELEGATE " + target + ":primes id={} {{\"below\":" + str(below) + "}}"
     open_ones = set(range(1, count + 1))
     begun = time.monotonic()
     link.send(*[command.format(number) for number in sorted(open_ones)])
@@ -279,6 +312,35 @@ def show_demo(cluster):
         answer = json.loads(answer)
         if set(answer["results"]) != set(NAMES) - {FIRST} or set(answer["errors"]) != {FIRST}:
             raise Trouble(f"expected a reply of each node except {FIRST}")
+    return below
+
+
+def show_chain(chain, below):
+    heading("Four more in a chain: " + " -- ".join(CHAIN))
+    for name in CHAIN:
+        chain.start(name)
+    begun = time.monotonic()
+    patient(chain.is_complete, f"{CHAIN[0]} has a route to each")
+    show(f"After {time.monotonic() - begun:.1f} s, {CHAIN[0]} has a route to {CHAIN[-1]}. The configuration of {CHAIN[1]}:")
+    for line in chain.config_of(CHAIN[1]).splitlines():
+        show(f"    {line}")
+
+    with Link(chain.urls[CHAIN[0]]) as link:
+        question = f"PULL {CHAIN[-1]}:prime/97"
+        heading(f"A request over three links, asked at {CHAIN[0]}")
+        show(f"> {question}\n< {json.dumps(link.ask(question), separators=(',', ':'))}")
+
+        heading(f"{SPREAD} jobs for {CHAIN[1]} by its name, asked at {CHAIN[0]}; its neighbours have free workers")
+        before = jobs_done(link)
+        fates, seconds, _, _ = run_jobs(link, SPREAD, below, target=CHAIN[1])
+        shares = shares_of(before, jobs_done(link))
+        for name, share in shares.items():
+            show_share(name, share)
+        show(f"{fates['done']} done in {seconds:.1f} s. Jobs that waited at {CHAIN[1]} moved to its neighbours, which had "
+             f"asked for them;\nto {CHAIN[-1]} it has no link.")
+        moved = shares[CHAIN[0]] + shares[CHAIN[2]]
+        if fates["done"] != SPREAD or sum(shares.values()) != SPREAD or moved == 0 or shares[CHAIN[-1]] != 0:
+            raise Trouble(f"expected {SPREAD} jobs to be done, some by the neighbours: {dict(fates)}, {shares}")
 
 
 def interrupt(number, _):
@@ -289,9 +351,11 @@ def main():
     for number in INTERRUPTS:
         signal.signal(number, interrupt)
     programs = sys.argv[1] if len(sys.argv) > 1 else "build/release/apps"
-    cluster = Cluster(programs)
+    cluster, chain = Cluster(programs), Chain(programs)
     try:
-        show_demo(cluster)
+        below = show_demo(cluster)
+        cluster.end()
+        show_chain(chain, below)
         return 0
     except (Trouble, OSError, ValueError, KeyError, subprocess.TimeoutExpired) as problem:
         print(f"cles: {problem}", file=sys.stderr)
@@ -302,6 +366,7 @@ def main():
         for number in INTERRUPTS:
             signal.signal(number, signal.SIG_IGN)
         cluster.close()
+        chain.close()
 
 
 if __name__ == "__main__":

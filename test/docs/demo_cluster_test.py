@@ -78,6 +78,11 @@ class Demo(unittest.TestCase):
         self.assertRegex(said, r"(?m)^  80 sent: 80 done, 0 refused, 0 failed, 0 unknown, in \d+\.\d s$")
         answered = re.search(r"(?m)^  < (\{\"results\".*)$", said)[1]
         self.assertIn('"errors":{"sat1":{"error":"unavailable"', answered)
+        self.assertRegex(said, r"(?m)^  After \d+\.\d s, car1 has a route to car4\.")
+        self.assertIn('< {"value":true}', said)
+        for name in ("car1", "car2", "car3"):
+            self.assertRegex(said, rf"(?m)^  {name} +[1-9]\d* #+$")
+        self.assertRegex(said, r"(?m)^  60 done in \d+\.\d s\. Jobs that waited at car2 moved to its neighbours")
 
     def test_interrupted_it_cleans_up(self):
         for number, at in ((signal.SIGINT, "sat1 listening"), (signal.SIGTERM, "sat1 is dead")):
