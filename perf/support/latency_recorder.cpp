@@ -6,6 +6,12 @@
 
 namespace cles::perf {
 
+void latency_recorder::copy_to(latency_recorder& other) const noexcept {
+    const auto count = std::min(count_, other.remaining());
+    std::copy_n(nanoseconds_.begin(), count, other.nanoseconds_.begin() + static_cast<std::ptrdiff_t>(other.count_));
+    other.count_ += count;
+}
+
 latencies latency_recorder::quantiles() {
     if (count_ == 0) {
         return {};

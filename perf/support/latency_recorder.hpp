@@ -30,6 +30,8 @@ class latency_recorder {
     void record(std::chrono::nanoseconds latency) noexcept {
         nanoseconds_[count_++] = static_cast<std::uint64_t>(latency.count());
     }
+    /// Records in `other` what was recorded here, as far as there is space.
+    void copy_to(latency_recorder& other) const noexcept;
     /// Reorders what was recorded.
     latencies quantiles();
 
