@@ -40,6 +40,7 @@ struct request_arguments {
     output_format format = output_format::automatic;
     bool progress = false;
     bool urgent = false;
+    std::uint32_t hops = 8;
 };
 
 // The node does not route or cannot be reached: another one may.
@@ -75,7 +76,7 @@ asio::awaitable<void> send_all(client& requester, const request_arguments& args,
     printer out{args.format, args.count != 1};
     progress_line progress{args.progress};
     auto options = requester.options_for(args.noun, args.timeout);
-    options.urgent(args.urgent);
+    options.urgent(args.urgent).hops(args.hops);
     if (args.verb == cles::verb::delegate && progress.is_wanted()) {
         options.on_progress(
             [&progress](double fraction, std::string_view details) { progress.show(fraction, details); });
@@ -118,6 +119,7 @@ void add_request(CLI::App& app, context& shared, cles::verb verb, const std::str
     add_timeout(*command, args->timeout, verb == cles::verb::delegate ? "30s" : "5s");
     add_count(*command, args->count, "Number of requests; 0: until interrupted (default 1)");
     add_duration(*command, "-i,--interval", args->interval, "Time between requests; 0: no pause (default 1s)");
+    add_hops(*command, args->hops);
     add_output_option(*command, args->format);
     if (verb != cles::verb::update) {
         command->add_flag("--urgent", args->urgent, "Have the node send the reply before others that are queued");

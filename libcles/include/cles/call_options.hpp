@@ -31,6 +31,12 @@ class call_options {
         urgent_ = value;
         return *this;
     }
+    /// How many nodes may forward the request: 0 to 16. A node between this one and the target counts as one; if this
+    /// node sends it to its own router, that counts too. Larger values are refused.
+    call_options& hops(std::uint32_t most) {
+        hops_ = most;
+        return *this;
+    }
     /// Receives the peer's error message if the request fails. It is written before the request completes, and must
     /// outlive the request.
     call_options& diagnostics(std::string& text) {
@@ -44,6 +50,7 @@ class call_options {
     std::chrono::milliseconds deadline_{0};
     std::string at_{};
     bool urgent_ = false;
+    std::uint32_t hops_ = 8;
     std::string* diagnostics_ = nullptr;
     std::function<void(double, std::string_view)> on_progress_{};
 };
@@ -75,6 +82,7 @@ class bind_options : public call_options {
     }
     bind_options& deadline(std::chrono::milliseconds limit);
     bind_options& at(std::string_view url);
+    bind_options& hops(std::uint32_t most);
     bind_options& diagnostics(std::string& text);
 
     std::chrono::milliseconds every_{0};

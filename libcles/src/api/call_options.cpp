@@ -27,6 +27,11 @@ bind_options& bind_options::at(std::string_view url) {
     return *this;
 }
 
+bind_options& bind_options::hops(std::uint32_t most) {
+    call_options::hops(most);
+    return *this;
+}
+
 bind_options& bind_options::diagnostics(std::string& text) {
     call_options::diagnostics(text);
     return *this;

@@ -291,6 +291,9 @@ void append_request(std::string& out, const outgoing_request& request) {
     if (request.keep != 0) {
         append_adverb(out, "keep", request.keep);
     }
+    if (request.hops != default_hops) {
+        append_adverb(out, "hops", request.hops);
+    }
     if (!request.adverbs.empty()) {
         out.push_back(' ');
         out.append(request.adverbs);

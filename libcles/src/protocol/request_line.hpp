@@ -23,6 +23,7 @@ inline constexpr std::uint32_t default_delegate_deadline_ms = 30'000;
 inline constexpr std::uint32_t default_keep = 64;
 inline constexpr std::uint64_t max_keep = 65'536;
 inline constexpr std::uint64_t max_hops = 16;
+inline constexpr std::uint32_t default_hops = 8;
 inline constexpr std::uint32_t default_lease_ms = 10'000;
 inline constexpr std::uint32_t max_lease_ms = 60'000;
 inline constexpr std::size_t max_since = 64;
@@ -56,7 +57,7 @@ struct request_line : carried_adverbs {
     std::uint32_t deadline_ms = default_deadline_ms;
     bool wants_reply = true;
     bool wants_progress = false;
-    std::uint8_t hops = 8;
+    std::uint8_t hops = default_hops;
     std::optional<std::uint32_t> lease_ms;
     std::uint32_t every_ms = 0; ///< 0: every update
     std::uint32_t keep = default_keep;
@@ -118,7 +119,8 @@ struct outgoing_request {
     std::optional<std::uint32_t> lease_ms{};
     std::uint32_t every_ms = 0;
     std::uint32_t keep = 0;
-    std::string_view adverbs{}; ///< further ones, in wire format
+    std::uint32_t hops = default_hops; ///< not written if it is the default
+    std::string_view adverbs{};        ///< further ones, in wire format
     std::string_view body{};
 
     /// The node that the noun names.

@@ -28,6 +28,7 @@ struct repeatable_request {
     std::string body;
     std::string at;
     bool urgent = false;
+    std::uint32_t hops = protocol::default_hops;
     outbound::progress_function progress;
     time_point deadline{};
     std::uint64_t ticket = 0;
@@ -73,10 +74,14 @@ void send_signed(local_node& host, request_signer& by, const repeatable_request&
     const auto noun = node + ":" + r.path;
     const auto adverbs = std::string{"sig="}.append(sig);
     host.flush_scheduler().run_user_call([&] {
-        const auto id = host.peer_channels().send(
-            node, r.at,
-            {.verb = r.how, .noun = noun, .carried = {.urgent = r.urgent}, .adverbs = adverbs, .body = r.body},
-            r.deadline, std::move(reply), std::move(progress));
+        const auto id = host.peer_channels().send(node, r.at,
+                                                  {.verb = r.how,
+                                                   .noun = noun,
+                                                   .carried = {.urgent = r.urgent},
+                                                   .hops = r.hops,
+                                                   .adverbs = adverbs,
+                                                   .body = r.body},
+                                                  r.deadline, std::move(reply), std::move(progress));
         if (id != 0) {
             by.note(r.ticket, id);
         }
@@ -338,6 +343,7 @@ detail::pending_ptr request_signer::watch(const outgoing_call& r, detail::pendin
                                                   .body = std::string{protocol::trim(r.body)},
                                                   .at = r.options.at_,
                                                   .urgent = r.options.urgent_,
+                                                  .hops = r.options.hops_,
                                                   .progress = r.options.on_progress_,
                                                   .deadline = r.deadline,
                                                   .ticket = r.ticket},
