@@ -49,15 +49,18 @@ void gossip_contacts::expire_resting(time_point now) {
     std::erase_if(resting_, [now](const resting& r) { return r.until <= now; });
 }
 
-std::vector<std::string> gossip_contacts::take_ended() {
-    std::vector<std::string> urls;
+std::vector<gossip_contact> gossip_contacts::take_ended(bool by_name) {
+    std::vector<contact> found;
     for (const auto& c : all_) {
-        if (c.ended && first_of(all_, [&c](const contact& other) { return other.url == c.url; }) == nullptr) {
-            urls.push_back(c.url);
+        const auto is_at_same_place = [&](const contact& other) {
+            return other.url == c.url && (!by_name || other.node == c.node);
+        };
+        if (c.ended && first_of(all_, is_at_same_place) == nullptr) {
+            found.push_back(c);
         }
     }
     std::erase_if(all_, [](const contact& c) { return c.ended; });
-    return urls;
+    return found;
 }
 
 // -- candidates ----------------------------------------------------------------------------------------------------

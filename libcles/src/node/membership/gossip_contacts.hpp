@@ -63,8 +63,9 @@ class gossip_contacts {
     [[nodiscard]] bool rests(std::string_view node, time_point now) const noexcept;
     void expire_resting(time_point now);
 
-    /// Removes the contacts that have ended; \returns the URLs at which no other contact is asked.
-    std::vector<std::string> take_ended();
+    /// Removes the contacts that have ended; \returns those at whose URLs no other contact is asked. `by_name`: nodes
+    /// at the same URL are told apart.
+    std::vector<contact> take_ended(bool by_name = false);
     void clear() noexcept { all_.clear(); }
 
     [[nodiscard]] auto begin() noexcept { return all_.begin(); }

@@ -2,6 +2,7 @@
 #include "node/membership/route_table.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <tuple>
 #include <utility>
 
@@ -26,25 +27,38 @@ route_table::destination& route_table::entry_of(std::string_view name, std::uint
     return at->second;
 }
 
-void route_table::apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered) {
-    if (destinations_.size() >= max_destinations_ && !destinations_.contains(name)) {
-        return;
+route_table::change route_table::apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour,
+                                       route_advert offered, const usable_function& usable) {
+    auto at = destinations_.find(name);
+    if (at == destinations_.end() && destinations_.size() >= max_destinations_) {
+        return {};
     }
-    auto& d = entry_of(name, epoch);
-    d.newest = std::max(d.newest, offered.seq);
-    const auto known = std::ranges::find(d.offers, neighbour, &offer::by);
+    change found;
+    if (at != destinations_.end()) {
+        found.was_offered = std::ranges::find(at->second.offers, neighbour, &offer::by) != at->second.offers.end();
+        found.before = copy_of(best(at->second, usable, {}));
+    }
+    auto& d = at != destinations_.end() && at->second.epoch == epoch ? at->second : entry_of(name, epoch);
+    d.take(neighbour, offered);
+    found.after = copy_of(best(d, usable, {}));
+    found.requested = d.requested;
+    found.missing = missing_number(d, usable);
+    return found;
+}
+
+void route_table::destination::take(std::string_view neighbour, route_advert offered) {
+    newest = std::max(newest, offered.seq);
+    const auto known = std::ranges::find(offers, neighbour, &offer::by);
     if (!offered.hops || *offered.hops >= max_hops) {
-        if (known != d.offers.end()) {
-            d.offers.erase(known);
+        if (known != offers.end()) {
+            offers.erase(known);
         }
-        return;
-    }
-    if (known != d.offers.end()) {
+    } else if (known != offers.end()) {
         known->seq = offered.seq;
         known->hops = *offered.hops;
-    } else if (d.offers.size() < max_offers) {
-        d.offers.push_back({std::string{neighbour}, offered.seq, *offered.hops});
-    } else if (auto& oldest = *std::ranges::min_element(d.offers, {}, &offer::seq); oldest.seq < offered.seq) {
+    } else if (offers.size() < max_offers) {
+        offers.push_back({std::string{neighbour}, offered.seq, *offered.hops});
+    } else if (auto& oldest = *std::ranges::min_element(offers, {}, &offer::seq); oldest.seq < offered.seq) {
         oldest = {std::string{neighbour}, offered.seq, *offered.hops};
     }
 }
@@ -59,15 +73,20 @@ std::vector<std::string> route_table::destinations_by(std::string_view neighbour
     return found;
 }
 
-bool route_table::is_offered(std::string_view name, std::string_view neighbour) const {
-    const auto at = destinations_.find(name);
-    return at != destinations_.end() &&
-           std::ranges::find(at->second.offers, neighbour, &offer::by) != at->second.offers.end();
+std::vector<std::string> route_table::destinations() const {
+    std::vector<std::string> found;
+    for (const auto& [name, d] : destinations_) {
+        found.push_back(name);
+    }
+    return found;
 }
 
-route_table::route route_table::in_use(std::string_view name, const usable_function& usable) const {
-    const auto* const found = find(name, usable);
-    return found == nullptr ? route{} : *found;
+std::vector<std::string> route_table::neighbours_of(std::string_view name) const {
+    std::vector<std::string> found;
+    if (const auto at = destinations_.find(name); at != destinations_.end()) {
+        std::ranges::transform(at->second.offers, std::back_inserter(found), &offer::by);
+    }
+    return found;
 }
 
 void route_table::forget(std::string_view name) {
@@ -111,11 +130,15 @@ std::optional<unsigned> route_table::hops_to(std::string_view name, const usable
 
 std::uint64_t route_table::missing_number(std::string_view name, const usable_function& usable) const {
     const auto at = destinations_.find(name);
-    if (at == destinations_.end() || at->second.hops > max_hops) {
+    return at == destinations_.end() ? 0 : missing_number(at->second, usable);
+}
+
+std::uint64_t route_table::missing_number(const destination& d, const usable_function& usable) const {
+    if (d.hops > max_hops) {
         return 0;
     }
-    const auto* const chosen = best(at->second, usable, {});
-    return chosen != nullptr && at->second.is_feasible(*chosen) ? 0 : at->second.seq + 1;
+    const auto* const chosen = best(d, usable, {});
+    return chosen != nullptr && d.is_feasible(*chosen) ? 0 : d.seq + 1;
 }
 
 bool route_table::request(std::string_view name, std::uint32_t epoch, std::uint64_t number) {

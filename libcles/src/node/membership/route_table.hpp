@@ -37,11 +37,31 @@ class route_table {
 
     explicit route_table(std::size_t max_destinations) noexcept : max_destinations_(max_destinations) {}
 
+    /// A route, as its neighbour advertises it.
+    struct route {
+        std::string by; ///< empty: there is none
+        std::uint64_t seq = 0;
+        unsigned hops = 0;
+
+        bool operator==(const route&) const = default;
+    };
+    /// What an advertisement has changed.
+    struct change {
+        bool was_offered = false;    ///< by this neighbour
+        route before{};              ///< in use
+        route after{};               ///< the same
+        std::uint64_t requested = 0; ///< the greatest number that was asked for
+        std::uint64_t missing = 0;   ///< see `missing_number`
+    };
     /// Applies what a neighbour advertises. Another epoch is another destination: what was known is forgotten.
-    void apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered);
+    change apply(std::string_view name, std::uint32_t epoch, std::string_view neighbour, route_advert offered,
+                 const usable_function& usable);
     /// The destinations that this neighbour advertises.
     [[nodiscard]] std::vector<std::string> destinations_by(std::string_view neighbour) const;
     void forget(std::string_view name);
+    [[nodiscard]] std::vector<std::string> destinations() const;
+    /// Those that advertise it.
+    [[nodiscard]] std::vector<std::string> neighbours_of(std::string_view name) const;
 
     /// The neighbour to which a request is sent, by the shortest route that does not lead through a node for which
     /// `avoid` is true; empty: there is none.
@@ -50,16 +70,6 @@ class route_table {
     /// What this node advertises to the neighbour `to`. `direct`: it has a link to the destination.
     route_advert advertise(std::string_view name, std::uint32_t epoch, bool direct, const usable_function& usable,
                            std::string_view to);
-    [[nodiscard]] bool is_offered(std::string_view name, std::string_view neighbour) const;
-    /// The route in use, as its neighbour advertises it.
-    struct route {
-        std::string by; ///< empty: there is none
-        std::uint64_t seq = 0;
-        unsigned hops = 0;
-
-        bool operator==(const route&) const = default;
-    };
-    [[nodiscard]] route in_use(std::string_view name, const usable_function& usable) const;
     /// The length of the route in use, in links; nothing: there is none.
     [[nodiscard]] std::optional<unsigned> hops_to(std::string_view name, const usable_function& usable) const;
     /// Without a number of at least that, no route to the destination can be advertised again; 0: there is one, or
@@ -89,7 +99,11 @@ class route_table {
         }
         [[nodiscard]] bool is_current(const offer& o) const noexcept { return newest - o.seq < max_late; }
         void note_advertised(std::uint64_t s, unsigned h) noexcept;
+        void take(std::string_view neighbour, route_advert offered);
     };
+
+    static route copy_of(const offer* o) { return o == nullptr ? route{} : *o; }
+    [[nodiscard]] std::uint64_t missing_number(const destination& d, const usable_function& usable) const;
 
     /// The route in use; null if there is none.
     [[nodiscard]] const offer* best(const destination& d, const usable_function& usable,
