@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 
 namespace {
 
-// How many waiting jobs are looked at for one that another node wants, so that the queue is not locked for long.
+// How many waiting jobs are offered to another node, so that the queue is not locked for long.
 constexpr std::size_t most_offered = 256;
 
 // After so many jobs of one burst further workers are woken at once, and not when the burst has been read.
@@ -135,6 +135,8 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
     pauses_.count_input();
     auto& r = acquire_record();
     r.assign(what, records_.copy_of(what.peer()), std::move(task));
+    const auto call = sharing_ ? answer.node_call() : nullptr;
+    r.movable = call && sharing_->may_move(*call);
     const auto admission = workers_.push(r);
     if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
         r.answered_ = true;
@@ -270,9 +272,12 @@ job_dispatcher::stopped_job job_dispatcher::stop(job_record& r) {
 shareable_queue::state job_dispatcher::read_state() const {
     const auto workers = workers_.read_figures();
     return {.waiting = workers.queued,
-            .idle = draining_ ? 0 : workers.usable - std::min(workers.running, workers.usable),
+            .idle = workers.usable - std::min(workers.running, workers.usable),
             .workers = workers.usable,
-            .service_time = expected_service_time(workers)};
+            .service_time = expected_service_time(workers),
+            .movable = workers.movable,
+            .movable_queued = workers.movable_queued,
+            .draining = draining_};
 }
 
 void job_dispatcher::offer(job_taker& to) {
@@ -280,7 +285,7 @@ void job_dispatcher::offer(job_taker& to) {
         most_offered,
         [&](const job_record& r, std::size_t ahead) {
             const auto call = r.requester_ ? r.requester_->node_call() : nullptr;
-            return call && to.wants(*call, ahead);
+            return call && to.choose(*call, ahead);
         },
         [&] { return to.full(); });
     for (auto* r : taken) {
@@ -313,6 +318,7 @@ void job_dispatcher::end_move(job_record& r, bool refused) {
         workers_.wake();
         return;
     }
+    ++figures_.moved;
     r.answered_ = true;
     forget_requester(r);
     release_record(r);

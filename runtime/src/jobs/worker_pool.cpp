@@ -334,6 +334,8 @@ worker_pool::figures worker_pool::read_figures() const noexcept {
     auto result = counts_;
     result.stuck_now = static_cast<std::uint32_t>(watchdog_.stuck());
     result.queued = static_cast<std::uint32_t>(queue_.size());
+    result.movable = static_cast<std::uint32_t>(queue_.movable());
+    result.movable_queued = queue_.movable_queued();
     result.running = busy_;
     result.usable = static_cast<std::uint32_t>(watchdog_.usable());
     result.service_time = service_time_.value();

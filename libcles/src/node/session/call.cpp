@@ -63,7 +63,9 @@ void call::fail(protocol::failure why) {
         why = after_run(std::move(why));
         if (!terms_.grantee.empty()) { // its sender takes any failure that does not say so for a refusal
             why.ran = why.code != errc::busy || why.ran;
-            node_->counts.jobs_moved_in -= why.ran ? 0 : 1;
+        }
+        if (!why.ran) {
+            terms_.grantee.clear(); // it goes back
         }
     }
     end().refuse(*this, why);
@@ -116,6 +118,7 @@ void call::on_stop(std::function<void()> callback) {
 }
 
 void call::detach() noexcept {
+    node_->counts.jobs_moved_in += owner_ != nullptr && !terms_.grantee.empty() ? 1 : 0;
     owner_ = nullptr;
     node_->deadlines.disarm(*this);
 }

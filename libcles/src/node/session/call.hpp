@@ -32,15 +32,14 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
         /// Those that the request line states.
         explicit terms(const protocol::request_line& r)
             : carried_adverbs(r.carried()), verb(r.verb), id(r.id), wants_reply(r.wants_reply),
-              wants_progress(r.wants_progress),
-              grantee(r.grant != 0 ? protocol::last_in_via(r.via) : std::string_view{}) {}
+              wants_progress(r.wants_progress) {}
 
         cles::verb verb;
         std::uint64_t id;
         bool wants_reply;
         bool wants_progress;
         bool routed = false;      ///< other nodes serve it
-        std::string grantee{};    ///< the node that has forwarded it on a grant of this one; empty: none
+        std::string grantee{};    ///< the node that has forwarded it on a valid grant of this one; empty: none
         std::string publish_path; ///< path of a request to publish; else empty
         std::string publish_body;
     };

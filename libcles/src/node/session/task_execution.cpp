@@ -145,10 +145,12 @@ void task_execution::run(task_sink& to, const std::shared_ptr<memory_account>& m
     if (!why) {
         try {
             to.write_result(*this);
+            node_->counts.jobs_moved_in += granted_ ? 1 : 0;
             return;
         } catch (...) {
             why = after_run(describe(std::current_exception()));
-            why->ran = why->ran || (line_.grant != 0 && why->code != errc::busy);
+            why->ran = why->ran || (granted_ && why->code != errc::busy);
+            node_->counts.jobs_moved_in += granted_ && why->ran ? 1 : 0;
         }
     }
     to.refuse(*this, *why);
@@ -184,8 +186,8 @@ std::optional<protocol::failure> task_execution::grant_refusal() {
     if (node_->sharing == nullptr) {
         return protocol::failure{.code = errc::denied, .message = node_->name + " does not share work"};
     }
-    auto why = node_->sharing->use_grant(line_, *data_.peer, now_);
-    node_->counts.jobs_moved_in += why ? 0 : 1;
+    auto why = node_->sharing->use_grant(line_, handler_->info, *data_.peer, now_);
+    granted_ = !why;
     return why;
 }
 
@@ -211,6 +213,9 @@ void task_execution::write(json_writer& w) {
 
 void task_execution::start(task_sink& to, const std::shared_ptr<memory_account>& memory) {
     call::terms wanted{line_};
+    if (granted_) {
+        wanted.grantee = protocol::last_in_via(line_.via);
+    }
     if (line_.verb == verb::update) {
         wanted.publish_path = publish_path();
         append_compact_json(request_.body(), wanted.publish_body);

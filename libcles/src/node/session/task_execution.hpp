@@ -148,6 +148,7 @@ class task_execution {
     const request request_;
     std::string path_;
     bool started_ = false;
+    bool granted_ = false; // it has used a slot of a grant of this node
 };
 
 } // namespace cles::core
