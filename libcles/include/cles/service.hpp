@@ -54,7 +54,8 @@ namespace cles {
 
 namespace detail {
 class security_part;
-}
+struct tracing_part;
+} // namespace detail
 
 /// The configuration of a service. Only the name is required.
 struct service_options {
@@ -83,6 +84,9 @@ struct service_options {
     /// `cles::routing()` forwards requests of clients to `any:`, `all:` and other nodes (docs/routing.md). If null,
     /// these fail with `no_target`.
     const detail::routing_part* routing = nullptr;
+    /// `cles::tracing()` records how long traced requests take here (<cles/tracing.hpp>). If null, the identity of a
+    /// trace is only passed on.
+    const detail::tracing_part* tracing = nullptr;
     /// Returns the load of this node, which is reported to others and used to balance `any:`. Called often, on the
     /// service's executor, so it must be quick. If empty, the load is the number of unfinished handlers, without a pool
     /// of workers.

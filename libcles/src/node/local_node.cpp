@@ -8,6 +8,7 @@
 #include "node/base/completion_drain.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/session/request_checks.hpp"
+#include "node/tracing/span_recorder.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
@@ -58,6 +59,14 @@ std::string foreign_adverb(std::string_view command) {
     return {};
 }
 
+protocol::carried_adverbs carried_by(const call_options& options) {
+    protocol::carried_adverbs carried{.urgent = options.urgent_};
+    if (!options.trace_.empty()) {
+        carried.trace = protocol::parse_traceparent(options.trace_).value_or(protocol::trace_context{});
+    }
+    return carried;
+}
+
 std::string negative(const char* option, std::chrono::milliseconds value) {
     return std::string{option} + " is " + std::to_string(value.count()) + " ms: must be 0 or more";
 }
@@ -90,6 +99,10 @@ node_options complete(node_options setup, const std::shared_ptr<environment>& by
 } // namespace
 
 std::string invalid_option_reason(const call_options& options) {
+    if (!options.trace_.empty() && !protocol::parse_traceparent(options.trace_)) {
+        return "call_options::trace is " + protocol::quoted(options.trace_) +
+               ": must be 00-<32 hex digits>-<16 hex digits>-<2 hex digits>, the first two not all 0";
+    }
     return options.deadline_.count() < 0 ? negative("call_options::deadline", options.deadline_)
                                          : invalid_hops_reason("call_options::hops", options.hops_);
 }
@@ -280,20 +293,24 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
     const auto id = draw_id();
     const auto started = now();
     const auto deadline = saturating_add(started, time_limit(options.deadline_, how));
+    protocol::outgoing_request request{
+        .verb = how, .noun = text, .id = id, .carried = carried_by(options), .hops = options.hops_, .body = body};
     if (node_->secured) {
-        operation = node_->secured->watch(
-            {.how = how, .noun = noun, .body = body, .options = options, .deadline = deadline, .ticket = id},
-            std::move(operation));
+        operation = node_->secured->watch({.how = how,
+                                           .noun = noun,
+                                           .body = body,
+                                           .options = options,
+                                           .carried = request.carried,
+                                           .deadline = deadline,
+                                           .ticket = id},
+                                          std::move(operation));
     }
-    flush_scheduler_.run_user_call([&] {
-        r->send({.verb = how,
-                 .noun = text,
-                 .id = id,
-                 .carried = {.urgent = options.urgent_},
-                 .hops = options.hops_,
-                 .body = body},
-                deadline, started, std::move(operation), options.on_progress_);
-    });
+    if (request.carried.trace.sampled && node_->spans) {
+        const auto next = options.at_.empty() ? peer_channels_.neighbour_towards(noun.target) : std::string{};
+        operation = node_->spans->send(request, next, std::move(operation), started);
+    }
+    flush_scheduler_.run_user_call(
+        [&] { r->send(request, deadline, started, std::move(operation), options.on_progress_); });
     return id;
 }
 

@@ -23,12 +23,17 @@
 #include <string_view>
 #include <vector>
 
+namespace cles::detail {
+struct tracing_part;
+} // namespace cles::detail
+
 namespace cles::core {
 
 class gossip;
 class node_security;
 class request_sharing;
 class security_protocol;
+class span_recorder;
 
 struct node_state;
 
@@ -43,6 +48,7 @@ struct node_options {
     std::shared_ptr<node_security> security{}; ///< null: the node is not secured
     /// Creates what a secured node says; null only without `security`.
     std::unique_ptr<security_protocol> (*secured)(node_state& host) = nullptr;
+    const detail::tracing_part* tracing = nullptr; ///< null: nothing is recorded of traced requests
     log_sink log{};
     std::function<void(json_writer&)> metrics{}; ///< metrics of the program
     std::function<node_load()> load{};           ///< load of the program; empty: its running handlers
@@ -90,6 +96,7 @@ struct node_state {
     dedup_memory remembered;
     reflection_limit reflection;
     const std::unique_ptr<security_protocol> secured; ///< null: the node is not secured
+    const std::shared_ptr<span_recorder> spans;       ///< null: nothing is recorded of traced requests
     std::uint64_t next_id = 1;                        ///< of the requests that this node sends
     router* active_router = nullptr;                  ///< serves requests for `any`, `all` and other nodes; null: none
 

@@ -5,6 +5,7 @@
 #include <cles/verb.hpp>
 
 #include "protocol/grammar.hpp"
+#include "protocol/traceparent.hpp"
 
 #include <cstddef>
 #include <cstdint>
@@ -44,6 +45,7 @@ constexpr std::uint32_t default_deadline(verb v) noexcept {
 /// is parsed to the call that replies later, and through nodes that forward it. Code in between copies them as a whole.
 struct carried_adverbs {
     bool urgent = false;
+    trace_context trace{};
 
     /// These, of whatever has them.
     [[nodiscard]] const carried_adverbs& carried() const noexcept { return *this; }
@@ -160,6 +162,7 @@ class owned_request {
     explicit owned_request(const protocol::request_line& r) : line_(r.text) {
         protocol::malformed_request ignored;
         protocol::parse_request(line_, parsed_, ignored); // was valid on arrival
+        parsed_.trace = r.trace;                          // of this node's span
     }
     owned_request(const owned_request&) = delete;
     owned_request& operator=(const owned_request&) = delete;

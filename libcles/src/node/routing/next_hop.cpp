@@ -223,7 +223,7 @@ std::string forwarded_adverbs(const protocol::request_line& r, std::string_view 
     if (!r.sig.empty()) {
         out.append(" sig=").append(r.sig);
     }
-    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0) - (r.sig.empty() ? 0 : 1));
+    append_foreign(out, r, max_foreign - (states_requester ? 1 : 0) - (r.sig.empty() ? 0 : 1) - (r.trace ? 1 : 0));
     return out;
 }
 

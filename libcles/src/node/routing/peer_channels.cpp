@@ -4,6 +4,7 @@
 #include "node/local_node.hpp"
 #include "node/membership/gossip.hpp"
 #include "node/publish/feed_machine.hpp"
+#include "node/tracing/span_recorder.hpp"
 #include "protocol/grammar.hpp"
 
 #include <boost/system/errc.hpp>
@@ -304,6 +305,10 @@ peer_channel* peer_channels::to(std::string_view target, std::string_view at, bo
 std::uint64_t peer_channels::send(std::string_view target, std::string_view at, protocol::outgoing_request r,
                                   time_point deadline, detail::pending_ptr operation,
                                   outbound::progress_function progress, const forwarding& by) {
+    if (r.carried.trace.sampled && host_.node().spans) {
+        const auto next = at.empty() ? neighbour_towards(target, by) : std::string{};
+        operation = host_.node().spans->send(r, next, std::move(operation), host_.now());
+    }
     boost::system::error_code code;
     std::string why;
     auto* channel = to(target, at, r.carried.urgent, code, why, by);
@@ -315,6 +320,15 @@ std::uint64_t peer_channels::send(std::string_view target, std::string_view at, 
     channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress),
                   at.empty() && by.empty() && !r.carried.urgent);
     return r.id;
+}
+
+std::string peer_channels::neighbour_towards(std::string_view target, const forwarding& by) const {
+    try {
+        auto next = place_of(target, by).node;
+        return next == target ? std::string{} : next;
+    } catch (const error&) { // it is not known
+        return {};
+    }
 }
 
 void peer_channels::send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r,

@@ -137,7 +137,9 @@ class peer_channels {
     /// there, the operation fails later. Returns the id, or 0.
     std::uint64_t send(std::string_view target, std::string_view at, protocol::outgoing_request r, time_point deadline,
                        detail::pending_ptr operation, outbound::progress_function progress, const forwarding& by = {});
-    /// The same at an address where only the node of that name is to answer.
+    /// The node to which a request for the target is sent on its way there; empty if that is the target, or not known.
+    [[nodiscard]] std::string neighbour_towards(std::string_view target, const forwarding& by = {}) const;
+    /// As `send`, to an address where only the node of that name is to answer.
     void send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r, time_point deadline,
                       detail::pending_ptr operation);
     /// The address of the node has become known, unknown, or another.

@@ -11,6 +11,7 @@
 #include "protocol/reply_line.hpp"
 #include "protocol/request_line.hpp"
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -66,6 +67,8 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     void on_stop(std::function<void()> callback);
     /// Removes and returns the `on_stop` callback.
     std::function<void()> forget_on_stop() noexcept { return std::exchange(on_stop_, nullptr); }
+    /// For `responder::record_times`.
+    void record_times(std::chrono::nanoseconds queued, std::chrono::nanoseconds ran);
     /// Logs a handler's message with the request's id and, until the call ends, the peer's address.
     [[gnu::cold]] void write_log(log_level level, std::string_view text) const;
     /// Reserves this much more memory until the handler releases the call. False if there is none.
@@ -111,6 +114,7 @@ class call final : public deadline, public std::enable_shared_from_this<call> {
     std::function<void()> on_stop_;
     std::unique_ptr<const movable_request> movable_;
     bool stopped_ = false;
+    bool times_recorded_ = false;
 };
 
 /// Whether the handler may have run: `busy` without `ran` promises that it has not.

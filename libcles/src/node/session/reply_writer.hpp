@@ -45,21 +45,23 @@ struct reply_target {
     bool wanted = true;
     bool urgent = false;
     bool housekeeping = false;
-    bool reserved = false; ///< for the task `cles`, which is answered even without free memory
-    bool apart = false;    ///< not the reply to the request in flight with that id
+    bool reserved = false;  ///< for the task `cles`, which is answered even without free memory
+    bool apart = false;     ///< not the reply to the request in flight with that id
+    std::uint64_t span = 0; ///< of a traced request, which ends with the reply
 
-    explicit reply_target(const call::terms& r) noexcept : reply_target(r.id, r.wants_reply, r.urgent) {}
-    explicit reply_target(const protocol::request_line& r) noexcept : reply_target(r.id, r.wants_reply, r.urgent) {
+    explicit reply_target(const call::terms& r) noexcept : reply_target(r.id, r.wants_reply, r.carried()) {}
+    explicit reply_target(const protocol::request_line& r) noexcept : reply_target(r.id, r.wants_reply, r.carried()) {
         housekeeping = is_housekeeping(r);
         reserved = r.noun.task == "cles";
     }
-    explicit reply_target(const protocol::malformed_request& r) noexcept : reply_target(r.id, r.wants_reply, false) {
+    explicit reply_target(const protocol::malformed_request& r) noexcept : reply_target(r.id, r.wants_reply, {}) {
         apart = true;
     }
 
   private:
-    reply_target(std::uint64_t of, bool reply_wanted, bool is_urgent) noexcept
-        : id(of), wanted(reply_wanted), urgent(is_urgent && of != 0) {} // without an id, order matters
+    reply_target(std::uint64_t of, bool reply_wanted, const protocol::carried_adverbs& r) noexcept
+        : id(of), wanted(reply_wanted), urgent(r.urgent && of != 0), // without an id, order matters
+          span(r.trace.sampled ? r.trace.span : 0) {}
 };
 
 /// Writes the replies of one link: a handler's result, or the failure that replaces it.
@@ -105,7 +107,7 @@ class reply_writer {
         return where.urgent ? out_.urgent_output() : out_.output();
     }
     void send(reply_target where, std::string& text, std::size_t body);
-    void note(reply_target where, std::string_view reply);
+    void note(reply_target where, std::string_view reply, std::string_view outcome);
 
     node_state& node_;
     line_sink& out_;
