@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "daemon/daemon.hpp"
 
+#include <cles/tracing.hpp>
+
 #include "config/config.hpp"
 #include "config/config_file.hpp"
 #include "config/config_values.hpp"
 #include "daemon/daemon_security.hpp"
+#include "jobs/current_trace.hpp"
 #include "jobs/pooled_registrar.hpp"
 #include "plugins/plugin_library.hpp"
 #include "plugins/plugin_start_guard.hpp"
@@ -38,6 +41,7 @@ service_options options_of(const config& setup, const daemon_log& log) {
     options.limits = setup.limits;
     options.log = log.sink();
     options.routing = cles::routing();
+    options.tracing = cles::tracing();
     options.gossip = cles::gossip(setup.seeds, setup.links); // without any, this node may be the seed of others
     return options;
 }
@@ -59,7 +63,8 @@ plugin_host_options host_options_of(const config& setup, const daemon_log& log) 
     options.folders = options.rules.folders;
     options.trial = 0ms; // they were tried before threads were started
     options.log = [&log](log_level level, std::string_view plugin, std::string_view text) {
-        log.write(level, std::string{plugin} + ": " + std::string{text});
+        const auto line = std::string{plugin} + ": " + std::string{text};
+        log.write(level, {line, {}, 0, current_trace::id()});
     };
     return options;
 }

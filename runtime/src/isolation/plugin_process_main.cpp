@@ -178,7 +178,14 @@ class plugin_runner {
         options.rules = {.secured = wanted_.secured, .folders = {wanted_.folders.begin(), wanted_.folders.end()}};
         options.folders = options.rules.folders;
         options.trial = std::chrono::milliseconds{0}; // this process is the trial
-        options.log = [this](log_level level, std::string_view, std::string_view text) {
+        options.log = [this](log_level level, std::string_view plugin, std::string_view text) {
+            if (const auto job = process_jobs::traced_here(); job != 0) { // the daemon adds its trace
+                std::string line;
+                wire_line_writer{line, verb::push, control_task}.parameter("log").parameter(job).body(
+                    log_message{static_cast<std::uint32_t>(level), std::string{plugin} + ": " + std::string{text}});
+                daemon_.say(line);
+                return;
+            }
             tell("log", log_message{static_cast<std::uint32_t>(level), std::string{text}});
         };
         return options;

@@ -76,6 +76,9 @@ void append_request(std::string& to, std::uint64_t id, const request& what) {
     if (peer.local) {
         line.adverb("local", std::int64_t{1});
     }
+    if (!what.trace().empty()) {
+        line.adverb("trace", what.trace());
+    }
     line.body(what.body());
 }
 

@@ -62,7 +62,7 @@ std::uint64_t control_connection::said_here() noexcept { return lines_said; }
 // from inside the handler goes over the handler's lane.
 class process_jobs::call final : public detail::call_control {
   public:
-    call(process_jobs& jobs, std::uint64_t id) noexcept : jobs_(jobs), id_(id) {}
+    call(process_jobs& jobs, std::uint64_t id, bool traced) noexcept : jobs_(jobs), id_(id), traced_(traced) {}
     call(const call&) = delete;
     call& operator=(const call&) = delete;
     ~call() override {
@@ -138,9 +138,15 @@ class process_jobs::call final : public detail::call_control {
         current = this;
         said_before_ = control_connection::said_here();
     }
-    /// The handler has returned. Returns its reply, if it goes over the lane.
-    std::optional<std::string> end() noexcept {
+    /// The handler has returned. Returns its reply, if it goes over the lane: not if what it has logged after that has
+    /// to be read before the job ends.
+    std::optional<std::string> end() {
         current = nullptr;
+        if (traced_ && direct_ && said_before_ != control_connection::said_here()) {
+            std::string line;
+            wire_line_writer{line, id_}.body(*std::exchange(direct_, std::nullopt));
+            jobs_.daemon_.say(line);
+        }
         return std::move(direct_);
     }
     /// The requester waits no more. Returns the callback, to be called on a thread where it may take long.
@@ -150,6 +156,10 @@ class process_jobs::call final : public detail::call_control {
         return std::exchange(on_stop_, nullptr);
     }
     void set_unwanted() noexcept { unwanted_ = true; }
+
+    [[nodiscard]] static std::uint64_t traced_here() noexcept {
+        return current != nullptr && current->traced_ ? current->id_ : 0;
+    }
 
   private:
     static thread_local const call* current;
@@ -169,6 +179,7 @@ class process_jobs::call final : public detail::call_control {
 
     process_jobs& jobs_;
     const std::uint64_t id_;
+    const bool traced_;
     std::atomic<bool> answered_{false};
     std::atomic<bool> stopped_{false};
     std::atomic<bool> unwanted_{false};
@@ -180,6 +191,8 @@ class process_jobs::call final : public detail::call_control {
 
 thread_local const process_jobs::call* process_jobs::call::current = nullptr;
 
+std::uint64_t process_jobs::traced_here() noexcept { return call::traced_here(); }
+
 // -- on lanes ------------------------------------------------------------------------------------------------------
 
 void process_jobs::add(registration task) {
@@ -189,7 +202,8 @@ void process_jobs::add(registration task) {
 }
 
 std::string process_jobs::serve(const wire_line& line, std::string_view node) {
-    const auto handled = std::make_shared<call>(*this, line.id);
+    const auto trace = line.adverb("trace");
+    const auto handled = std::make_shared<call>(*this, line.id, !trace.empty());
     {
         const std::scoped_lock lock{mutex_};
         calls_.emplace(line.id, handled.get());
@@ -208,6 +222,7 @@ std::string process_jobs::serve(const wire_line& line, std::string_view node) {
         .body = line.body,
         .peer = &peer,
         .deadline = due ? time_point{time_point::duration{*due}} : time_point{},
+        .trace = trace,
     };
     handled->begin();
     try {

@@ -55,6 +55,8 @@ class process_jobs {
     /// Runs the handler of a request from a lane. Returns the line that ends it there: its reply, or that it replies
     /// later.
     std::string serve(const wire_line& line, std::string_view node);
+    /// The job whose handler runs on this thread, if it is traced; else 0.
+    [[nodiscard]] static std::uint64_t traced_here() noexcept;
     /// Runs a callback of a job: a request that it has sent is answered, or reports progress.
     void resume(const wire_line& line);
 

@@ -3,6 +3,7 @@
 
 #include <cles/limits.hpp>
 
+#include "jobs/current_trace.hpp"
 #include "jobs/service_time.hpp"
 
 #include <boost/asio/execution/outstanding_work.hpp>
@@ -137,6 +138,10 @@ void job_dispatcher::submit(const request& what, responder answer, std::shared_p
     r.assign(what, records_.copy_of(what.peer()), std::move(task));
     const auto call = sharing_ ? answer.node_call() : nullptr;
     r.movable = call && sharing_->may_move(*call);
+    r.note_phase(job_times::phase::queued);
+    if (!what.trace().empty()) {
+        answer.record_times({}, {}); // they follow
+    }
     const auto admission = workers_.push(r);
     if (admission == worker_pool::admission::full || admission == worker_pool::admission::no_workers) {
         r.answered_ = true;
@@ -241,6 +246,7 @@ void job_dispatcher::release_record(job_record& r) {
 
 job_dispatcher::stopped_job job_dispatcher::stop(job_record& r) {
     pauses_.count_input();
+    r.report_times();
     awaited_ -= r.requester_ && !r.stopped() ? 1 : 0;
     auto callback = r.stop();
     const bool moved = r.moved_ != 0;
@@ -289,6 +295,8 @@ void job_dispatcher::offer(job_taker& to) {
         },
         [&] { return to.full(); });
     for (auto* r : taken) {
+        r->report_times();
+        r->note_phase(job_times::phase::elsewhere);
         ++moved_;
         r->moved_ = to.take(r->requester_->node_call(), r->request().body(),
                             [this, r](bool refused) { end_move(*r, refused); });
@@ -389,7 +397,8 @@ void job_dispatcher::log(job_ptr job, log_level level, std::string text) {
         if (r.requester_) {
             r.requester_->log(level, text); // adds the request's id
         } else {
-            write_log(level, {text, r.request().peer().address});
+            const auto& what = r.request();
+            write_log(level, {text, what.peer().address, 0, current_trace::id_in(what.trace())});
         }
     });
     if (!put) {
@@ -455,7 +464,7 @@ void job_dispatcher::report_stuck() {
                   {"worker " + std::to_string(worker.slot + 1) + " is stuck in " + std::string{to_string(what.verb())} +
                        " '" + std::string{what.task()} + "' for " + seconds(worker.busy_for) +
                        (worker.replaced ? ": replaced by another" : ": no replacement is left"),
-                   what.peer().address});
+                   what.peer().address, 0, current_trace::id_in(what.trace())});
     }
 }
 

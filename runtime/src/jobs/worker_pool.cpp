@@ -46,6 +46,7 @@ job_record* worker_pool::pop() noexcept { return static_cast<job_record*>(queue_
 // With the lock. The job is the first of its requester.
 void worker_pool::resume(job_record& job) {
     job.state = job_record::run_state::queued;
+    job.note_phase(job_times::phase::queued);
     queue_.push_resumed(job);
 }
 
@@ -101,6 +102,7 @@ bool worker_pool::put_back(job_record& job) {
     }
     queue_.put_back(job);
     job.state = job_record::run_state::queued;
+    job.note_phase(job_times::phase::queued);
     return true;
 }
 

@@ -493,6 +493,12 @@ class Same(unittest.TestCase):
             with self.subTest(line):
                 self.both(lambda link, d: link.ask(line))
 
+    def test_its_traces(self):
+        trace = "00-4bf92f3577b34da6a3ce929d0e0e4736-00f067aa0ba902b7-00"
+        for noun in ("caller", "passes_on/DELEGATE%20self%3Acaller"):
+            said = json.loads(self.both(lambda link, d, noun=noun: link.ask(f"DELEGATE self:{noun} trace={trace}")))
+            self.assertEqual(said["trace"], trace)
+
     def test_its_description(self):
         self.both(lambda link, d: json.loads(link.ask("PULL self:cles"))["tasks"])
 

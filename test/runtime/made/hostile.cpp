@@ -41,8 +41,9 @@ struct caller {
     std::vector<std::string> parameters;
     std::string body;
     bool has_deadline = false;
+    std::string trace;
 };
-BOOST_DESCRIBE_STRUCT(caller, (), (node, transport, name, has_address, local, parameters, body, has_deadline))
+BOOST_DESCRIBE_STRUCT(caller, (), (node, transport, name, has_address, local, parameters, body, has_deadline, trace))
 
 struct point {
     double x = 0, y = 0;
@@ -58,7 +59,8 @@ caller describe(const cles::request& asked) {
             .local = asked.peer().local,
             .parameters = {asked.parameters().begin(), asked.parameters().end()},
             .body = std::string{asked.body()},
-            .has_deadline = left > 0s && left < 60s};
+            .has_deadline = left > 0s && left < 60s,
+            .trace = std::string{asked.trace()}};
 }
 
 void crash() {
