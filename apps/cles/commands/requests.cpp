@@ -4,6 +4,7 @@
 #include <cles/verb.hpp>
 
 #include "client/client.hpp"
+#include "client/routed_request.hpp"
 #include "commands.hpp"
 #include "discovery/find_nodes.hpp"
 #include "options/arguments.hpp"
@@ -16,7 +17,6 @@
 
 #include <chrono>
 #include <cstdint>
-#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,35 +43,6 @@ struct request_arguments {
     std::uint32_t hops = 8;
 };
 
-// The node does not route or cannot be reached: another one may.
-bool is_refused_by_router(const cles::error& e) {
-    return e.code() == cles::errc::no_target || e.code().category() != cles::error_category();
-}
-
-// Sends the request to the first node that routes, if one has to be found: the others refuse it before they begin.
-asio::awaitable<cles::json_text> send_request(client& requester, const std::string& command,
-                                              cles::call_options& options, std::vector<std::string>& routers) {
-    std::exception_ptr first_failure; // of the most likely router
-    const auto candidates = std::exchange(routers, {});
-    for (const auto& url : candidates) {
-        options.at(url); // and of all further requests, if it answers
-        try {
-            cles::json_text answer = co_await requester.node().async_request(command, options);
-            co_return answer;
-        } catch (const cles::error& e) {
-            if (!is_refused_by_router(e)) {
-                throw;
-            }
-            first_failure = first_failure ? first_failure : std::current_exception();
-        }
-    }
-    if (first_failure) {
-        std::rethrow_exception(first_failure);
-    }
-    cles::json_text answer = co_await requester.node().async_request(command, options);
-    co_return answer;
-}
-
 asio::awaitable<void> send_all(client& requester, const request_arguments& args, std::string command) {
     printer out{args.format, args.count != 1};
     progress_line progress{args.progress};
@@ -92,7 +63,7 @@ asio::awaitable<void> send_all(client& requester, const request_arguments& args,
             next += args.interval;
             co_await requester.sleep_until(next);
         }
-        const cles::json_text answer = co_await send_request(requester, command, options, routers);
+        const cles::json_text answer = co_await send_routed(requester, command, options, routers);
         progress.clear();
         out.print(answer.text);
     }
