@@ -609,6 +609,14 @@ void membership::touch(std::string_view node) {
     }
 }
 
+void membership::touch(std::uint32_t epoch) {
+    auto* const found = by_epoch_.find(epoch);
+    if (found != nullptr && found->second.owner.epoch == epoch) {
+        found->second.owner.revision = ++revision_;
+        freshen(*found);
+    }
+}
+
 const std::vector<std::string>* membership::endpoints_of(std::string_view node) const noexcept {
     const auto at = peers_.find(node);
     return at == peers_.end() ? nullptr : &at->second.owner.endpoints;

@@ -137,6 +137,8 @@ class membership final : private deadline {
     void prefer_address(std::string_view node, std::string_view epoch, std::string_view url, bool announced = false);
     /// Reports the node again to those that ask for changes.
     void touch(std::string_view node);
+    /// The same for the owner of a name, by its epoch.
+    void touch(std::uint32_t epoch);
     /// All such URLs, the preferred one first; null if it is unknown.
     [[nodiscard]] const std::vector<std::string>* endpoints_of(std::string_view node) const noexcept;
     /// The number of other nodes.

@@ -231,7 +231,7 @@ void reachability::apply(const std::string& name, std::uint32_t epoch, std::stri
     const auto& [was_offered, before, after, requested, missing] = found;
     auto number = requested;
     if (before != after) {
-        others_.touch(name);
+        others_.touch(epoch);
         if (missing != 0 && !is_usable(name)) {
             request(name, missing, everywhere);
             number = std::max(number, missing);

@@ -146,8 +146,9 @@ BOOST_AUTO_TEST_CASE(a_route_has_at_most_sixteen_links) {
 
 BOOST_AUTO_TEST_CASE(the_table_is_bounded) {
     cles::core::route_table small{2};
+    std::uint32_t run = 0;
     for (const auto* name : {"x", "y", "z"}) {
-        small.apply(name, 1, "a", {1, 1}, all);
+        small.apply(name, ++run, "a", {1, 1}, all);
     }
     BOOST_TEST(small.size() == 2U);
     for (int i = 0; i < 40; ++i) {
@@ -155,6 +156,15 @@ BOOST_AUTO_TEST_CASE(the_table_is_bounded) {
     }
     BOOST_TEST(!offers(small, "x", "n39"));
     BOOST_TEST(offers(small, "x", "n14"));
+}
+
+BOOST_AUTO_TEST_CASE(of_two_nodes_with_one_epoch_the_last_counts) {
+    offer("a", 7, 1);
+    table.apply("near", epoch, "b", {1, 0}, all);
+    BOOST_TEST(table.size() == 1U);
+    BOOST_TEST(hop().empty());
+    BOOST_TEST(offers(table, "near", "b"));
+    BOOST_TEST((advert() == route_advert{}));
 }
 
 BOOST_AUTO_TEST_CASE(a_newer_offer_replaces_the_oldest_where_there_are_sixteen) {
