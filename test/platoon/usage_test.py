@@ -60,7 +60,9 @@ class Usage(unittest.TestCase):
     def test_wrong_usage(self):
         for arguments in ([], ["fly"], ["run", "--vanish", "x"], ["run", "--vanish", "99@1"], ["run", "--join", "0@1"],
                           ["run", "--hz", "5"], ["run", "--loss", "101"], ["simulate", "--vehicles", "1"],
-                          ["simulate", "--vanish", "3@"], ["vehicle"],
+                          ["simulate", "--vanish", "3@"], ["simulate", "--mute", "1@2+x"],
+                          ["simulate", "--loss", "60", "--burst", "1.2"], ["simulate", "--no-radar", "--split", "1@2"],
+                          ["simulate", "--lags", "0.5", "0.2"], ["vehicle"],
                           ["vehicle", "--name", "v1", "--lead", "--ahead", "v0"]):
             code, out, err = run(*arguments)
             self.assertEqual((code, out), (2, ""), arguments)
