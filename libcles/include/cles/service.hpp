@@ -321,6 +321,8 @@ class service : public registrar {
     /// Tasks with many short-lived nouns ("session/17") need not call this: beyond `limits::nouns`, or the memory for
     /// values, nouns without subscribers are retired automatically, least recently used first.
     bool retire(std::string_view noun);
+    /// The same for all nouns of a task. Returns how many values there were.
+    std::size_t retire_all(std::string_view task);
 
     /// Publishes when every subscriber's queue has space, so that nothing is dropped: `void(error_code)`. It completes
     /// when the update is in all queues, in the order of the calls. If it is cancelled earlier, the update is not
