@@ -34,4 +34,11 @@ class owned_descriptor {
     int fd_ = -1;
 };
 
+struct pipe_ends {
+    owned_descriptor from; ///< does not block
+    owned_descriptor into; ///< blocks, so that no output is lost
+};
+/// A pipe whose ends are closed by `exec`. \throws std::system_error
+pipe_ends make_pipe();
+
 } // namespace cles::runtime

@@ -25,7 +25,7 @@ namespace {
 constexpr std::size_t max_cancelled_early = 256;
 constexpr std::size_t max_log_text = 4096;
 
-thread_local std::uint64_t lines_said = 0;
+thread_local std::uint64_t lines_sent = 0;
 
 identity peer_of(const wire_line& line) {
     identity peer{.transport = std::string{line.adverb("transport")},
@@ -42,7 +42,7 @@ identity peer_of(const wire_line& line) {
 } // namespace
 
 void control_connection::say(std::string_view lines) {
-    ++lines_said;
+    ++lines_sent;
     const std::scoped_lock lock{mutex_};
     while (!lines.empty()) {
         const auto sent = ::send(socket_, lines.data(), lines.size(), MSG_NOSIGNAL);
@@ -54,7 +54,7 @@ void control_connection::say(std::string_view lines) {
     }
 }
 
-std::uint64_t control_connection::said_here() noexcept { return lines_said; }
+std::uint64_t control_connection::lines_sent_by_this_thread() noexcept { return lines_sent; }
 
 // -- a job ---------------------------------------------------------------------------------------------------------
 
@@ -90,7 +90,7 @@ class process_jobs::call final : public detail::call_control {
         }
     }
     bool progress(double fraction, std::string_view json) override {
-        if (stopped_ || answered_ || unwanted_) {
+        if (stopped_ || answered_ || progress_unwanted_) {
             return false;
         }
         std::string number;
@@ -136,7 +136,7 @@ class process_jobs::call final : public detail::call_control {
     /// The handler begins on this thread.
     void begin() noexcept {
         current = this;
-        said_before_ = control_connection::said_here();
+        sent_before_ = control_connection::lines_sent_by_this_thread();
     }
     /// The handler has returned. Returns its reply, if it goes over the lane: not if what it has logged after that has
     /// to be read before the job ends.
@@ -155,7 +155,7 @@ class process_jobs::call final : public detail::call_control {
         stopped_ = true;
         return std::exchange(on_stop_, nullptr);
     }
-    void set_unwanted() noexcept { unwanted_ = true; }
+    void set_progress_unwanted() noexcept { progress_unwanted_ = true; }
 
     [[nodiscard]] static std::uint64_t traced_here() noexcept {
         return current != nullptr && current->traced_ ? current->id_ : 0;
@@ -165,7 +165,7 @@ class process_jobs::call final : public detail::call_control {
     static thread_local const call* current;
 
     void answer(std::string body) {
-        if (current == this && said_before_ == control_connection::said_here()) {
+        if (current == this && sent_before_ == control_connection::lines_sent_by_this_thread()) {
             direct_ = std::move(body);
         } else {
             std::string line;
@@ -182,8 +182,8 @@ class process_jobs::call final : public detail::call_control {
     const bool traced_;
     std::atomic<bool> answered_{false};
     std::atomic<bool> stopped_{false};
-    std::atomic<bool> unwanted_{false};
-    std::uint64_t said_before_ = 0;
+    std::atomic<bool> progress_unwanted_{false};
+    std::uint64_t sent_before_ = 0;
     std::optional<std::string> direct_{};
     std::mutex mutex_;
     std::function<void()> on_stop_{};
@@ -296,14 +296,14 @@ void process_jobs::cancel(std::uint64_t id) {
     }
 }
 
-void process_jobs::unwanted(std::uint64_t id) {
+void process_jobs::progress_unwanted(std::uint64_t id) {
     const std::scoped_lock lock{mutex_};
     if (const auto found = calls_.find(id); found != calls_.end()) {
-        found->second->set_unwanted();
+        found->second->set_progress_unwanted();
     }
 }
 
-void process_jobs::resume_elsewhere(const wire_line& line) {
+void process_jobs::resume_on_notifier(const wire_line& line) {
     // The copy's views are of its own text.
     const auto kept = std::make_shared<wire_line>(line);
     const auto text = std::make_shared<std::string>(line.body);

@@ -33,8 +33,8 @@ class control_connection {
 
     /// Waits until the daemon has read enough to take it.
     void say(std::string_view lines);
-    /// How many lines this thread has said, to keep what follows in order.
-    [[nodiscard]] static std::uint64_t said_here() noexcept;
+    /// To keep what follows in order.
+    [[nodiscard]] static std::uint64_t lines_sent_by_this_thread() noexcept;
 
   private:
     int socket_;
@@ -62,9 +62,9 @@ class process_jobs {
 
     // From the control connection:
     void cancel(std::uint64_t id);
-    void unwanted(std::uint64_t id);
+    void progress_unwanted(std::uint64_t id);
     /// The same as `resume`, on another thread.
-    void resume_elsewhere(const wire_line& line);
+    void resume_on_notifier(const wire_line& line);
 
   private:
     class call;
