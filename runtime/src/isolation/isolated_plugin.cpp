@@ -134,7 +134,7 @@ session_events isolated_plugin::events_of(std::uint64_t run) {
     events.publish =
         guarded([](isolated_plugin& self, std::string_view noun, std::string_view json) { self.publish(noun, json); });
     events.ended = guarded(
-        [run](isolated_plugin& self, const process_end& how, bool overdue) { self.on_ended(run, how, overdue); });
+        [run](isolated_plugin& self, const process_end& how) { self.on_ended(run, how); });
     return events;
 }
 
@@ -174,7 +174,7 @@ void isolated_plugin::fail_to_start(const std::string& why) {
     starting_->kill(why);
 }
 
-void isolated_plugin::on_ended(std::uint64_t run, const process_end& how, bool overdue) {
+void isolated_plugin::on_ended(std::uint64_t run, const process_end& how) {
     start_timer_.reset();
     auto why = describe(how);
     if (first_start_) { // `start` reports it
@@ -195,11 +195,7 @@ void isolated_plugin::on_ended(std::uint64_t run, const process_end& how, bool o
         return;
     }
     ++ended_;
-    if (overdue) {
-        restart_after(policy_.delay(clock::now()), why);
-    } else {
-        restart_or_withdraw(why);
-    }
+    restart_or_withdraw(why);
 }
 
 std::string isolated_plugin::describe(const process_end& how) const {

@@ -471,7 +471,6 @@ void plugin_session::kill_if_overdue() {
     const auto patience = patience_of(options_.grace);
     const auto check = [&](const job& of) {
         if (now - of.due.load() > patience) {
-            overdue_ = true;
             kill(of.label + " did not end within " + grace_text(options_.grace) + " of its deadline or cancellation");
         }
     };
@@ -717,7 +716,7 @@ void plugin_session::finish() {
     end_stream_.reset();
     read_pause_.reset();
     watch_.reset();
-    events_.ended(how, overdue_);
+    events_.ended(how);
 }
 
 bool plugin_session::close(std::chrono::steady_clock::time_point until) {

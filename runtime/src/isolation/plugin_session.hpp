@@ -52,8 +52,7 @@ struct session_events {
     std::function<void(std::string_view text)> output;                          ///< a line of its stdout or stderr
     std::function<void(std::string_view noun, std::string_view json)> publish;
     /// The last one: it has ended, and all its jobs have been answered.
-    /// \param overdue it was killed because a job did not end
-    std::function<void(const process_end& how, bool overdue)> ended;
+    std::function<void(const process_end& how)> ended;
 };
 
 /// One run of the process of an isolated plugin, from its start to its end: the daemon's side of the jobs in it.
@@ -161,7 +160,6 @@ class plugin_session : public std::enable_shared_from_this<plugin_session> {
     line_buffer output_text_;
     time_point control_closed_ = time_point::max(); // when the process closed the connection
     bool answered_load_ = false;                    // it has said `started` or `refused`
-    bool overdue_ = false;                          // it was killed because a job did not end
     bool finished_ = false;
 
     std::atomic<bool> ended_{false};

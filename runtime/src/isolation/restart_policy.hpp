@@ -31,9 +31,8 @@ class restart_policy {
         withdrawn_ = withdrawn_ || often;
         return withdrawn_ ? decision::withdraw : decision::restart;
     }
-    /// The process could not be started, or was killed because of a job that was overdue, which requesters can cause at
-    /// will. That does not withdraw the tasks. Returns how long to wait before the next start: twice as long each time,
-    /// unless the last time is longer ago than `period`.
+    /// The process could not be started. That does not withdraw the tasks. Returns how long to wait before the next
+    /// start: twice as long each time, unless the last time is longer ago than `period`.
     std::chrono::milliseconds delay(time_point now) noexcept {
         const bool recent = delayed_ > 0 && now - last_delayed_ < period;
         const auto wanted = min_delay * (1U << (recent ? std::min(delayed_, 10U) : 0U));

@@ -75,7 +75,7 @@ class Isolated(unittest.TestCase):
 class Ends(Isolated):
     """Each of these ends the process, and costs the jobs that ran there one `failed` each."""
 
-    def ends(self, command, words, own=True, code="failed", restarting="Restarting."):
+    def ends(self, command, words, own=True, code="failed"):
         """Runs a command that ends the process, next to a job that runs there and one that runs in the daemon."""
         before = self.process()
         with self.daemon.connect() as link:
@@ -97,7 +97,7 @@ class Ends(Isolated):
         self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
         self.assertNotEqual(self.process(), before)
         wait_until(lambda: not exists(before), "the old process is gone")
-        entry = self.daemon.wait_for_entry(restarting)
+        entry = self.daemon.wait_for_entry("Restarting.")
         self.assertEqual(entry["level"], "error")
         self.assertIn("hostile: its process ", entry["message"])
         self.assertIn(words, entry["message"])
@@ -123,7 +123,7 @@ class Ends(Isolated):
     def test_endless_loop(self):
         self.ends("DELEGATE self:loops deadline=100",
                   "was ended because DELEGATE 'loops' did not end within 400 ms of its deadline or cancellation",
-                  own=False, code="deadline", restarting="Restarting in 100 ms.")
+                  own=False, code="deadline")
         metrics = json.loads(self.daemon.ask("PULL self:cles/metrics"))["pool"]
         self.assertEqual((metrics["stuck"], metrics["stuck_now"]), (0, 0))
 
@@ -158,21 +158,20 @@ class Ends(Isolated):
         """Bytes that arrive do not delay the end of a job that is overdue."""
         self.ends("DELEGATE self:drips deadline=100",
                   "was ended because DELEGATE 'drips' did not end within 400 ms of its deadline or cancellation",
-                  own=False, code="deadline", restarting="Restarting in 100 ms.")
+                  own=False, code="deadline")
 
     def test_a_job_without_a_worker_does_not_end(self):
         """Its handler has returned, and it is not answered."""
         self.ends("DELEGATE self:keeps deadline=100",
                   "was ended because DELEGATE 'keeps' did not end within 400 ms of its deadline or cancellation",
-                  own=False, code="deadline", restarting="Restarting in 100 ms.")
+                  own=False, code="deadline")
 
-    def test_requesters_cannot_withdraw_it(self):
-        """Ends that a short deadline causes do not count, and the pauses between restarts grow."""
-        for delay in (100, 200, 400, 800):
+    def test_overdue_jobs_withdraw_it(self):
+        for expected in ((1, "running"), (2, "running"), (3, "withdrawn")):
             self.assertEqual(body(self.daemon.ask("DELEGATE self:keeps deadline=200"))["error"], "deadline")
-            self.daemon.wait_for_entry(f"Restarting in {delay} ms.")
-            wait_until(lambda: self.figures()["state"] == "running", "it runs again")
-        self.assertEqual(self.daemon.ask("PULL self:quick"), '{"value":42}')
+            wait_until(lambda: (self.figures()["ended"], self.figures()["state"]) == expected, f"it is {expected}")
+        self.assertEqual(body(self.daemon.ask("PULL self:quick"))["error"], "no_task")
+        self.daemon.wait_for_entry("third end within 60 s; the last: its process was ended because DELEGATE 'keeps'")
 
     def test_a_job_that_waits_for_a_worker_is_not_overdue(self):
         before = self.process()
