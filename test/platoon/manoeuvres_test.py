@@ -9,7 +9,7 @@ from processes import DriveTest
 
 class Manoeuvres(DriveTest):
     def test_one_merges_and_the_last_splits_off(self):
-        found = self.drive("--vehicles", 4, "--seconds", 14, "--brake-at", 100, "--merge", "1@0.1", "--split", "3@0.3")
+        found = self.drive("--vehicles", 4, "--seconds", 15, "--brake-at", 100, "--merge", "1@0.1", "--split", "3@0.3")
         told = [event["why"] for event in found["events"]]
         self.assertIn("it changes into the lane behind v1", told, found["events"])
         self.assertIn("it splits off", told)

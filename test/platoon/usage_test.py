@@ -68,6 +68,13 @@ class Usage(unittest.TestCase):
             self.assertEqual((code, out), (2, ""), arguments)
             self.assertNotEqual(err, "", arguments)
 
+    def test_the_search_of_gains_ends_with_the_best(self):
+        code, out, err = run("tune", "--vehicles", 3, "--hz", 10, "--loss", 10, "--seeds", 1, "--seconds", 12)
+        self.assertEqual((code, err), (0, ""))
+        costs = [float(line.rpartition(" ")[2]) for line in out.splitlines()]
+        self.assertRegex(out, r"^start +q1 1\.\d+, .*\n(better +q1 .*\n)*best +q1 .*\n$")
+        self.assertEqual(costs, sorted(costs, reverse=True))
+
     def test_a_record_that_cannot_be_written(self):
         code, _, err = run("simulate", "--vehicles", 2, "--record", "/nowhere/record.json")
         self.assertEqual(code, 5)
