@@ -133,8 +133,7 @@ session_events isolated_plugin::events_of(std::uint64_t run) {
     });
     events.publish =
         guarded([](isolated_plugin& self, std::string_view noun, std::string_view json) { self.publish(noun, json); });
-    events.ended = guarded(
-        [run](isolated_plugin& self, const process_end& how) { self.on_ended(run, how); });
+    events.ended = guarded([run](isolated_plugin& self, const process_end& how) { self.on_ended(run, how); });
     return events;
 }
 

@@ -77,9 +77,10 @@ struct ask_message {
     std::string command;
     std::string at;
     bool urgent = false;
+    std::uint32_t hops = 8;
     std::int64_t deadline_ms = 0;
     bool progress = false;
 };
-BOOST_DESCRIBE_STRUCT(ask_message, (), (command, at, urgent, deadline_ms, progress))
+BOOST_DESCRIBE_STRUCT(ask_message, (), (command, at, urgent, hops, deadline_ms, progress))
 
 } // namespace cles::runtime

@@ -653,7 +653,8 @@ void plugin_session::ask(const wire_line& line) {
     }
     ++by->waits;
     call_options options;
-    options.urgent(wanted.urgent).at(wanted.at).deadline(std::chrono::milliseconds{wanted.deadline_ms});
+    options.urgent(wanted.urgent).at(wanted.at).hops(wanted.hops);
+    options.deadline(std::chrono::milliseconds{wanted.deadline_ms});
     if (wanted.progress) {
         options.on_progress([weak = weak_from_this(), by, ticket](double fraction, std::string_view json) {
             if (const auto self = weak.lock()) {

@@ -121,6 +121,7 @@ class process_jobs::call final : public detail::call_control {
             ask_message{.command = std::string{command},
                         .at = options.at_,
                         .urgent = options.urgent_,
+                        .hops = options.hops_,
                         .deadline_ms = options.deadline_.count(),
                         .progress = options.on_progress_ != nullptr});
         jobs_.daemon_.say(line);
@@ -142,7 +143,7 @@ class process_jobs::call final : public detail::call_control {
     /// to be read before the job ends.
     std::optional<std::string> end() {
         current = nullptr;
-        if (traced_ && direct_ && said_before_ != control_connection::said_here()) {
+        if (traced_ && direct_ && sent_before_ != control_connection::lines_sent_by_this_thread()) {
             std::string line;
             wire_line_writer{line, id_}.body(*std::exchange(direct_, std::nullopt));
             jobs_.daemon_.say(line);

@@ -74,14 +74,10 @@ void send_signed(local_node& host, request_signer& by, const repeatable_request&
     const auto noun = node + ":" + r.path;
     const auto adverbs = std::string{"sig="}.append(sig);
     host.flush_scheduler().run_user_call([&] {
-        const auto id = host.peer_channels().send(node, r.at,
-                                                  {.verb = r.how,
-                                                   .noun = noun,
-                                                   .carried = r.carried,
-                                                   .hops = r.hops,
-                                                   .adverbs = adverbs,
-                                                   .body = r.body},
-                                                  r.deadline, std::move(reply), std::move(progress));
+        const auto id = host.peer_channels().send(
+            node, r.at,
+            {.verb = r.how, .noun = noun, .carried = r.carried, .hops = r.hops, .adverbs = adverbs, .body = r.body},
+            r.deadline, std::move(reply), std::move(progress));
         if (id != 0) {
             by.note(r.ticket, id);
         }
