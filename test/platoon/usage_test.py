@@ -86,7 +86,7 @@ class Usage(unittest.TestCase):
                          (5, "", "cles-platoon: cannot write /nowhere/record.json: No such file or directory\n"))
         code, out, err = run(*where, "/dev/full")
         self.assertEqual((code, err), (5, "cles-platoon: cannot write /dev/full: No space left on device\n"))
-        self.assertRegex(out, r"(?m)^gap +\d+\.\d{3} m at least\nfallback")
+        self.assertRegex(out, r"(?m)^gap +\d+\.\d{3} m at least\nradar")
         self.assertRegex(out, r"(?m)^latency   p50 \d")
 
     def test_on_a_terminal_it_shows_a_table(self):
