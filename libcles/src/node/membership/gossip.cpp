@@ -457,11 +457,15 @@ void gossip::choose_neighbours(time_point now) {
 
 void gossip::contact_bootstraps(time_point now) {
     while (contacts_.count(part::bootstrap) < max_bootstraps) {
-        const auto url = seeds_.due(others_, now, search_pause());
-        if (!url) {
+        const auto seed = seeds_.due(others_, now, search_pause(), [this](std::string_view node) {
+            // With security, a reply of a seed is not yet known to be that of the node, when its address is chosen.
+            return security_ != nullptr && reach_.allows(node) && !reach_.is_usable(node) &&
+                   contacts_.find_node(node) == nullptr;
+        });
+        if (!seed) {
             break;
         }
-        contacts_.add(part::bootstrap, {}, *url, now);
+        contacts_.add(part::bootstrap, seed->node, seed->url, now);
     }
     if (unknown_peer_) {
         const auto known = others_.find_member(*unknown_peer_);

@@ -77,20 +77,22 @@ void seeds::set(const std::vector<std::string>& urls) {
     all_ = std::move(now);
 }
 
-std::optional<std::string> seeds::due(const membership& others, time_point now, std::chrono::milliseconds rest) {
+std::optional<seeds::candidate> seeds::due(const membership& others, time_point now, std::chrono::milliseconds rest,
+                                           const std::function<bool(std::string_view)>& is_lost) {
     for (auto& s : all_) {
         if (s.self || s.next > now) {
             continue;
         }
         const auto known = s.node.empty() ? std::nullopt : others.find_member(s.node);
-        if (known && !known->suspect) {
+        const bool is_live = known && !known->suspect;
+        if (is_live && !is_lost(s.node)) {
             s.pause = doubling_pause{first_pause};
             s.next = now + rest;
             continue;
         }
         const auto pause = s.pause.take(rest);
         s.next = now + pause - jitter_.quarter_of(pause);
-        return s.url;
+        return candidate{s.url, is_live ? s.node : std::string{}};
     }
     return {};
 }

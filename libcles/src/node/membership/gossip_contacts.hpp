@@ -137,8 +137,16 @@ class seeds {
     /// URLs that remain keep their state. New ones are due at once.
     void set(const std::vector<std::string>& urls);
     [[nodiscard]] bool empty() const noexcept { return all_.empty(); }
+    struct candidate {
+        std::string url;
+        std::string node{}; ///< that is known to be there; empty: whoever replies
+    };
     /// A seed to ask now. It is due again after a pause of at most `rest`.
-    std::optional<std::string> due(const membership& others, time_point now, std::chrono::milliseconds rest);
+    /// \param is_lost whether no link could be opened to this node. Then its seed is asked although the node is live:
+    /// the
+    ///        address that it has announced first may be one that leads nowhere from here
+    std::optional<candidate> due(const membership& others, time_point now, std::chrono::milliseconds rest,
+                                 const std::function<bool(std::string_view)>& is_lost);
     /// When the next seed is due, unless a node is found before.
     [[nodiscard]] std::optional<time_point> next() const noexcept;
     /// `node` replied at `url`.
