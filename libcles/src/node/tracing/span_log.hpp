@@ -30,8 +30,8 @@ class span_log final : public span_recorder, public std::enable_shared_from_this
 
     [[nodiscard]] protocol::trace_context receive(const protocol::request_line& r, time_point arrived,
                                                   time_point now) override;
-    void add_times(std::uint64_t span, std::chrono::nanoseconds queued, std::chrono::nanoseconds ran) override;
-    void end(std::uint64_t span, std::string_view outcome, time_point now) override;
+    void add_times(std::uint64_t id, std::chrono::nanoseconds queued, std::chrono::nanoseconds ran) override;
+    void end(std::uint64_t id, std::string_view outcome, time_point now) override;
     [[nodiscard]] detail::pending_ptr send(protocol::outgoing_request& r, std::string_view next,
                                            detail::pending_ptr operation, time_point now) override;
     void write(json_writer& w, const protocol::trace_id& id, time_point now) override;
