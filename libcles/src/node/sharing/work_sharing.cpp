@@ -373,7 +373,10 @@ void work_sharing::hold_another(std::uint64_t ticket, std::uint64_t grant) {
     if (const auto found = moved_.find(ticket); found != moved_.end()) {
         const auto& moved = found->second;
         ++node_.counts.grants_received;
-        hold(moved.node, grant, 1, node_.time.now()).service_time = moved.service_time;
+        auto& held = hold(moved.node, grant, 1, node_.time.now());
+        // Where the node did not know it, the job that it has run tells.
+        held.service_time =
+            moved.service_time > microseconds{0} ? moved.service_time : elapsed(moved.sent, node_.time.now());
     }
 }
 
