@@ -15,12 +15,12 @@
 #include "perf/pull/pull_exchange.hpp"
 #include "perf/support/child_process.hpp"
 #include "perf/support/latency_recorder.hpp"
+#include "perf/support/number_option.hpp"
 #include "perf/support/pinning.hpp"
 
 #include <boost/asio/io_context.hpp>
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cstddef>
 #include <cstdio>
@@ -46,17 +46,6 @@ struct options {
     bool one_core = false;
 };
 
-template <class Number>
-Number number(std::string_view option, std::string_view text, Number most) {
-    Number value{};
-    const auto [end, wrong] = std::from_chars(text.data(), text.data() + text.size(), value);
-    if (wrong != std::errc{} || end != text.data() + text.size() || value < 1 || value > most) {
-        throw std::invalid_argument(std::string{option} + " takes a number from 1 to " +
-                                    std::to_string(static_cast<unsigned>(most)));
-    }
-    return value;
-}
-
 options read(std::span<char*> arguments) {
     options o;
     for (std::size_t i = 1; i < arguments.size(); ++i) {
@@ -67,11 +56,11 @@ options read(std::span<char*> arguments) {
             throw std::invalid_argument(
                 "usage: cles_forward_cost [--rounds N] [--requests N] [--most RATIO] [--one-core]");
         } else if (option == "--rounds") {
-            o.rounds = number(option, arguments[++i], 1000U);
+            o.rounds = perf::number(option, arguments[++i], 1000U);
         } else if (option == "--requests") {
-            o.requests = number(option, arguments[++i], 10'000'000U);
+            o.requests = perf::number(option, arguments[++i], 10'000'000U);
         } else if (option == "--most") {
-            o.most = number(option, arguments[++i], 1000.0);
+            o.most = perf::number(option, arguments[++i], 1000.0);
         } else {
             throw std::invalid_argument("'" + std::string{option} + "' is not an option");
         }
@@ -116,12 +105,6 @@ struct exchange {
     }
 };
 
-double median(std::vector<double> of) {
-    const auto middle = of.begin() + static_cast<std::ptrdiff_t>(of.size() / 2);
-    std::nth_element(of.begin(), middle, of.end());
-    return *middle;
-}
-
 int measure(const options& o) {
     const auto cores = perf::usable_cores();
     const auto ends = perf::place_ends();
@@ -154,10 +137,10 @@ int measure(const options& o) {
             ratio.push_back(forwarded.p50.back() / direct.p50.back());
         }
     }
-    const auto found = median(ratio);
+    const auto found = perf::median(ratio);
     std::printf("                     p50          p99\n");
-    std::printf("PULL, direct     %8.1f us  %8.1f us\n", median(direct.p50), median(direct.p99));
-    std::printf("PULL, forwarded  %8.1f us  %8.1f us\n", median(forwarded.p50), median(forwarded.p99));
+    std::printf("PULL, direct     %8.1f us  %8.1f us\n", perf::median(direct.p50), perf::median(direct.p99));
+    std::printf("PULL, forwarded  %8.1f us  %8.1f us\n", perf::median(forwarded.p50), perf::median(forwarded.p99));
     std::printf("ratio of p50     %8.2f     (%.2f to %.2f)", found, *std::min_element(ratio.begin(), ratio.end()),
                 *std::max_element(ratio.begin(), ratio.end()));
     if (o.most) {

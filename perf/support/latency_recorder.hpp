@@ -16,6 +16,9 @@ struct latencies {
     double max = 0;
 };
 
+/// Of figures, such as those of several passes. \pre there are some
+[[nodiscard]] double median(std::vector<double> of);
+
 /// Stores every latency of one pass, so that its quantiles are exact. Recording neither allocates nor touches new
 /// pages.
 class latency_recorder {
