@@ -209,7 +209,7 @@ void work_sharing::serve_slots(reply_writer& replies, const protocol::request_li
     }
     ++node_.counts.grants_received;
     auto& held = hold(said.node, r.grant, bounded(said.free), now);
-    held.service_time = microseconds{bounded(said.service_us)};
+    other.service_time = microseconds{bounded(said.service_us)};
     const auto taken = forward_jobs(std::string{said.node}, held, now);
     const bool may_have_more = taken != 0 && held.left == 0;
     const auto waiting = may_have_more ? jobs_.read_state().excess() : 0;
@@ -250,7 +250,7 @@ class work_sharing::forwarding final : public job_taker {
     forwarding(work_sharing& by, const std::string& node, const held_grant& grant, const shareable_queue::state& own,
                time_point now)
         : by_(by), node_(node), other_(by.known_[node]), grant_(grant), now_(now), own_(own) {
-        const auto slower = std::max(grant.service_time - own_.service_time, microseconds{0});
+        const auto slower = std::max(other_.service_time - own_.service_time, microseconds{0});
         const std::chrono::duration<double, std::micro> transfer{other_.transfer(now)};
         required_wait_ = min_wait_per_transfer * transfer + slower;
     }
@@ -289,8 +289,7 @@ class work_sharing::forwarding final : public job_taker {
                                              .node = node_,
                                              .grant = grant_.number,
                                              .request = request,
-                                             .sent = now_,
-                                             .service_time = grant_.service_time});
+                                             .sent = now_});
         ++taken_;
         return ticket;
     }
@@ -371,12 +370,8 @@ void work_sharing::use_held_grants(time_point now) {
 // The node to which that job was moved has granted another slot.
 void work_sharing::hold_another(std::uint64_t ticket, std::uint64_t grant) {
     if (const auto found = moved_.find(ticket); found != moved_.end()) {
-        const auto& moved = found->second;
         ++node_.counts.grants_received;
-        auto& held = hold(moved.node, grant, 1, node_.time.now());
-        // Where the node did not know it, the job that it has run tells.
-        held.service_time =
-            moved.service_time > microseconds{0} ? moved.service_time : elapsed(moved.sent, node_.time.now());
+        hold(found->second.node, grant, 1, node_.time.now());
     }
 }
 
@@ -398,17 +393,22 @@ microseconds work_sharing::acquaintance::transfer(time_point now) const {
     return std::max(trip.value_or(first_transfer), now < surplus_until ? *surplus : microseconds{0});
 }
 
-// Until the reply, less the usual time of a job there. If that is not known, nothing is learned.
+// Until the reply, less the usual time of a job there. If that is not known, this job tells.
 void work_sharing::measure(const moved_job& moved, time_point now) {
     const auto found = known_.find(moved.node);
-    if (found == known_.end() || moved.service_time == microseconds{0}) {
+    if (found == known_.end()) {
         return;
     }
     auto& other = found->second;
+    const auto took = elapsed(moved.sent, now);
+    if (other.service_time == microseconds{0}) {
+        other.service_time = took;
+        return;
+    }
     if (now >= other.surplus_until) {
         other.surplus.reset();
     }
-    smooth(other.surplus, elapsed(moved.sent, now) - moved.service_time);
+    smooth(other.surplus, took - other.service_time);
     other.surplus_until = now + surplus_valid_for;
 }
 

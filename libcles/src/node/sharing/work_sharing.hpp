@@ -110,6 +110,7 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
     struct acquaintance {
         std::uint32_t waiting = 0;                        // jobs there that may be moved
         time_point heard = time_point::min();             // when it last said so
+        std::chrono::microseconds service_time{0};        // of a job there; 0: not known
         std::optional<std::chrono::microseconds> trip;    // how long `push_slots` takes there and back
         std::optional<std::chrono::microseconds> surplus; // what moved jobs take longer than usual there
         time_point surplus_until{};                       // it counts
@@ -148,7 +149,6 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         unsigned left = 0;
         std::uint64_t searched = 0; // how many jobs had been queued when the queue was searched for one
         time_point expires{};
-        std::chrono::microseconds service_time{0}; // of a job there; 0: not known
     };
     struct moved_job {
         std::shared_ptr<call> job;
@@ -157,7 +157,6 @@ class work_sharing : public job_sharing, public request_sharing, private deadlin
         std::uint64_t grant = 0;
         std::uint64_t request = 0; // the ticket of the client
         time_point sent{};
-        std::chrono::microseconds service_time{0}; // of a job there; 0: not known
     };
 
     [[nodiscard]] static bool read(std::string_view body, std::size_t depth, slots_message& to);

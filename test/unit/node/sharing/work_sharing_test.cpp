@@ -299,6 +299,21 @@ BOOST_AUTO_TEST_CASE(the_transfer_is_not_measured_if_the_other_node_does_not_kno
     BOOST_TEST(grant(1, "00000000000000ab").find("\"taken\":1") != std::string::npos);
 }
 
+BOOST_AUTO_TEST_CASE(the_first_job_tells_how_long_a_node_takes_that_does_not_know_it) {
+    submit_jobs(1);
+    grant(1); // without "service_us"
+    node.pass(40ms);
+    sent().reply.release()->offer_granted("{}", 0xbb);
+    submit("DELEGATE car1:work id=50"); // it waits for 5 ms
+    sharing->on_change();
+    BOOST_TEST(queue.moved.empty());
+    for (int id = 51; id <= 54; ++id) {
+        submit("DELEGATE car1:work id=" + std::to_string(id));
+    }
+    sharing->on_change();
+    BOOST_TEST(queue.moved.size() == 1U); // one that waits for 35 ms: the node is slower by 30 ms, and 1.5 ms
+}
+
 BOOST_AUTO_TEST_CASE(a_grant_is_used_for_50_ms_less_a_round_trip) {
     const auto told = [&](int id) -> cles::test::recorded_next_hop::sent& {
         submit("DELEGATE car1:work id=" + std::to_string(id));
