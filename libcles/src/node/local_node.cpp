@@ -8,7 +8,6 @@
 #include "node/base/completion_drain.hpp"
 #include "node/membership/reachable_endpoints.hpp"
 #include "node/session/request_checks.hpp"
-#include "node/tracing/span_recorder.hpp"
 #include "protocol/grammar.hpp"
 
 #include <algorithm>
@@ -305,9 +304,8 @@ std::uint64_t local_node::send(verb how, std::string_view text, std::string_view
                                            .ticket = id},
                                           std::move(operation));
     }
-    if (request.carried.trace.sampled && node_->spans) {
-        const auto next = options.at_.empty() ? peer_channels_.neighbour_towards(noun.target) : std::string{};
-        operation = node_->spans->send(request, next, std::move(operation), started);
+    if (request.carried.trace.sampled) {
+        operation = peer_channels_.record(request, options.at_, {}, std::move(operation));
     }
     flush_scheduler_.run_user_call(
         [&] { r->send(request, deadline, started, std::move(operation), options.on_progress_); });

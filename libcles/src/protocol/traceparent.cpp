@@ -16,17 +16,6 @@ constexpr std::size_t length = 55;
 constexpr std::uint8_t no_version = 0xff;
 constexpr unsigned sampled_flag = 1;
 
-void put_digits(std::string& text, std::size_t at, std::uint64_t value) {
-    for (std::size_t i = 2 * sizeof value; i-- > 0; value >>= 4U) {
-        text[at + i] = "0123456789abcdef"[value & 0xFU];
-    }
-}
-
-void put_id(std::string& text, std::size_t at, const trace_id& id) {
-    put_digits(text, at, id.high);
-    put_digits(text, at + 2 * sizeof id.high, id.low);
-}
-
 } // namespace
 
 std::optional<trace_context> parse_traceparent(std::string_view text) noexcept {
@@ -47,14 +36,7 @@ std::optional<trace_context> parse_traceparent(std::string_view text) noexcept {
 }
 
 std::string traceparent_text(const trace_context& trace) {
-    std::string text(length, '0');
-    put_id(text, trace_at, trace.id);
-    put_digits(text, span_at, trace.span);
-    for (const auto at : {trace_at, span_at, flags_at}) {
-        text[at - 1] = '-';
-    }
-    text.back() = trace.sampled ? '1' : '0';
-    return text;
+    return "00-" + trace_id_text(trace.id) + "-" + hex_text(trace.span) + (trace.sampled ? "-01" : "-00");
 }
 
 std::optional<trace_id> parse_trace_id(std::string_view text) noexcept {
@@ -70,10 +52,6 @@ std::optional<trace_id> parse_trace_id(std::string_view text) noexcept {
     return trace_id{.high = *high, .low = *low};
 }
 
-std::string trace_id_text(const trace_id& id) {
-    std::string text(span_at - 1 - trace_at, '0');
-    put_id(text, 0, id);
-    return text;
-}
+std::string trace_id_text(const trace_id& id) { return hex_text(id.high) + hex_text(id.low); }
 
 } // namespace cles::protocol

@@ -3,9 +3,11 @@
 
 #include <array>
 #include <cerrno>
+#include <cstddef>
 #include <system_error>
 
 #include <fcntl.h>
+#include <sys/socket.h>
 
 namespace cles::runtime {
 
@@ -19,6 +21,18 @@ pipe_ends make_pipe() {
         throw std::system_error(errno, std::generic_category(), "cannot create a pipe");
     }
     return made;
+}
+
+int send_all(int socket, std::string_view text) noexcept {
+    while (!text.empty()) {
+        const auto sent = ::send(socket, text.data(), text.size(), MSG_NOSIGNAL);
+        if (sent >= 0) {
+            text.remove_prefix(static_cast<std::size_t>(sent));
+        } else if (errno != EINTR) {
+            return errno;
+        }
+    }
+    return 0;
 }
 
 } // namespace cles::runtime

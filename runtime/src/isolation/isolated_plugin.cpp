@@ -92,11 +92,8 @@ void isolated_plugin::start() {
         fail("its start does not end");
     }
     if (starting_) { // it has not said that it has started
-        std::string how;
-        const auto run = run_;
         session->close(std::chrono::steady_clock::now() + 1s);
-        how = run == run_ ? start_failure_ : "";
-        fail(how.empty() ? "its process ended while it started" : how);
+        fail(start_failure_.empty() ? "its process ended while it started" : start_failure_);
     }
     first_start_ = false;
     session->run();
@@ -133,7 +130,7 @@ session_events isolated_plugin::events_of(std::uint64_t run) {
     });
     events.publish =
         guarded([](isolated_plugin& self, std::string_view noun, std::string_view json) { self.publish(noun, json); });
-    events.ended = guarded([run](isolated_plugin& self, const process_end& how) { self.on_ended(run, how); });
+    events.ended = guarded([](isolated_plugin& self, const process_end& how) { self.on_ended(how); });
     return events;
 }
 
@@ -173,7 +170,7 @@ void isolated_plugin::fail_to_start(const std::string& why) {
     starting_->kill(why);
 }
 
-void isolated_plugin::on_ended(std::uint64_t run, const process_end& how) {
+void isolated_plugin::on_ended(const process_end& how) {
     start_timer_.reset();
     auto why = describe(how);
     if (first_start_) { // `start` reports it
@@ -190,7 +187,7 @@ void isolated_plugin::on_ended(std::uint64_t run, const process_end& how) {
             missing_since_ = clock::now();
         }
     }
-    if (stopping_ || run != run_) {
+    if (stopping_) {
         return;
     }
     ++ended_;

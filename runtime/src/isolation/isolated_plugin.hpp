@@ -77,7 +77,7 @@ class isolated_plugin : public std::enable_shared_from_this<isolated_plugin> {
     void launch();
     session_events events_of(std::uint64_t run);
     void on_started(const started_message& what);
-    void on_ended(std::uint64_t run, const process_end& how);
+    void on_ended(const process_end& how);
     [[nodiscard]] std::string describe(const process_end& how) const;
     void fail_to_start(const std::string& why);
     void restart_or_withdraw(const std::string& why);

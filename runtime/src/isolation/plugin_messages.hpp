@@ -7,6 +7,7 @@
 
 #include <boost/describe/class.hpp>
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -64,6 +65,9 @@ struct refused_message {
     std::string key; ///< that is to blame, as in `plugin_error`
 };
 BOOST_DESCRIBE_STRUCT(refused_message, (), (why, key))
+
+/// Longer entries of the log are cut.
+inline constexpr std::size_t max_log_text = 4096;
 
 /// `PUSH self:cles/log` and `PUSH self:cles/log/<id>`, from the plugin's process.
 struct log_message {

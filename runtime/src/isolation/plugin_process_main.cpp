@@ -4,16 +4,16 @@
 #include <cles/plugin_abi.h>
 
 #include "isolation/confinement.hpp"
+#include "isolation/descriptor.hpp"
 #include "isolation/line_buffer.hpp"
 #include "isolation/plugin_messages.hpp"
 #include "isolation/plugin_process.hpp"
 #include "isolation/process_jobs.hpp"
+#include "isolation/wire_line.hpp"
 #include "plugins/plugin_host.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <chrono>
 #include <csignal>
 #include <cstdint>
@@ -40,14 +40,6 @@ namespace {
 
 constexpr std::chrono::milliseconds max_stop_time{2'000};
 constexpr int exit_wrong_usage = 2;
-
-template <class T>
-std::optional<T> number_of(const char* text) noexcept {
-    const std::string_view all{text};
-    T number{};
-    const auto [end, failed] = std::from_chars(all.data(), all.data() + all.size(), number);
-    return failed == std::errc{} && end == all.data() + all.size() ? std::optional<T>{number} : std::nullopt;
-}
 
 /// Reads lines from a socket.
 class line_reader {
@@ -249,12 +241,8 @@ class plugin_runner {
             } else {
                 reply = jobs_.serve(*read, wanted_.node);
             }
-            for (std::string_view rest = reply; !rest.empty();) {
-                const auto sent = ::send(socket, rest.data(), rest.size(), MSG_NOSIGNAL);
-                if (sent < 0 && errno != EINTR) {
-                    return; // the daemon has ended
-                }
-                rest.remove_prefix(static_cast<std::size_t>(std::max<ssize_t>(sent, 0)));
+            if (send_all(socket, reply) != 0) {
+                return; // the daemon has ended
             }
         }
     }
@@ -286,8 +274,8 @@ int run_plugin_process(int argc, const char* const* argv) {
     sigset_t none;
     ::sigemptyset(&none);
     ::sigprocmask(SIG_SETMASK, &none, nullptr);
-    const auto parent = argc == 5 ? number_of<pid_t>(argv[2]) : std::nullopt;
-    const auto lanes = parent ? number_of<std::uint16_t>(argv[3]) : std::nullopt;
+    const auto parent = argc == 5 ? to_number<pid_t>(argv[2]) : std::nullopt;
+    const auto lanes = parent ? to_number<std::uint16_t>(argv[3]) : std::nullopt;
     if (!lanes) {
         return reject_usage();
     }

@@ -27,8 +27,6 @@ constexpr std::size_t max_control_read = 65536;
 // What the process may leave unread. It reads at once, unless it has been stopped.
 constexpr std::size_t max_pending = 64U << 20U;
 constexpr std::size_t max_output_line = 1000;
-
-constexpr std::size_t max_entry = 4096;
 // How long the process may take to end after it has closed a connection.
 constexpr std::chrono::milliseconds end_time{100};
 
@@ -164,13 +162,8 @@ bool plugin_session::serve(const request& what, const responder& answer) {
 
 // Sends a line, and waits for the line that answers it: when the handler, or the callback, has returned.
 plugin_session::exchanged plugin_session::exchange(lane& on, std::string_view line, std::string& reply) {
-    while (!line.empty()) {
-        const auto sent = ::send(on.socket, line.data(), line.size(), MSG_NOSIGNAL);
-        if (sent >= 0) {
-            line.remove_prefix(static_cast<std::size_t>(sent));
-        } else if (errno != EINTR) {
-            return lose(errno);
-        }
+    if (const auto code = send_all(on.socket, line); code != 0) {
+        return lose(code);
     }
     for (;;) {
         if (const auto whole = on.input.next()) {
@@ -608,7 +601,7 @@ void plugin_session::on_request(const wire_line& line) {
         const auto entry = body_of<log_message>(line);
         const auto level = static_cast<log_level>(std::min<std::uint32_t>(entry.level, 3));
         const auto of = find(line.number_at(1));
-        events_.log(level, std::string_view{entry.text}.substr(0, max_entry), of ? &of->answer : nullptr);
+        events_.log(level, std::string_view{entry.text}.substr(0, max_log_text), of ? &of->answer : nullptr);
     } else if (what == "started" && !answered_load_) {
         answered_load_ = true;
         events_.started(body_of<started_message>(line));

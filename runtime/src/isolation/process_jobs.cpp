@@ -6,24 +6,21 @@
 #include <cles/json_writer.hpp>
 #include <cles/limits.hpp>
 
+#include "isolation/descriptor.hpp"
 #include "isolation/plugin_messages.hpp"
 
-#include <algorithm>
-#include <cerrno>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <optional>
 #include <vector>
 
-#include <sys/socket.h>
 #include <unistd.h>
 
 namespace cles::runtime {
 namespace {
 
 constexpr std::size_t max_cancelled_early = 256;
-constexpr std::size_t max_log_text = 4096;
 
 thread_local std::uint64_t lines_sent = 0;
 
@@ -44,13 +41,8 @@ identity peer_of(const wire_line& line) {
 void control_connection::say(std::string_view lines) {
     ++lines_sent;
     const std::scoped_lock lock{mutex_};
-    while (!lines.empty()) {
-        const auto sent = ::send(socket_, lines.data(), lines.size(), MSG_NOSIGNAL);
-        if (sent >= 0) {
-            lines.remove_prefix(static_cast<std::size_t>(sent));
-        } else if (errno != EINTR) {
-            ::_exit(0); // the daemon has ended
-        }
+    if (send_all(socket_, lines) != 0) {
+        ::_exit(0); // the daemon has ended
     }
 }
 

@@ -139,12 +139,11 @@ class seeds {
     [[nodiscard]] bool empty() const noexcept { return all_.empty(); }
     struct candidate {
         std::string url;
-        std::string node{}; ///< that is known to be there; empty: whoever replies
+        std::string node{}; ///< that is known to be there; empty: any node that replies
     };
     /// A seed to ask now. It is due again after a pause of at most `rest`.
-    /// \param is_lost whether no link could be opened to this node. Then its seed is asked although the node is live:
-    /// the
-    ///        address that it has announced first may be one that leads nowhere from here
+    /// \param is_lost whether no link could be opened to this node. Then its seed is asked although the node is live,
+    /// because the address that it has announced first may lead nowhere from here
     std::optional<candidate> due(const membership& others, time_point now, std::chrono::milliseconds rest,
                                  const std::function<bool(std::string_view)>& is_lost);
     /// When the next seed is due, unless a node is found before.

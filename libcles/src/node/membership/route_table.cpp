@@ -166,11 +166,6 @@ std::uint64_t route_table::newest(std::string_view name) const {
     return d == nullptr ? 0 : d->newest;
 }
 
-std::uint64_t route_table::requested(std::string_view name) const {
-    const auto* const d = find(name);
-    return d == nullptr ? 0 : d->requested;
-}
-
 route_advert route_table::advertise(std::string_view name, std::uint32_t epoch, bool direct,
                                     const usable_function& usable, std::string_view to) {
     if (direct) { // no loop is possible, so the newest number counts, no matter which node stated it

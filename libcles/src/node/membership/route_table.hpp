@@ -80,8 +80,6 @@ class route_table {
     bool request(std::string_view name, std::uint32_t epoch, std::uint64_t number);
     /// The greatest number that is known; 0: none.
     [[nodiscard]] std::uint64_t newest(std::string_view name) const;
-    /// The greatest number that was asked for; 0: none.
-    [[nodiscard]] std::uint64_t requested(std::string_view name) const;
     [[nodiscard]] std::size_t size() const noexcept { return epochs_.size(); }
 
   private:

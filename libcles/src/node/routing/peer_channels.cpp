@@ -305,9 +305,8 @@ peer_channel* peer_channels::to(std::string_view target, std::string_view at, bo
 std::uint64_t peer_channels::send(std::string_view target, std::string_view at, protocol::outgoing_request r,
                                   time_point deadline, detail::pending_ptr operation,
                                   outbound::progress_function progress, const forwarding& by) {
-    if (r.carried.trace.sampled && host_.node().spans) {
-        const auto next = at.empty() ? neighbour_towards(target, by) : std::string{};
-        operation = host_.node().spans->send(r, next, std::move(operation), host_.now());
+    if (r.carried.trace.sampled) {
+        operation = record(r, at, by, std::move(operation));
     }
     boost::system::error_code code;
     std::string why;
@@ -320,6 +319,16 @@ std::uint64_t peer_channels::send(std::string_view target, std::string_view at, 
     channel->send(r, deadline, host_.now(), std::move(operation), std::move(progress),
                   at.empty() && by.empty() && !r.carried.urgent);
     return r.id;
+}
+
+detail::pending_ptr peer_channels::record(protocol::outgoing_request& r, std::string_view at, const forwarding& by,
+                                          detail::pending_ptr operation) {
+    const auto& spans = host_.node().spans;
+    if (!spans) {
+        return operation;
+    }
+    const auto next = at.empty() ? neighbour_towards(r.target(), by) : std::string{};
+    return spans->send(r, next, std::move(operation), host_.now());
 }
 
 std::string peer_channels::neighbour_towards(std::string_view target, const forwarding& by) const {

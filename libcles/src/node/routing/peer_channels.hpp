@@ -30,9 +30,10 @@ class local_node;
 
 /// What limits the way of a request that this node forwards. Empty for its own ones.
 struct forwarding {
-    std::string_view via{}; ///< nodes that have forwarded it: it does not lead through them
-    std::string_view
-        requester{}; ///< the member for which it is, if it is another one: nodes on the way may forward for it
+    /// Nodes that have forwarded it: it does not lead through them.
+    std::string_view via{};
+    /// The member for which it is, if it is another one: nodes on the way may forward for it.
+    std::string_view requester{};
 
     [[nodiscard]] bool empty() const noexcept { return via.empty() && requester.empty(); }
 };
@@ -137,8 +138,9 @@ class peer_channels {
     /// there, the operation fails later. Returns the id, or 0.
     std::uint64_t send(std::string_view target, std::string_view at, protocol::outgoing_request r, time_point deadline,
                        detail::pending_ptr operation, outbound::progress_function progress, const forwarding& by = {});
-    /// The node to which a request for the target is sent on its way there; empty if that is the target, or not known.
-    [[nodiscard]] std::string neighbour_towards(std::string_view target, const forwarding& by = {}) const;
+    /// Begins the span of a traced request that is about to be sent; returns the operation that ends it.
+    [[nodiscard, gnu::cold]] detail::pending_ptr record(protocol::outgoing_request& r, std::string_view at,
+                                                        const forwarding& by, detail::pending_ptr operation);
     /// As `send`, to an address where only the node of that name is to answer.
     void send_to_node(std::string_view name, std::string_view at, protocol::outgoing_request r, time_point deadline,
                       detail::pending_ptr operation);
@@ -177,6 +179,8 @@ class peer_channels {
         std::string node;
     };
     [[nodiscard]] place place_of(std::string_view target, const forwarding& by = {}) const;
+    /// The node to which a request for the target is sent on its way there; empty if that is the target, or not known.
+    [[nodiscard]] std::string neighbour_towards(std::string_view target, const forwarding& by) const;
     [[nodiscard]] std::optional<place> discovered_place_of(std::string_view target, const forwarding& by) const;
     url checked_url(std::string_view where) const;
     [[nodiscard]] std::string_view name_to_check(std::string_view target, std::string_view at,
