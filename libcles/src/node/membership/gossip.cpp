@@ -343,6 +343,9 @@ void gossip::on_deadline(time_point now) {
 }
 
 void gossip::review(time_point now) {
+    if (security_ != nullptr) { // otherwise a reply itself tells the address, see `on_answer`
+        seeds_.prefer_in(others_);
+    }
     contacts_.expire_resting(now);
     drop_unresponsive(now);
     choose_successor(now);
@@ -457,15 +460,11 @@ void gossip::choose_neighbours(time_point now) {
 
 void gossip::contact_bootstraps(time_point now) {
     while (contacts_.count(part::bootstrap) < max_bootstraps) {
-        const auto seed = seeds_.due(others_, now, search_pause(), [this](std::string_view node) {
-            // With security, a reply of a seed is not yet known to be that of the node, when its address is chosen.
-            return security_ != nullptr && reach_.allows(node) && !reach_.is_usable(node) &&
-                   contacts_.find_node(node) == nullptr;
-        });
-        if (!seed) {
+        const auto url = seeds_.due(others_, now, search_pause());
+        if (!url) {
             break;
         }
-        contacts_.add(part::bootstrap, seed->node, seed->url, now);
+        contacts_.add(part::bootstrap, {}, *url, now);
     }
     if (unknown_peer_) {
         const auto known = others_.find_member(*unknown_peer_);

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: BSL-1.0
 #include "node/membership/gossip_contacts.hpp"
 
+#include "protocol/request_line.hpp"
+
 #include <algorithm>
 #include <utility>
 
@@ -77,22 +79,20 @@ void seeds::set(const std::vector<std::string>& urls) {
     all_ = std::move(now);
 }
 
-std::optional<seeds::candidate> seeds::due(const membership& others, time_point now, std::chrono::milliseconds rest,
-                                           const std::function<bool(std::string_view)>& is_lost) {
+std::optional<std::string> seeds::due(const membership& others, time_point now, std::chrono::milliseconds rest) {
     for (auto& s : all_) {
         if (s.self || s.next > now) {
             continue;
         }
         const auto known = s.node.empty() ? std::nullopt : others.find_member(s.node);
-        const bool is_live = known && !known->suspect;
-        if (is_live && !is_lost(s.node)) {
+        if (known && !known->suspect) {
             s.pause = doubling_pause{first_pause};
             s.next = now + rest;
             continue;
         }
         const auto pause = s.pause.take(rest);
         s.next = now + pause - jitter_.quarter_of(pause);
-        return candidate{s.url, is_live ? s.node : std::string{}};
+        return s.url;
     }
     return {};
 }
@@ -118,6 +118,16 @@ void seeds::on_answer(std::string_view url, std::string_view node) {
 void seeds::on_self(std::string_view url) {
     for (auto& s : all_) {
         s.self |= s.url == url;
+    }
+}
+
+void seeds::prefer_in(membership& others) const {
+    for (const auto& s : all_) {
+        const auto known = s.node.empty() ? std::nullopt : others.find_member(s.node);
+        const auto is_in_use = [&](const seed& other) { return other.node == s.node && other.url == known->where; };
+        if (known && std::none_of(all_.begin(), all_.end(), is_in_use)) {
+            others.prefer_address(s.node, protocol::epoch_text(known->epoch), s.url, true);
+        }
     }
 }
 

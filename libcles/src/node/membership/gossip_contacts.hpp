@@ -137,21 +137,17 @@ class seeds {
     /// URLs that remain keep their state. New ones are due at once.
     void set(const std::vector<std::string>& urls);
     [[nodiscard]] bool empty() const noexcept { return all_.empty(); }
-    struct candidate {
-        std::string url;
-        std::string node{}; ///< that is known to be there; empty: any node that replies
-    };
     /// A seed to ask now. It is due again after a pause of at most `rest`.
-    /// \param is_lost whether no link could be opened to this node. Then its seed is asked although the node is live,
-    /// because the address that it has announced first may lead nowhere from here
-    std::optional<candidate> due(const membership& others, time_point now, std::chrono::milliseconds rest,
-                                 const std::function<bool(std::string_view)>& is_lost);
+    std::optional<std::string> due(const membership& others, time_point now, std::chrono::milliseconds rest);
     /// When the next seed is due, unless a node is found before.
     [[nodiscard]] std::optional<time_point> next() const noexcept;
     /// `node` replied at `url`.
     void on_answer(std::string_view url, std::string_view node);
     /// `url` leads to this node itself.
     void on_self(std::string_view url);
+    /// Has the nodes that replied be reached at the URLs where they did, if they have announced these. It may have
+    /// become known only later which they have announced, and the first one may lead nowhere from here.
+    void prefer_in(membership& others) const;
 
   private:
     struct seed {

@@ -367,6 +367,22 @@ BOOST_AUTO_TEST_CASE(of_several_announced_addresses_the_one_that_answers_is_pref
     BOOST_TEST(where() == "tls://10.0.0.2:1");
 }
 
+BOOST_AUTO_TEST_CASE(the_address_at_which_a_seed_has_replied_is_preferred) {
+    cles::core::seeds configured{7};
+    configured.set({"tls://10.0.0.2:1", "tls://10.0.0.3:1", "tls://10.0.0.1:1"});
+    configured.on_answer("tls://10.0.0.2:1", "car1");
+    configured.on_answer("tls://10.0.0.3:1", "car1");
+    configured.prefer_in(others); // it is not known yet
+    hear(entry(7, R"({"node":"car1","endpoints":["tls://10.0.0.1:1","tls://10.0.0.2:1"]})"));
+    BOOST_TEST(where() == "tls://10.0.0.1:1");
+    configured.prefer_in(others);
+    BOOST_TEST(where() == "tls://10.0.0.2:1"); // it has not announced the other
+    configured.on_answer("tls://10.0.0.1:1", "car1");
+    others.prefer_address("car1", "00000001", "tls://10.0.0.1:1", true);
+    configured.prefer_in(others);
+    BOOST_TEST(where() == "tls://10.0.0.1:1"); // one of them is in use already
+}
+
 BOOST_AUTO_TEST_CASE(the_stated_roster_is_reported) {
     hear(entry(1, body("tls://10.0.0.1:1", R"(,"roster":8)")));
     hear(entry_with("x", 2, body("tls://10.0.0.1:1", R"(,"roster":9)"), 1, 0));
