@@ -40,8 +40,6 @@ class SecuredRing(Secured, routes_test.RingTests, unittest.TestCase):
     NAMES, CABLES = routes_test.RingTests.NAMES, routes_test.RingTests.CABLES
     NEAR, FAR = routes_test.RingTests.NEAR, routes_test.RingTests.FAR
     HAS_LINKS = True
-    # Not reliable yet: in one of three runs, the binding stayed on the lost link.
-    test_a_binding_at_the_other_end_of_a_lost_link_moves_too = None
 
     def test_a_node_that_may_not_forward_is_not_on_the_way(self):
         self.assertEqual(self.route("n1", "n3"), (2, "n2"))
