@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: BSL-1.0
-// How much longer an empty job takes that moves, compared with one that is sent to the same node directly, in round
-// trips between client and node. Prints medians.
+// How much longer an empty job takes that moves than one that runs at the node to which it is sent, in round trips
+// between client and node. Prints medians.
 //
-//   cles_moved_job FREE BUSY [SAMPLES]
+//   cles_moved_job DIRECT BUSY [SAMPLES]
 //
-// FREE and BUSY are the URLs of two daemons that share jobs, have one worker each, and offer the tasks of the plugin
-// `work`; the first is the node "free". The worker of BUSY is held by a job meanwhile. One request is in flight at a
-// time, and the three kinds alternate in groups.
+// Both are URLs of daemons that have one worker each and offer the tasks of the plugin `work`. DIRECT, of any name,
+// runs its jobs itself. BUSY shares its jobs with the node "free"; its worker is held by a job meanwhile. One request
+// is in flight at a time, and the three kinds alternate in groups.
 #include <cles/service.hpp>
 
 #include "perf/support/latency_recorder.hpp"
@@ -35,7 +35,7 @@ BOOST_DESCRIBE_STRUCT(ran, (), (node))
 
 class client {
   public:
-    client(std::string free, std::string busy) : free_(std::move(free)), busy_(std::move(busy)) {}
+    client(std::string direct, std::string busy) : direct_(std::move(direct)), busy_(std::move(busy)) {}
 
     /// Occupies the only worker of the busy node.
     void hold_worker() {
@@ -44,14 +44,14 @@ class client {
         io_.run_for(300ms);
     }
     void pull(cles::perf::latency_recorder& to) {
-        timed(to, [&](auto done) { node_.async_pull<int>("self:nothing", at(free_, 5s), std::move(done)); });
+        timed(to, [&](auto done) { node_.async_pull<int>("self:nothing", at(direct_, 5s), std::move(done)); });
     }
-    /// A job for one node, which has to run at the free one.
+    /// A job for one of the two, which moves unless it is `direct`.
     void job(bool direct, cles::perf::latency_recorder& to) {
         timed(to, [&](auto done) {
-            node_.async_delegate<ran>("self:sleep/0", cles::json_text{"{}"}, at(direct ? free_ : busy_, 5s),
-                                      [this, done](boost::system::error_code code, const ran& where) {
-                                          elsewhere_ += where.node == "free" ? 0 : 1;
+            node_.async_delegate<ran>("self:sleep/0", cles::json_text{"{}"}, at(direct ? direct_ : busy_, 5s),
+                                      [=, this](boost::system::error_code code, const ran& where) {
+                                          elsewhere_ += direct == (where.node == "free") ? 1 : 0;
                                           done(code, 0);
                                       });
         });
@@ -80,7 +80,7 @@ class client {
         to.record(clock_type::now() - begun);
     }
 
-    std::string free_;
+    std::string direct_;
     std::string busy_;
     boost::asio::io_context io_{1};
     cles::service node_{io_, {.name = "measuring"}};
@@ -94,7 +94,7 @@ double us(cles::perf::latency_recorder& all) { return all.quantiles().p50; }
 
 int main(int argc, char** argv) try {
     if (argc < 3) {
-        std::fputs("usage: cles_moved_job FREE BUSY [SAMPLES]\n", stderr);
+        std::fputs("usage: cles_moved_job DIRECT BUSY [SAMPLES]\n", stderr);
         return 2;
     }
     const std::size_t wanted = argc > 3 ? std::strtoul(argv[3], nullptr, 10) : 1000;

@@ -7,7 +7,8 @@
 - `four`: jobs of 10 ms, sleeping, are sent by name to one node of four with one worker each, and to a node that is alone.
 - `quotas`: jobs that compute for 20 ms are sent to one of three nodes that may use 40, 40 and 10 % of a processor. The
   ideal is that all three compute all the time. Requires root, for the quotas.
-- `moved`: an empty job that moves, compared with one that is sent to the same node directly, in round trips of a PULL.
+- `moved`: an empty job that moves, compared with one that runs at the node to which it is sent, in round trips of a PULL.
+  As between machines, each message wakes a core: a client and the node to which jobs move have one, the other nodes another.
 
 Each figure is the median of the rounds, and all sides are measured in each round. Nodes are on loopback. The exit code is 1
 if a figure is not met, except with `--smoke`: a short run, for other machines than an idle one.
@@ -196,9 +197,11 @@ def measure_quotas(options):
 def measure_moved(options):
     more = []
     for _ in range(options.rounds):
-        with Pool(options.build, ["free", "busy"]) as pool:
-            free, busy = pool.nodes
-            shown = subprocess.run([f"{options.build}/perf/sharing/cles_moved_job", free.url, busy.url],
+        cores = sorted(os.sched_getaffinity(0))
+        near, far = (["taskset", "-c", f"{core}"] for core in (cores[0], cores[-1]))
+        with Pool(options.build, ["direct"], [far]) as alone, Pool(options.build, ["free", "busy"], [near, far]) as pool:
+            urls = [alone.nodes[0].url, pool.nodes[1].url]
+            shown = subprocess.run([*near, f"{options.build}/perf/sharing/cles_moved_job", *urls],
                                    stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
                                    timeout=TIMEOUT_S, env=clean_environment())
         if shown.returncode != 0:
