@@ -12,6 +12,8 @@ from support import free_port, wait_until
 
 COUNT = 1024
 TICKS = os.sysconf("SC_CLK_TCK")
+# Sanitizers make the work several times as long.
+SLOWER = 4 if os.environ.get("SANITIZED", "") else 1
 
 
 def processor_time(process):
@@ -68,7 +70,7 @@ class Crowd(unittest.TestCase):
         self.announce()
         wait_until(lambda: self.known() > COUNT * 9 // 10, "most of them are known")
         beside = self.slowest(6)
-        asked = {deadline: self.ask_all(deadline) for deadline in (300, 1000)}
+        asked = {deadline: self.ask_all(deadline) for deadline in (300 * SLOWER, 1000 * SLOWER)}
         begun, worked = time.monotonic(), processor_time(self.one.process)
         time.sleep(5)
         share = (processor_time(self.one.process) - worked) / (time.monotonic() - begun)
@@ -77,8 +79,8 @@ class Crowd(unittest.TestCase):
         for deadline, (answer, took) in asked.items():
             self.assertIn("sat2", answer.get("results", {}), answer.get("message"))
             self.assertLess(took, deadline / 1000)
-        self.assertLessEqual(beside, 2 * before + 1)
-        self.assertLessEqual(share, 0.05)
+        self.assertLessEqual(beside, 2 * before + SLOWER)
+        self.assertLessEqual(share, 0.05 * SLOWER)
 
 
 if __name__ == "__main__":
