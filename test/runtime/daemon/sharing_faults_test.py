@@ -112,7 +112,9 @@ class Faults:
                 wrong.append(f"{job} ran at {marks[job.number]}")
         print(f"{self.load.told()}; {moved} moved since the nodes were last started; back in the pool after "
               f"{max(self.backs):.2f} s at most, {sorted(self.backs)[len(self.backs) // 2]:.2f} s in the median")
-        print(f"jobs that ran: {collections.Counter(len(nodes) for nodes in marks.values())} times")
+        for task, kind in (("once", "with effects"), ("again", "idempotent")):
+            runs = collections.Counter(len(marks[job.number]) for job in jobs if job.task == task)
+            print(f"jobs {kind}: " + ", ".join(f"{count} ran {times} times" for times, count in sorted(runs.items())))
         if wrong:
             raise AssertionError("\n".join(wrong[:20]))
         if moved == 0:

@@ -59,6 +59,10 @@ bool is_exempt(const protocol::noun_view& noun) noexcept {
            what == "slots";
 }
 
+bool may_forward_for(const node_state& n, std::string_view requester) {
+    return requester == n.name || n.security->may_forward(n.name, requester);
+}
+
 // For `any` and `all`, the rights are checked for each node that is asked.
 bool is_permitted(const node_state& n, const identity& peer, const protocol::request_line& r) {
     const auto requester = requester_of(n, peer, r);
@@ -71,8 +75,19 @@ bool is_permitted(const node_state& n, const identity& peer, const protocol::req
     if (is_local_target(n, r)) {
         return permits(n, requester, n.name, r.verb, r.noun);
     }
-    return permits(n, requester, r.noun.target, r.verb, r.noun) &&
-           (requester == n.name || n.security->may_forward(n.name, requester));
+    return permits(n, requester, r.noun.target, r.verb, r.noun) && may_forward_for(n, requester);
+}
+
+// Why it is denied. A lack of the right to forward is the node's own, not the requester's, so it is named.
+std::string denial(const node_state& n, const identity& peer, const protocol::request_line& r) {
+    const auto requester = requester_of(n, peer, r);
+    const bool is_for_another =
+        !requester.empty() && !protocol::is_reserved_target(r.noun.target) && !is_local_target(n, r);
+    if (is_for_another && n.security->is_member(requester) && !may_forward_for(n, requester)) {
+        return n.name + " may not forward requests of " + std::string{requester} + " to " + std::string{r.noun.target} +
+               " (cles fleet rights " + n.name + " --forwards " + std::string{requester} + ")";
+    }
+    return n.name + " does not allow " + std::string{to_string(r.verb)} + " '" + std::string{r.noun.task} + "'";
 }
 
 } // namespace
@@ -111,8 +126,7 @@ std::optional<protocol::failure> refusal_reason(const node_state& n, const ident
         return protocol::failure{.code = code, .message = std::move(message)};
     };
     if (!allows(n, peer, r)) {
-        return object(errc::denied, n.name + " does not allow " + std::string{to_string(r.verb)} + " '" +
-                                        std::string{r.noun.task} + "'");
+        return object(errc::denied, denial(n, peer, r));
     }
     // A request for the reserved task other than PULL concerns the link it arrives on, such as an id to cancel.
     const bool stays = n.active_router == nullptr || (r.noun.task == "cles" && r.verb != verb::pull);

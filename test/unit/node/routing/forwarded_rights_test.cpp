@@ -55,7 +55,9 @@ BOOST_AUTO_TEST_CASE(own_requests_state_none) {
 
 BOOST_AUTO_TEST_CASE(a_node_without_the_right_to_forward_does_not) {
     security->forwarders = {};
-    BOOST_TEST(link.kind("PULL car2:speed id=7") == "id=7 denied");
+    BOOST_TEST(link.ask("PULL car2:speed id=7") ==
+               "id=7 {\"error\":\"denied\",\"message\":\"car1 may not forward requests of sat1 to car2 "
+               "(cles fleet rights car1 --forwards sat1)\"}\n");
     BOOST_TEST(link.kind("BIND car2:pose id=8") == "id=8 denied");
     BOOST_TEST(ways.count() == 0U);
 }
