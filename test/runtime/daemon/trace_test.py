@@ -5,6 +5,7 @@
 import json
 import unittest
 
+import secured
 from daemon import DEFAULTS, STUBBORN, Daemon, Folder, body, wait_until_running
 from fleet import Fleet
 from load import Load
@@ -138,6 +139,20 @@ class Moved(TraceTest):
                 load.write([f"PUSH self:cles/cancel/{job.number} reply=no\n"])
             load.wait_until(lambda: all(job.ended for job in held), "they have ended")
             self.assertEqual(fleet.stop(), [0, 0])
+
+
+class Secured(TraceTest):
+    def test_a_member_sees_the_hops_of_its_request(self):
+        fleet = secured.Fleet("car1", "car2", "operator")
+        self.addCleanup(fleet.__exit__)
+        fleet.let_forward("car1", who="operator")
+        fleet.spread("car1", "car2", "operator")
+        car1, car2 = (secured.Node(fleet, name) for name in ("car1", "car2"))
+        for node in (car1, car2):
+            self.addCleanup(node.__exit__)
+        wait_until(lambda: car1.peers() == {"car2"}, "car1 knows car2")
+        how = ("--at", car1.url, "-k", fleet.keys("operator"))
+        self.assertEqual(path_of(self.trace("pull", "car2:cles", *how)["request"]), ["cles", "car1", "car2"])
 
 
 class Jobs(TraceTest):
